@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import placements
 from apo_bench.depth_camera.distance import join_shapes, shape_of, strike_distances
 from apo_bench.depth_camera.follow import Event
 from apo_bench.geometry import pose

@@ -20,7 +20,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import imageio.v3 as imageio
 import numpy as np
 
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import placements
 from apo_bench.drafting.checking import check_file
 from apo_bench.drafting.posed import TABLE
 from apo_bench.records.settings import TrialSettings

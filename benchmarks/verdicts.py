@@ -18,9 +18,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Layout
+from apo_bench.assembly.goals import Layout, placements
 from apo_bench.assembly.joint_play import joint_play_mm
-from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Contact
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array

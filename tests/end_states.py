@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import placements
 from apo_bench.assembly.reached import Reached, Snapshot
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array

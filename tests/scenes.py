@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, Observation
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Demonstration, Observation, placements
 from apo_bench.assembly.topology import Assembly, Contact, Operation, PartFace
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array

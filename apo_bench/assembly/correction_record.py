@@ -1,15 +1,15 @@
-"""What a corrector returns: goals, how the solver ended, and what the test of the correction says."""
+"""What a corrector returns: goals, how the solver ended, and what the test of the correction says; what it may ask."""
 
+from collections.abc import Collection
 from dataclasses import dataclass
-from typing import NamedTuple, final
+from typing import NamedTuple, Protocol, final, runtime_checkable
 
 import numpy as np
 
 from apo_bench.assembly.goals import Observation, Plan, Step
 from apo_bench.assembly.topology import Contact
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.records import copyable
+from apo_bench.geometry.arrays import Array, copyable, freeze
 
 
 class Iterate(NamedTuple):
@@ -111,11 +111,8 @@ class Correction:
     None if it was the observation."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "goals", frozen(self.goals, None, 4, 4))
-        if self.covariance is not None:
-            object.__setattr__(self, "covariance", frozen(self.covariance, len(self.goals), 6, 6))
-        if self.targets is not None:
-            object.__setattr__(self, "targets", frozen(self.targets, len(self.schedule), 4, 4))
+        n = len(self.goals)
+        freeze(self, goals=(None, 4, 4), covariance=(n, 6, 6), targets=(len(self.schedule), 4, 4))
 
     @property
     def ok(self) -> bool:
@@ -134,3 +131,33 @@ class Correction:
             )
         targets = np.zeros((0, 4, 4)) if self.targets is None else self.targets
         return Plan(observation.assembly, observation.start, self.goals, self.schedule, targets)
+
+
+@runtime_checkable
+class Look(Protocol):
+    """What a corrector is handed that may look again: called with operations, counted from 0, it looks once at them.
+
+    Each look has errors of its own, by the noise of the first, so it may be an outlier or a miss as well.
+    """
+
+    @property
+    def left(self) -> int:
+        """Looks that may still be taken."""
+
+    def __call__(self, operations: Collection[int]) -> Observation:
+        """What is seen this time; operations that were not asked for are not `seen`.
+
+        Raises:
+            InputError: No look is left, or there is no such operation.
+        """
+
+
+@runtime_checkable
+class LookingCorrector(Protocol):
+    """A corrector that can ask; one without `looking` is never handed a look."""
+
+    def __call__(self, observation: Observation) -> Correction:
+        """Correct an observation that cannot be looked at again."""
+
+    def looking(self, observation: Observation, look: Look) -> Correction:
+        """Correct an observation, looking again as often as is allowed and needed."""

@@ -23,8 +23,7 @@ from apo_bench.assembly.kinds import OPPOSING, contact_kind
 from apo_bench.assembly.lowering import lowered
 from apo_bench.assembly.topology import ODL, Assembly, Contact, Operation, inverted, product, simplified
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.remembered import remembered
+from apo_bench.geometry.arrays import Array, remembered
 from apo_bench.geometry.solid import Face
 
 

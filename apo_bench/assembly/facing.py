@@ -10,6 +10,7 @@ import numpy as np
 from apo_bench.assembly.facing_round import measure_round, round_pairs
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.convex import ball_around
 from apo_bench.geometry.overlap import face_area, overlap
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, Solid
@@ -108,17 +109,10 @@ def face_gap(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -
 
 def _far(a: Solid, T_a: Array, b: Solid, T_b: Array, gap_m: float) -> bool:
     """Whether the balls around two solids are farther apart than a gap."""
-    middle_a, radius_a = _ball(a)
-    middle_b, radius_b = _ball(b)
+    middle_a, radius_a = ball_around(a.pieces)
+    middle_b, radius_b = ball_around(b.pieces)
     between = T_a[:3, :3] @ middle_a + T_a[:3, 3] - T_b[:3, :3] @ middle_b - T_b[:3, 3]
     return bool(np.sqrt(between @ between) > radius_a + radius_b + gap_m)
-
-
-@lru_cache(maxsize=4096)
-def _ball(solid: Solid) -> tuple[Array, float]:
-    """The middle of the box around a solid, in its frame, and half the diagonal, [m]."""
-    low, high = solid.bounds
-    return (low + high) / 2, float(np.linalg.norm(high - low)) / 2
 
 
 class _Posed(NamedTuple):

@@ -1,12 +1,12 @@
 """The numbers that flow, under different names by role, so that a plan cannot be mixed up with the truth.
 
 Goals are one pose per operation, shape (n, 4, 4), world frame, [m]. Parts that start somewhere known have a
-`start` pose; for a fixed part that is where it stays.
+`start` pose; for a fixed part that is where it stays. From both follows where every part stands after each operation.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import NamedTuple, final
@@ -19,16 +19,12 @@ from apo_bench.assembly.shared_error import SharedError
 from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.records import copyable
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array, copyable, freeze
 
 Poses = Mapping[str, Array]
 """Part name -> pose (4, 4) in the world, [m]."""
-
-
-def frozen_poses(poses: Poses) -> Poses:
-    """A read-only copy."""
-    return MappingProxyType({name: frozen(T, 4, 4) for name, T in poses.items()})
+SCHEDULE_REMEDY = "do operations in order, undo the last one that is done, and have everything done at the end"
 
 
 @final
@@ -41,8 +37,7 @@ class Layout:
     start: Poses
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "goals", frozen(self.goals, None, 4, 4))
-        object.__setattr__(self, "start", frozen_poses(self.start))
+        freeze(self, goals=(None, 4, 4), start=(4, 4))
 
 
 @final
@@ -70,10 +65,7 @@ class Demonstration:
 
     def __post_init__(self) -> None:
         n = len(self.assembly)
-        object.__setattr__(self, "goals", frozen(self.goals, n, 4, 4))
-        object.__setattr__(self, "careless", frozen(self.careless, n, 6, 6))
-        object.__setattr__(self, "start", frozen_poses(self.start))
-        object.__setattr__(self, "final", frozen_poses(self.final))
+        freeze(self, goals=(n, 4, 4), careless=(n, 6, 6), start=(4, 4), final=(4, 4))
 
 
 @final
@@ -103,15 +95,13 @@ class Observation:
 
     def __post_init__(self) -> None:
         n = len(self.assembly)
-        object.__setattr__(self, "goals", frozen(self.goals, n, 4, 4))
-        object.__setattr__(self, "covariance", frozen(self.covariance, n, 6, 6))
+        freeze(self, goals=(n, 4, 4), covariance=(n, 6, 6), start=(4, 4))
         object.__setattr__(self, "shared", tuple(self.shared))
-        for one in self.shared:
-            if max(one.operations, default=-1) >= n:
-                raise ValueError(f"the shared error '{one.name}' names operation {max(one.operations) + 1} of {n}")
+        for error in self.shared:
+            if max(error.operations, default=-1) >= n:
+                raise ValueError(f"the shared error '{error.name}' names operation {max(error.operations) + 1} of {n}")
         if self.tails is not None and len(self.tails.frames) != n:
             raise ValueError(f"tails of {len(self.tails.frames)} operations were given for {n}")
-        object.__setattr__(self, "start", frozen_poses(self.start))
         seen = np.array(self.seen, dtype=np.bool_)
         if seen.shape != (n,):
             raise ValueError(f"`seen` needs shape ({n},), {seen.shape} was given")
@@ -162,10 +152,68 @@ class Plan:
 
     def __post_init__(self) -> None:
         n = len(self.assembly)
-        object.__setattr__(self, "goals", frozen(self.goals, n, 4, 4))
-        object.__setattr__(self, "start", frozen_poses(self.start))
+        freeze(self, goals=(n, 4, 4), start=(4, 4))
         if not self.schedule:
             object.__setattr__(self, "schedule", once_each(n))
-        filled = self.goals[[step.operation for step in self.schedule]]
-        targets = self.targets if len(self.targets) else filled
-        object.__setattr__(self, "targets", frozen(targets, len(self.schedule), 4, 4))
+        if not len(self.targets):
+            object.__setattr__(self, "targets", self.goals[[step.operation for step in self.schedule]])
+        freeze(self, targets=(len(self.schedule), 4, 4))
+
+
+def placements(assembly: Assembly, start: Poses, goals: Array) -> tuple[Poses, ...]:
+    """The pose of every part after each operation, what an ODL stands for (Section 3.2.1), by walking the operations.
+
+    Args:
+        start: Poses before the first operation, world frame, [m].
+        goals: (n, 4, 4), world frame, [m].
+
+    Returns:
+        One mapping per operation; a part that was not moved yet stands where it started.
+    """
+    history: list[Poses] = []
+    now = dict(start)
+    for operation, goal in zip(assembly.operations, goals, strict=True):
+        before = now[operation.main]
+        now = dict(now)
+        # What is carried keeps its place on the main part: T_world_carried = T_goal T_before^-1 T_world_carried.
+        for part in operation.carries:
+            now[part] = goal @ pose.inverse(before) @ now[part]
+        now[operation.main] = goal
+        history.append(MappingProxyType(now))
+    return tuple(history)
+
+
+def schedule_fault(schedule: Sequence[Step], operations: int) -> str:
+    """What is wrong with it, such as `undoes operation 2, which is not done`; empty if nothing is.
+
+    What is done is always the first few operations: an operation may stand on all that came before it, and what was
+    undone last first leaves free the place that it came from.
+    """
+    done = 0
+    for k, undo in schedule:
+        if not 0 <= k < operations:
+            return f"names operation {k + 1}, where {operations} are known"
+        if undo and k >= done:
+            return f"undoes operation {k + 1}, which is not done"
+        if undo and k < done - 1:
+            return f"undoes operation {k + 1} before operation {done}, which came after it"
+        if not undo and k < done:
+            return f"does operation {k + 1} again, which is done"
+        if not undo and k > done:
+            return f"does operation {k + 1} before operation {done + 1}"
+        done += -1 if undo else 1
+    return f"leaves operation {done + 1} undone" if done < operations else ""
+
+
+def goals_in_force(plan: Plan) -> list[tuple[int, Array]]:
+    """How many operations are done, and the goals in force, before each time something is undone and at the end."""
+    goals = np.array(plan.goals)
+    done = 0
+    stages = []
+    for i, (step, target) in enumerate(zip(plan.schedule, plan.targets, strict=True)):
+        if not step.undo:
+            goals[step.operation] = target
+            done = step.operation + 1
+        if i + 1 == len(plan.schedule) or (plan.schedule[i + 1].undo and not step.undo):
+            stages.append((done, np.array(goals)))
+    return stages

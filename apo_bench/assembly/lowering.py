@@ -25,8 +25,7 @@ from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.kinds import WALLS, contact_kind
 from apo_bench.assembly.topology import Assembly, Contact, Gap, PartFace
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.remembered import remembered
+from apo_bench.geometry.arrays import Array, remembered
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face
 

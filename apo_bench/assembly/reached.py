@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import final
 
-from apo_bench.assembly.goals import Poses, Step, frozen_poses
-from apo_bench.geometry.records import copyable
+from apo_bench.assembly.goals import Poses, Step
+from apo_bench.geometry.arrays import copyable, freeze
 
 
 @final
@@ -25,7 +25,7 @@ class Snapshot:
     """Whether no hand or gripper touches a part."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "poses", frozen_poses(self.poses))
+        freeze(self, poses=(4, 4))
 
 
 @final

@@ -16,8 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.records import copyable
+from apo_bench.geometry.arrays import Array, copyable, freeze
 
 
 @final
@@ -45,11 +44,7 @@ class SharedError:
         if m != len(set(operations)) or min(operations, default=0) < 0:
             raise ValueError(f"each operation once, counted from 0, is needed, {operations} was given")
         object.__setattr__(self, "operations", operations)
-        object.__setattr__(self, "covariance", frozen(self.covariance, 6, 6))
-        if self.frame is not None:
-            object.__setattr__(self, "frame", frozen(self.frame, 4, 4))
-        if self.correlation is not None:
-            object.__setattr__(self, "correlation", frozen(self.correlation, m, m))
+        freeze(self, covariance=(6, 6), frame=(4, 4), correlation=(m, m))
 
     def ways(self, goals: Array) -> Array:
         """A_k of the operations that share it, (m, 6, 6); `goals` are those that were seen, (n, 4, 4)."""

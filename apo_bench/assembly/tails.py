@@ -10,8 +10,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.records import copyable
+from apo_bench.geometry.arrays import Array, copyable, freeze
 
 _COLUMNS = ((0, 1), (2,), (3, 4), (5,))
 """Of an error (x, y, along; rx, ry, about): across, along, tilt, turn about."""
@@ -39,12 +38,10 @@ class Tails:
     """Whether shift and turn are large together, by one number for all six directions."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "frames", frozen(self.frames, None, 3, 3))
-        for name, length in (("scales", 4), ("freedom", 4), ("variances", 4), ("limits", 2)):
-            array = frozen(getattr(self, name), length)
-            if not (array > 0.0).all():
-                raise ValueError(f"`{name}` must be above 0, {array.tolist()} was given")
-            object.__setattr__(self, name, array)
+        freeze(self, frames=(None, 3, 3), scales=(4,), freedom=(4,), variances=(4,), limits=(2,))
+        for name in ("scales", "freedom", "variances", "limits"):
+            if not (getattr(self, name) > 0.0).all():
+                raise ValueError(f"`{name}` must be above 0, {getattr(self, name).tolist()} was given")
 
     def draws(self, joint: Array, count: int) -> Array:
         """Body twists of all operations, (count, n, 6), [m, rad]: the same for the same tails, so that what is computed

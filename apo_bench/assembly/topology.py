@@ -14,9 +14,7 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly.kinds import WALLS, contact_kind, geometric_play
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.records import copyable
-from apo_bench.geometry.remembered import remembered
+from apo_bench.geometry.arrays import Array, copyable, remembered
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, Solid
 

@@ -20,8 +20,7 @@ from apo_bench.assembly.equations import pattern
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.correction.play import plays
 from apo_bench.correction.solvers.gauss_newton import SMALLEST
-from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.remembered import remembered
+from apo_bench.geometry.arrays import Array, frozen, remembered
 
 TEST_LEVEL = 0.01
 """False alarms that are accepted."""

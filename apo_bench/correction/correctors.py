@@ -9,9 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly.correction_record import Correction, Look, LookingCorrector
 from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.look import Look, LookingCorrector
 from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.baselines.measured import gap_of, goals_as_given
 from apo_bench.correction.contact import ContactCorrector
@@ -19,7 +18,7 @@ from apo_bench.correction.ending import opposing
 from apo_bench.correction.own_code.returned import RIGID, check_correction, check_near
 from apo_bench.errors import InputError, failed, kind
 from apo_bench.geometry.arrays import Array, NotReal, real
-from apo_bench.geometry.rigid import is_rigid
+from apo_bench.geometry.pose import is_rigid
 from apo_bench.names import resolve
 from apo_bench.records.short_names import CORRECTOR, CORRECTORS
 

@@ -16,8 +16,7 @@ import numpy as np
 
 from apo_bench.assembly.equations import pattern
 from apo_bench.assembly.topology import Assembly, Contact, PartFace
-from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.remembered import remembered
+from apo_bench.geometry.arrays import Array, frozen, remembered
 
 LARGEST_CORRELATED = 300
 """Contacts above which the play of each is taken for its own: a covariance of all of them is a dense matrix."""

@@ -33,8 +33,7 @@ from apo_bench.correction.solvers.gauss_newton import NearestGoals, batch_goals
 from apo_bench.correction.solvers.inequalities import Inequalities, active_rank, bounded, nearest_between
 from apo_bench.correction.solvers.whitened import correction_to, noise_factor, scales
 from apo_bench.correction.tailed import drawn_lengths, drawn_p_value
-from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.remembered import remembered
+from apo_bench.geometry.arrays import Array, frozen, remembered
 
 
 class Solved(NamedTuple):

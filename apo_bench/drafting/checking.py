@@ -10,9 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Plan
+from apo_bench.assembly.goals import Plan, placements
 from apo_bench.assembly.kinds import contact_kind
-from apo_bench.assembly.placement import placements
 from apo_bench.drafting.lines import line_of
 from apo_bench.drafting.posed import TABLE
 from apo_bench.drafting.standing import stance

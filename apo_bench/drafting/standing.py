@@ -5,9 +5,8 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import piece_corners
 from apo_bench.geometry.hull import Hull
-from apo_bench.geometry.solid import Solid, extent
+from apo_bench.geometry.solid import Piece, Solid, extent
 
 _LOW_M = 2e-5
 """Corners so near to the lowest one carry."""
@@ -40,7 +39,7 @@ def stance(solid: Solid, R: Array) -> Stance:
     return Stance(-low, _on_line(base, middle[:2]), _on_line(base, middle[:2]))
 
 
-def _lowest(piece: object, up: Array, low: float) -> Array:
+def _lowest(piece: Piece, up: Array, low: float) -> Array:
     """The corners of a piece that touch the plane, (k, 3); of a level cylinder the ends of the line that does."""
     if isinstance(piece, Hull) and piece.cylinder is not None and abs(piece.cylinder.axis @ up) < _LEVEL:
         c = piece.cylinder
@@ -48,8 +47,7 @@ def _lowest(piece: object, up: Array, low: float) -> Array:
             return np.zeros((0, 3))
         reach = c.half_length * np.outer([-1.0, 1.0], c.axis)
         return np.asarray(c.center - c.radius * up + reach)
-    corners = piece_corners(piece)  # type: ignore[arg-type]
-    return np.asarray(corners[corners @ up < low + _LOW_M])
+    return np.asarray(piece.corners[piece.corners @ up < low + _LOW_M])
 
 
 def _margin(base: Array, at: Array) -> float:

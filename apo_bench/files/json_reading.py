@@ -5,9 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation, Plan, Poses, Step
+from apo_bench.assembly.goals import SCHEDULE_REMEDY, Observation, Plan, Poses, Step, schedule_fault
 from apo_bench.assembly.outlier_model import OutlierModel
-from apo_bench.assembly.schedule import REMEDY, schedule_fault
 from apo_bench.assembly.shared_error import SharedError
 from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import Assembly
@@ -81,7 +80,7 @@ def read_plan(path: str | Path, scenario: Scenario | None = None) -> Plan:
     steps = [_step(node, goals) for node in root["schedule"].items("schedule entry")]
     schedule = tuple(step for step, _ in steps)
     if steps and (wrong := schedule_fault(schedule, len(goals))):
-        raise InputError(f"{path}, schedule: it {wrong}; {REMEDY}.")
+        raise InputError(f"{path}, schedule: it {wrong}; {SCHEDULE_REMEDY}.")
     targets = np.array([T for _, T in steps] or goals)
     return Plan(found.assembly, _poses(root["start"], found), goals, schedule, targets)
 

@@ -10,7 +10,7 @@ from apo_bench.assembly.goals import Observation
 from apo_bench.errors import InputError
 from apo_bench.files.csv_form import read_table
 from apo_bench.files.deviations import DEVIATION_DEG, DEVIATION_MM, check_deviations
-from apo_bench.geometry.rigid import FARTHEST_M
+from apo_bench.geometry.pose import FARTHEST_M
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario
 

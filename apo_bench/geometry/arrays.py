@@ -1,10 +1,24 @@
-"""Arrays that stay as they were made."""
+"""What never changes: read-only arrays, records that stay so in every copy, and answers that follow from them."""
+
+import copyreg
+from collections.abc import Callable, Mapping
+from dataclasses import fields
+from functools import wraps
+from types import MappingProxyType
+from typing import Any, ParamSpec, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+Record = TypeVar("Record")
+Arguments = ParamSpec("Arguments")
+Answer = TypeVar("Answer")
+
+_MOST_ANSWERS = 16
+"""Answers that are kept of one object; further ones are worked out each time."""
 
 
 class NotReal(ValueError):
@@ -18,10 +32,10 @@ def real(value: ArrayLike) -> Array:
         NotReal: It holds complex numbers.
         TypeError, ValueError: It holds no numbers.
     """
-    given = np.asarray(value)
-    if given.dtype.kind == "c":
+    array = np.asarray(value)
+    if array.dtype.kind == "c":
         raise NotReal("real numbers are needed, complex ones were given")
-    return np.array(given, dtype=np.float64)
+    return np.array(array, dtype=np.float64)
 
 
 def frozen(value: ArrayLike, *shape: int | None) -> Array:
@@ -43,5 +57,63 @@ def frozen(value: ArrayLike, *shape: int | None) -> Array:
     return array
 
 
-def _differ(wanted: int | None, given: int) -> bool:
-    return wanted is not None and wanted != given
+def _differ(wanted: int | None, length: int) -> bool:
+    return wanted is not None and wanted != length
+
+
+def freeze(record: Any, **shapes: tuple[int | None, ...]) -> None:
+    """Have fields of a frozen dataclass hold read-only copies of what they were given; those that are None stay so.
+
+    Args:
+        shapes: Field -> the shape of its array, as in `frozen`, or of each array in it, if it is a mapping.
+    """
+    for name, shape in shapes.items():
+        value = getattr(record, name)
+        if isinstance(value, Mapping):
+            object.__setattr__(
+                record, name, MappingProxyType({key: frozen(each, *shape) for key, each in value.items()})
+            )
+        elif value is not None:
+            object.__setattr__(record, name, frozen(value, *shape))
+
+
+def copyable(record: type[Record]) -> type[Record]:
+    """Have a frozen dataclass copied and pickled through its constructor: what it holds is read-only in the copy too.
+
+    A read-only mapping cannot be pickled by itself, and an array that was pickled can be written to.
+    """
+    copyreg.pickle(record, _reduced)
+    return record
+
+
+def _reduced(record: Any) -> tuple[Any, ...]:
+    return _again, (type(record), {f.name: _plain(getattr(record, f.name)) for f in fields(record)})
+
+
+def _again(record: type[Any], values: Mapping[str, Any]) -> Any:
+    return record(**values)
+
+
+def _plain(value: Any) -> Any:
+    return dict(value) if isinstance(value, MappingProxyType) else value
+
+
+def remembered(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:
+    """Keep what a function of an object, and of plain values, returned, for as long as the object lives.
+
+    For objects that are compared by identity and never change. What is returned is shared, so nobody may change it.
+    """
+    known: WeakKeyDictionary[Any, dict[tuple[Any, ...], Answer]] = WeakKeyDictionary()
+
+    @wraps(function)
+    def remembering(*args: Arguments.args, **named: Arguments.kwargs) -> Answer:
+        answers = known.setdefault(args[0], {})
+        key = (args[1:], *sorted(named.items()))
+        if key in answers:
+            return answers[key]
+        answer = function(*args, **named)
+        if len(answers) < _MOST_ANSWERS:
+            answers[key] = answer
+        return answer
+
+    return remembering

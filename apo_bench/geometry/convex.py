@@ -1,20 +1,16 @@
-"""Shadows of convex pieces, and the directions along which two of them may be apart."""
+"""Convex pieces: their shadows, what is around several of them, and along which directions two of them may be apart."""
 
-from collections.abc import Iterable
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.hull import Hull
-from apo_bench.geometry.solid import Box, Piece
+from apo_bench.geometry.solid import Piece
 
 _PARALLEL = 1e-6
 """Edges whose cross product is shorter give no direction of their own."""
-
-
-def all_boxes(pieces: Iterable[Piece]) -> bool:
-    """Whether there is nothing but boxes."""
-    return all(isinstance(piece, Box) for piece in pieces)
 
 
 def shadow(piece: Piece, R: Array, axes: Array) -> tuple[Array, Array]:
@@ -40,13 +36,24 @@ def separating_axes(a: Piece, R_a: Array, b: Piece, R_b: Array) -> Array:
 
 def across_sides(a: Piece, R_a: Array, b: Piece, R_b: Array) -> Array:
     """Those that are normals of a side, (k, 3)."""
-    return np.concatenate([_sides(a)[0] @ R_a.T, _sides(b)[0] @ R_b.T])
+    return np.concatenate([a.normals @ R_a.T, b.normals @ R_b.T])
 
 
 def across_edges(a: Piece, R_a: Array, b: Piece, R_b: Array) -> Array:
     """Those across an edge of each, (k, 3)."""
-    u = (_sides(a)[1] @ R_a.T)[:, None]
-    v = (_sides(b)[1] @ R_b.T)[None]
+    return _crossed(a.edges @ R_a.T, b.edges @ R_b.T)
+
+
+def box_axes(R_a: Array, R_b: Array) -> Array:
+    """The directions along which two boxes may be apart, (k, 3), by their orientations, (3, 3)."""
+    return np.concatenate([R_a.T, R_b.T, _crossed(R_a.T, R_b.T)])
+
+
+def _crossed(edges_a: Array, edges_b: Array) -> Array:
+    """The cross product of each of some directions, (a, 3), with each of others, (b, 3), unit length; parallel ones
+    give none."""
+    u = edges_a[:, None]
+    v = edges_b[None]
     pairs = np.empty((len(u), v.shape[1], 3))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         pairs[..., i] = u[..., j] * v[..., k] - u[..., k] * v[..., j]
@@ -56,14 +63,23 @@ def across_edges(a: Piece, R_a: Array, b: Piece, R_b: Array) -> Array:
     return np.asarray(crossed[kept] / length[kept, None])
 
 
-def piece_corners(piece: Piece) -> Array:
-    """The corners of a piece, (k, 3), in the frame of its solid, [m]."""
-    return piece.corners if isinstance(piece, Hull) else np.asarray(piece.center + _SIGNS * piece.half)
+@lru_cache(maxsize=1024)
+def corners_of(pieces: tuple[Piece, ...]) -> tuple[Array, NDArray[np.intp]]:
+    """The corners of all pieces, (k, 3), in the frame of their solid, [m], and where those of each begin."""
+    corners = [piece.corners for piece in pieces]
+    return frozen(np.concatenate(corners), None, 3), np.cumsum([0, *map(len, corners[:-1])])
 
 
-_SIGNS = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, 8).T
+@lru_cache(maxsize=1024)
+def boxes_around(pieces: tuple[Piece, ...]) -> tuple[Array, Array]:
+    """Centres and half sizes, (k, 3) each, of boxes or of those around pieces, in the frame of their solid, [m]."""
+    return frozen([piece.center for piece in pieces], None, 3), frozen([piece.half for piece in pieces], None, 3)
 
 
-def _sides(piece: Piece) -> tuple[Array, Array]:
-    """Directions across the sides of a piece, and along its edges."""
-    return (piece.normals, piece.edges) if isinstance(piece, Hull) else (np.eye(3), np.eye(3))
+@lru_cache(maxsize=4096)
+def ball_around(pieces: tuple[Piece, ...]) -> tuple[Array, float]:
+    """Middle, (3,), of the box around all pieces, in the frame of their solid, and half its diagonal, [m]."""
+    centers, halves = boxes_around(pieces)
+    low = (centers - halves).min(axis=0)
+    high = (centers + halves).max(axis=0)
+    return frozen((low + high) / 2, 3), float(np.linalg.norm(high - low)) / 2

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import piece_corners
 from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, Piece, Solid
@@ -72,7 +71,7 @@ def fills_the_same(solid: Solid, g: Array, within_m: float) -> bool:
 
 def _points(piece: Piece) -> Array:
     """Corners of a piece, its middle, and what lies between them, (k, 3)."""
-    corners = piece_corners(piece)
+    corners = piece.corners
     middle = corners.mean(axis=0)
     return np.concatenate([corners, middle + 0.9 * (corners - middle), middle + 0.5 * (corners - middle), middle[None]])
 

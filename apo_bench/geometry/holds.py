@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import piece_corners
+from apo_bench.geometry.convex import corners_of
 from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.solid import Piece, Solid, extent
 
@@ -184,7 +184,7 @@ def _lines(low: float, high: float, also: Sequence[float], ray_m: float = _RAY_M
 def _cast(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Array) -> _Rays:
     """Send rays along a direction through all places of a grid, each way in rising order."""
     along = np.cross(up, across)
-    corners, first = _corners(pieces)
+    corners, first = corners_of(pieces)
     (t0, t1), (h0, h1) = (_over(places, corners @ axis, first) for places, axis in ((t, along), (h, up)))
     met = np.flatnonzero((t0 < t1) & (h0 < h1))
     T, H = np.meshgrid(t, h)
@@ -198,13 +198,6 @@ def _cast(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Arra
     return _Rays(across, along, up, T.ravel(), H.ravel(), *(end.reshape(T.size, len(met)) for end in (low, high)))
 
 
-@lru_cache(maxsize=64)
-def _corners(pieces: tuple[Piece, ...]) -> tuple[Array, NDArray[np.intp]]:
-    """The corners of all pieces, (k, 3), and where those of each begin."""
-    corners = [piece_corners(piece) for piece in pieces]
-    return np.concatenate(corners), np.cumsum([0, *map(len, corners[:-1])])
-
-
 def _over(places: Array, at: Array, first: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Of rising places, the first in the shadow of each piece and the one behind its last."""
     low = np.minimum.reduceat(at, first)
@@ -214,9 +207,8 @@ def _over(places: Array, at: Array, first: NDArray[np.intp]) -> tuple[NDArray[np
 
 def _ends(piece: Piece, across: Array, start: Array) -> tuple[Array, Array]:
     """Where rays from (r, 3) enter and leave a piece, (r,) each; infinite where they miss it."""
-    planes = _sides(piece)
-    rate = planes[:, :3] @ across
-    room = planes[:, 3] - start @ planes[:, :3].T
+    rate = piece.planes[:, :3] @ across
+    room = piece.planes[:, 3] - start @ piece.planes[:, :3].T
     with np.errstate(divide="ignore", invalid="ignore"):
         at = room / rate
     flat = np.abs(rate) < 1e-12
@@ -224,14 +216,6 @@ def _ends(piece: Piece, across: Array, start: Array) -> tuple[Array, Array]:
     high = np.where(rate > 0.0, at, np.inf)[:, ~flat].min(axis=1, initial=np.inf)
     missed = (room[:, flat] < 0.0).any(axis=1) | (low >= high)
     return np.where(missed, np.inf, low), np.where(missed, -np.inf, high)
-
-
-def _sides(piece: Piece) -> Array:
-    """The sides of a piece, (s, 4), n . x <= d inside."""
-    if isinstance(piece, Hull):
-        return piece.planes
-    n = np.concatenate([np.eye(3), -np.eye(3)])
-    return np.column_stack([n, n @ piece.center + np.tile(piece.half, 2)])
 
 
 def _clusters(rays: _Rays, within: NDArray[np.bool_]) -> list[tuple[float, float]]:

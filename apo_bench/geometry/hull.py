@@ -6,8 +6,7 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.records import copyable
+from apo_bench.geometry.arrays import Array, copyable, freeze, frozen
 
 SAGITTA_M = 5e-6
 """A round wall is stood for by flat ones that are nowhere farther from it."""
@@ -45,7 +44,7 @@ class Hull:
     """The cylinder that it stands for; its corners lie on the edges of that one."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "corners", frozen(self.corners, None, 3))
+        freeze(self, corners=(None, 3))
 
     @cached_property
     def center(self) -> Array:

@@ -5,12 +5,20 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.convex import across_edges, across_sides, all_boxes, piece_corners, separating_axes, shadow
-from apo_bench.geometry.solid import Piece, Solid
+from apo_bench.geometry.convex import (
+    across_edges,
+    across_sides,
+    ball_around,
+    box_axes,
+    boxes_around,
+    corners_of,
+    separating_axes,
+    shadow,
+)
+from apo_bench.geometry.solid import Piece, Solid, all_boxes
 
 _TOUCHING_M = 1e-6
 """Balls around solids are apart if this far from each other, whatever was rounded."""
@@ -33,8 +41,8 @@ def intrusion(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
     Separating axes: two pieces are apart if their shadows are apart along a normal of a side or along a cross product
     of two edges. The depth is the shortest way out.
     """
-    middle_a, reach_a = _ball(a.pieces)
-    middle_b, reach_b = _ball(b.pieces)
+    middle_a, reach_a = ball_around(a.pieces)
+    middle_b, reach_b = ball_around(b.pieces)
     between = T_a[:3, :3] @ middle_a + T_a[:3, 3] - T_b[:3, :3] @ middle_b - T_b[:3, 3]
     if between @ between > (reach_a + reach_b + _TOUCHING_M) ** 2:
         return 0.0
@@ -53,9 +61,9 @@ def intrusion_depths(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece
     """
     if not (_all_boxes(a) and _all_boxes(b)):
         return _piece_by_piece(a, R_a, at, b, T_b)
-    centers_a, halves_a = _boxes(a)
-    centers_b, halves_b = _boxes(b)
-    axes = _axes(R_a, T_b[:3, :3])
+    centers_a, halves_a = boxes_around(a)
+    centers_b, halves_b = boxes_around(b)
+    axes = box_axes(R_a, T_b[:3, :3])
     reach = (halves_a @ np.abs(axes @ R_a).T)[:, None] + (halves_b @ np.abs(axes @ T_b[:3, :3]).T)[None]
     between = (centers_a @ R_a.T)[:, None] - (centers_b @ T_b[:3, :3].T + T_b[:3, 3])[None]
     apart = np.abs((between @ axes.T)[None] + (at @ axes.T)[:, None, None])
@@ -67,9 +75,9 @@ def ways_out(a: Solid, T_a: Array, b: Solid, T_b: Array, deep_m: float) -> Itera
     R_a = T_a[:3, :3]
     R_b = T_b[:3, :3]
     if _all_boxes(a.pieces) and _all_boxes(b.pieces):
-        axes = _axes(R_a, R_b)
-        centers_a, halves_a = _boxes(a.pieces)
-        centers_b, halves_b = _boxes(b.pieces)
+        axes = box_axes(R_a, R_b)
+        centers_a, halves_a = boxes_around(a.pieces)
+        centers_b, halves_b = boxes_around(b.pieces)
         reach = (halves_a @ np.abs(axes @ R_a).T)[:, None] + (halves_b @ np.abs(axes @ R_b).T)[None]
         between = pose.apply(T_a, centers_a)[:, None] - pose.apply(T_b, centers_b)[None]
         along = between @ axes.T
@@ -137,17 +145,11 @@ def _rooms(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_
 
 def _upright(pieces: tuple[Piece, ...], R: Array) -> tuple[Array, Array]:
     """Middles and half sizes, (k, 3) each, of the boxes around turned pieces whose sides are those of the world."""
-    corners = _corners(pieces) @ R.T
-    begin = _begins(pieces)
-    low = np.minimum.reduceat(corners, begin)
-    high = np.maximum.reduceat(corners, begin)
+    corners, first = corners_of(pieces)
+    turned = corners @ R.T
+    low = np.minimum.reduceat(turned, first)
+    high = np.maximum.reduceat(turned, first)
     return (low + high) / 2, (high - low) / 2
-
-
-@lru_cache(maxsize=1024)
-def _begins(pieces: tuple[Piece, ...]) -> NDArray[np.intp]:
-    """Where the corners of each piece begin among those of all."""
-    return np.cumsum([0, *(len(piece_corners(piece)) for piece in pieces[:-1])])
 
 
 def _depths(a: Piece, R_a: Array, at: Array, b: Piece, T_b: Array, axes: Array) -> Array:
@@ -164,43 +166,11 @@ def _all_boxes(pieces: tuple[Piece, ...]) -> bool:
 
 
 @lru_cache(maxsize=1024)
-def _corners(pieces: tuple[Piece, ...]) -> Array:
-    """The corners of all pieces, (k, 3), in the frame of their solid."""
-    return frozen(np.concatenate([piece_corners(piece) for piece in pieces]), None, 3)
-
-
-@lru_cache(maxsize=1024)
 def _balls(pieces: tuple[Piece, ...]) -> tuple[Array, Array]:
     """Middles, (k, 3), and radii, (k,), of balls around pieces, in the frame of their solid."""
-    corners = [piece_corners(piece) for piece in pieces]
+    corners = [piece.corners for piece in pieces]
     radii = [np.linalg.norm(c - p.center, axis=1).max() for c, p in zip(corners, pieces, strict=True)]
     return frozen([piece.center for piece in pieces], None, 3), frozen(radii, None)
-
-
-@lru_cache(maxsize=1024)
-def _boxes(pieces: tuple[Piece, ...]) -> tuple[Array, Array]:
-    """Centres and half sizes, (k, 3) each, of boxes or of those around pieces, in the frame of their solid."""
-    return frozen([piece.center for piece in pieces], None, 3), frozen([piece.half for piece in pieces], None, 3)
-
-
-@lru_cache(maxsize=1024)
-def _ball(pieces: tuple[Piece, ...]) -> tuple[Array, float]:
-    """Middle, (3,), and radius of a ball around pieces, in the frame of their solid."""
-    centers, halves = _boxes(pieces)
-    low = (centers - halves).min(axis=0)
-    high = (centers + halves).max(axis=0)
-    return frozen((low + high) / 2, 3), float(np.linalg.norm(high - low)) / 2
-
-
-def _axes(R_a: Array, R_b: Array) -> Array:
-    """The directions along which two boxes may be apart, (k, 3), unit length; parallel edges give no cross product."""
-    a = R_a[:, :, None]
-    b = R_b[:, None, :]
-    crossed = np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-    crossed = crossed.reshape(3, -1).T
-    length = np.sqrt((crossed * crossed).sum(axis=1))
-    kept = length > 1e-6
-    return np.concatenate([R_a.T, R_b.T, crossed[kept] / length[kept, None]])
 
 
 def upright_bounds(pieces: tuple[Piece, ...], R: Array, at: Array) -> tuple[Array, Array]:
@@ -211,9 +181,9 @@ def upright_bounds(pieces: tuple[Piece, ...], R: Array, at: Array) -> tuple[Arra
         at: (3,), the place of their frame, [m].
     """
     if not _all_boxes(pieces):
-        corners = _corners(pieces) @ R.T + at
+        corners = corners_of(pieces)[0] @ R.T + at
         return corners.min(axis=0), corners.max(axis=0)
-    centers, halves = _boxes(pieces)
+    centers, halves = boxes_around(pieces)
     middle = centers @ R.T + at
     reach = halves @ np.abs(R).T
     return (middle - reach).min(axis=0), (middle + reach).max(axis=0)

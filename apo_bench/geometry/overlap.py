@@ -10,7 +10,7 @@ from typing import Any, final
 import numpy as np
 
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.arrays import Array, freeze
 from apo_bench.geometry.polygon import straightened
 from apo_bench.geometry.solid import Face
 
@@ -33,7 +33,7 @@ class Overlap:
     """The overlap as a shapely geometry in the frame of the lower face, so that overlaps on one face compare."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "corners", frozen(self.corners, None, 3))
+        freeze(self, corners=(None, 3))
 
     def share(self, of: Overlap) -> float:
         """How much of another overlap on the same lower face this one covers, 0 to 1; 1 if that one is empty."""

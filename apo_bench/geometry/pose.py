@@ -6,12 +6,14 @@ body's own frame, and acts from the right: `T @ exp(twist)`. Leading axes broadc
 """
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from apo_bench.geometry.arrays import Array
 
-_IDENTITY = np.eye(4)
-_IDENTITY.flags.writeable = False
+FARTHEST_M = 1e4
+"""Nothing is farther from the origin: beyond it, rounding is no longer small."""
+_NOT_ORTHOGONAL = 1e-6
+"""How far R R^t may be from the identity."""
 _ROUNDING = 1e-9
 """A component of a quaternion that is nearer to zero has no sign."""
 
@@ -116,6 +118,18 @@ def unpack(pose: ArrayLike) -> Array:
     T[..., :3, 3] = pose[..., :3]
     T[..., 3, 3] = 1.0
     return T
+
+
+def is_rigid(T: ArrayLike) -> NDArray[np.bool_]:
+    """Whether each matrix, (n, 4, 4), is a proper rigid displacement, -> (n,); numbers that are not finite are not."""
+    T = np.asarray(T, dtype=np.float64)
+    finite = np.isfinite(T).all(axis=(1, 2))
+    if not finite.all():
+        T = np.where(finite[:, None, None], T, 0.0)
+    R = T[:, :3, :3]
+    orthogonal = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2)) < _NOT_ORTHOGONAL
+    last_row = np.abs(T[:, 3] - np.eye(4)[3]).max(axis=1) < _NOT_ORTHOGONAL
+    return np.asarray(finite & orthogonal & last_row & (np.linalg.det(R) > 0.0))
 
 
 def apply(T: ArrayLike, points: ArrayLike) -> Array:

@@ -6,8 +6,7 @@ from typing import Literal, final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.records import copyable
+from apo_bench.geometry.arrays import Array, copyable, freeze, frozen
 
 RoundKind = Literal["cylinder", "cone", "rim"]
 WHOLE_TURN = 2.0 * np.pi
@@ -39,10 +38,7 @@ class RoundFace:
     """From the axis to the middle of the face, unit vector, (3,); None of a whole turn."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "point", frozen(self.point, 3))
-        object.__setattr__(self, "axis", frozen(self.axis, 3))
-        if self.toward is not None:
-            object.__setattr__(self, "toward", frozen(self.toward, 3))
+        freeze(self, point=(3,), axis=(3,), toward=(3,))
 
     @property
     def kind(self) -> RoundKind:

@@ -8,9 +8,8 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.arrays import Array, copyable, freeze, frozen
 from apo_bench.geometry.hull import Hull
-from apo_bench.geometry.records import copyable
 from apo_bench.geometry.round_face import RoundFace
 
 
@@ -33,7 +32,7 @@ class Face:
     """Whether what touches it looks the other way; a plane through an axis has two sides that are alike."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "outline", frozen(self.outline, None, 3))
+        freeze(self, outline=(None, 3))
         object.__setattr__(self, "holes", tuple(frozen(hole, None, 3) for hole in self.holes))
 
     @cached_property
@@ -64,12 +63,39 @@ class Box:
     half: Array
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "center", frozen(self.center, 3))
-        object.__setattr__(self, "half", frozen(self.half, 3))
+        freeze(self, center=(3,), half=(3,))
+
+    @cached_property
+    def corners(self) -> Array:
+        """(8, 3), [m]."""
+        signs = np.array(np.meshgrid([-1.0, 1.0], [-1.0, 1.0], [-1.0, 1.0])).reshape(3, 8).T
+        return frozen(self.center + signs * self.half, 8, 3)
+
+    @cached_property
+    def planes(self) -> Array:
+        """Its sides, (6, 4): outward unit normal n and d, so that n . x <= d inside, [m]."""
+        n = np.concatenate([np.eye(3), -np.eye(3)])
+        return frozen(np.column_stack([n, n @ self.center + np.tile(self.half, 2)]), 6, 4)
+
+    @property
+    def normals(self) -> Array:
+        """Directions across its sides, (3, 3), each once up to its sign."""
+        return np.eye(3)
+
+    @property
+    def edges(self) -> Array:
+        """Directions of its edges, (3, 3), each once up to its sign."""
+        return np.eye(3)
 
 
 Piece = Box | Hull
-"""A convex piece of a solid. Both have `center` and `half`, of the aligned box that it is or that is around it."""
+"""A convex piece of a solid. Both have `corners`, `planes`, `normals`, `edges`, and `center` and `half` of the aligned
+box that it is or that is around it."""
+
+
+def all_boxes(pieces: Iterable[Piece]) -> bool:
+    """Whether there is nothing but boxes."""
+    return all(isinstance(piece, Box) for piece in pieces)
 
 
 def extent(pieces: Iterable[Piece], along: Array) -> tuple[float, float]:
@@ -80,8 +106,8 @@ def extent(pieces: Iterable[Piece], along: Array) -> tuple[float, float]:
 
 def _ends(piece: Piece, along: Array) -> tuple[float, float]:
     if isinstance(piece, Hull):
-        found = piece.corners @ along
-        return float(found.min()), float(found.max())
+        heights = piece.corners @ along
+        return float(heights.min()), float(heights.max())
     at = along @ piece.center
     reach = np.abs(along) @ piece.half
     return float(at - reach), float(at + reach)
@@ -107,16 +133,22 @@ class Solid:
     """Of density 1 about the centroid, (3, 3), [m^5]; None: that of its boxes, which do not overlap."""
 
     def __post_init__(self) -> None:
+        freeze(self, centroid=(3,), inertia=(3, 3))
         object.__setattr__(self, "faces", MappingProxyType(dict(self.faces)))
-        object.__setattr__(self, "centroid", frozen(self.centroid, 3))
         object.__setattr__(self, "rounds", MappingProxyType(dict(self.rounds)))
-        if self.inertia is not None:
-            object.__setattr__(self, "inertia", frozen(self.inertia, 3, 3))
 
     @property
     def fits(self) -> bool:
         """Whether any face recedes by the clearance."""
         return any(f.fit for f in self.faces.values()) or any(f.fit for f in self.rounds.values())
+
+    def face(self, name: str) -> Face | RoundFace:
+        """A face, flat or round.
+
+        Raises:
+            KeyError: There is none of this name.
+        """
+        return self.rounds[name] if name in self.rounds else self.faces[name]
 
     @property
     def bounds(self) -> Array:

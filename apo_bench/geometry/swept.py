@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import across_edges, across_sides, all_boxes, shadow
-from apo_bench.geometry.solid import Piece
+from apo_bench.geometry.convex import across_edges, across_sides, ball_around, box_axes, boxes_around, shadow
+from apo_bench.geometry.solid import Piece, all_boxes
 
 _SLACK_M = 5e-5
 """Pieces are less than this deep in each other where they touch."""
@@ -48,9 +49,11 @@ def overlap_intervals(
 
 def _boxed(moving: Posed, way: Array, resting: Posed, slack_m: float) -> tuple[NDArray[np.intp], Array]:
     """Which pairs of pieces, by number, the boxes around them meet on a line, (k,), and from and until, (k, 2)."""
-    a, half_a = _world(moving)
-    b, half_b = _world(resting)
-    axes = _axes(moving.T[:3, :3], resting.T[:3, :3])
+    centers_a, half_a = boxes_around(moving.pieces)
+    centers_b, half_b = boxes_around(resting.pieces)
+    a = pose.apply(moving.T, centers_a)
+    b = pose.apply(resting.T, centers_b)
+    axes = box_axes(moving.T[:3, :3], resting.T[:3, :3])
     reach_a = half_a @ np.abs(axes @ moving.T[:3, :3]).T
     reach_b = half_b @ np.abs(axes @ resting.T[:3, :3]).T
     reach = (reach_a[:, None] + reach_b[None]).reshape(-1, len(axes)) - slack_m
@@ -120,17 +123,12 @@ def exit_distance(moving: Sequence[Posed], way: Array, resting: Sequence[Posed])
 
 def _near(moving: Posed, way: Array, length_m: float, resting: Posed) -> bool:
     """Whether balls around two parts come near each other on the way; most parts are far away."""
-    a, r_a = _ball(moving)
-    b, r_b = _ball(resting)
+    middle_a, r_a = ball_around(moving.pieces)
+    middle_b, r_b = ball_around(resting.pieces)
+    a = moving.T[:3, :3] @ middle_a + moving.T[:3, 3]
+    b = resting.T[:3, :3] @ middle_b + resting.T[:3, 3]
     passed = float(np.clip((b - a) @ way, 0.0, length_m))
     return bool(np.linalg.norm(a + passed * way - b) < r_a + r_b)
-
-
-def _ball(posed: Posed) -> tuple[Array, float]:
-    """Middle and radius of a ball around a part."""
-    low = np.min([piece.center - piece.half for piece in posed.pieces], axis=0)
-    high = np.max([piece.center + piece.half for piece in posed.pieces], axis=0)
-    return posed.T[:3, :3] @ (low + high) / 2 + posed.T[:3, 3], float(np.linalg.norm(high - low)) / 2
 
 
 def _intervals(at: Array, speed: Array, reach: Array) -> tuple[NDArray[np.intp], Array]:
@@ -144,17 +142,3 @@ def _intervals(at: Array, speed: Array, reach: Array) -> tuple[NDArray[np.intp],
     high = np.where(still, np.inf, ends.max(axis=0)).min(axis=1)
     kept = (low < high) & ~apart.any(axis=1) & (reach > 0.0).all(axis=1)
     return np.flatnonzero(kept), np.column_stack([low[kept], high[kept]])
-
-
-def _world(posed: Posed) -> tuple[Array, Array]:
-    """Centres in the world and half sizes, (k, 3) each, of boxes or of those around pieces."""
-    centers = np.array([box.center for box in posed.pieces])
-    return centers @ posed.T[:3, :3].T + posed.T[:3, 3], np.array([box.half for box in posed.pieces])
-
-
-def _axes(R_a: Array, R_b: Array) -> Array:
-    """Directions along which two boxes may be apart, (k, 3): normals of sides, and across one edge of each."""
-    crossed = np.cross(R_a.T[:, None], R_b.T[None]).reshape(-1, 3)
-    length = np.linalg.norm(crossed, axis=1)
-    kept = length > 1e-6
-    return np.concatenate([R_a.T, R_b.T, crossed[kept] / length[kept, None]])

@@ -8,11 +8,10 @@ from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import all_boxes
 from apo_bench.geometry.exact_turns import exact_turns
 from apo_bench.geometry.pose import apply
 from apo_bench.geometry.revolution import across_axis, revolution, turn_about, turned_alike
-from apo_bench.geometry.solid import Solid
+from apo_bench.geometry.solid import Solid, all_boxes
 
 _SAME_M = 1e-6
 """Corners of boxes that are nearer than this have the same coordinate."""

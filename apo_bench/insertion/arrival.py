@@ -9,13 +9,12 @@ import numpy as np
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.assembly.touching import TouchedContact, corners, mouth, touched_contacts
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.arrays import Array, freeze
 from apo_bench.geometry.solid import extent
 from apo_bench.geometry.swept import Posed, exit_distance, is_way_free
 from apo_bench.insertion.line import Attach, Preference
 from apo_bench.insertion.macros import UP, Chain, Macro, Way, chain, departure
-from apo_bench.insertion.screw import Screw, screw_state
-from apo_bench.insertion.states import ANGLE_RAD, State, classify, null_space, snap_normals
+from apo_bench.insertion.states import ANGLE_RAD, Screw, State, classify, null_space, screw_state, snap_normals
 
 _ROOM_M = 0.02
 """A part begins its way in so far outside of what it goes into."""
@@ -48,7 +47,7 @@ class Arrival:
     """Whether nothing is in the way of that line, nor above its beginning."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "T", frozen(self.T, 4, 4))
+        freeze(self, T=(4, 4))
 
     @property
     def state(self) -> State:

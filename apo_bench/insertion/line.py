@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple, final
 
-from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.records import copyable
+from apo_bench.geometry.arrays import Array, copyable, freeze
 
 
 @final
@@ -21,7 +20,7 @@ class Attach:
     """How far before the goal the line begins."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "direction", frozen(self.direction, 3))
+        freeze(self, direction=(3,))
 
     @property
     def stated(self) -> Preference:

@@ -1,6 +1,6 @@
 """Macros: the straight motions by which a part comes into its contacts, found by taking them off in thought.
 
-What is taken off last is made first (`apo_bench.insertion.peeling`). A contact that opens is made by a guarded motion
+What is taken off last is made first (`peel`). A contact that opens is made by a guarded motion
 until it is felt; walls that enclose the part are made by an insertion to a place that must be known before.
 """
 
@@ -11,8 +11,7 @@ from typing import Literal, NamedTuple, final
 import numpy as np
 
 from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.insertion.peeling import Layer, peel
-from apo_bench.insertion.states import ANGLE_RAD, State, classify, evenly_open, null_space
+from apo_bench.insertion.states import ANGLE_RAD, Cone, State, classify, evenly_open, null_space
 
 MacroName = Literal[
     "move-to-contact",
@@ -54,6 +53,40 @@ class Macro:
     def guarded(self) -> bool:
         """Whether it ends when contact is felt."""
         return not self.inserts and self.name != "depart"
+
+
+class Layer(NamedTuple):
+    """The contacts that one motion takes off, by their row numbers."""
+
+    cone: Cone
+    """The cone of all contacts that are left before the motion."""
+    breaks: tuple[int, ...]
+    keeps: tuple[int, ...]
+    """Walls along which the motion goes."""
+
+    @property
+    def slides_out(self) -> bool:
+        """Nothing can be opened, but there is a direction along all walls: the part is drawn out until they end."""
+        return not self.cone.state.detaching
+
+    @property
+    def locked(self) -> bool:
+        return not self.cone.state.detaching and not self.cone.state.maintaining
+
+
+def peel(rows: Array) -> tuple[Layer, ...]:
+    """The layers of contacts with these normals, (k, 3), from the one that comes off first; the last may be locked.
+
+    What can be opened is opened first, along walls that stay; walls on all sides are left at their end.
+    """
+    left = np.arange(len(rows))
+    layers = []
+    while len(left):
+        cone = classify(rows[left])
+        off = cone.detachable if cone.state.detaching else np.ones(len(left), dtype=np.bool_)
+        layers.append(Layer(cone, tuple(left[off].tolist()), tuple(left[~off].tolist())))
+        left = left[~off]
+    return tuple(layers)
 
 
 class Way(NamedTuple):

@@ -8,8 +8,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Poses, placements
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.arrival import ANY, Arrival, arrive

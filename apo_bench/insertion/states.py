@@ -12,7 +12,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.arrays import Array, freeze
 
 ANGLE_RAD = 1e-3
 """Directions nearer than this to each other, or to being opposite, are the same where poses are exact."""
@@ -20,6 +20,8 @@ _RANK = 1e-4
 """Singular values below this part of the largest are zero."""
 _FASTEST = 1e3
 """Bound of the components of a motion that opens contacts at unit speed: a narrower cone counts as flat."""
+_LENGTH_M = 0.04
+"""Turns are counted by how far they move a point at this distance, so that rows have one unit."""
 STATE_LETTERS = {
     (3, 0, 0): "S",
     (2, 1, 0): "A",
@@ -66,8 +68,7 @@ class Cone:
     state: State
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "rows", frozen(self.rows, None, None))
-        object.__setattr__(self, "direction", frozen(self.direction, self.rows.shape[1]))
+        freeze(self, rows=(None, None), direction=(self.rows.shape[1],))
 
     def admits(self, motion: Array, slack: float = ANGLE_RAD) -> bool:
         """Whether a unit motion, (n,), closes in on nothing."""
@@ -155,3 +156,33 @@ def snap_normals(normals: Array, angle_rad: float = ANGLE_RAD) -> Array:
             axes.append(n)
         made[i] = n if axis is None else np.sign(axis @ n) * axis
     return made
+
+
+class Screw(NamedTuple):
+    """The state of a part that may also turn."""
+
+    all: State
+    """The state in all six degrees of freedom."""
+    translation: State
+    rotation: State
+    """What is left of `all` when translation is taken out."""
+
+
+def screw_state(points: Array, normals: Array) -> Screw:
+    """The state of a part that is touched at points.
+
+    Args:
+        points: Corners of the contacts, (k, 3), [m], any frame.
+        normals: From what rests into the free side of what moves, (k, 3), one for each point.
+    """
+    everything = classify(_screw_rows(points, normals)).state
+    translation = classify(np.unique(normals, axis=0)).state
+    m = everything.maintaining - translation.maintaining
+    c = everything.constraining - translation.constraining
+    return Screw(everything, translation, State(m, 3 - m - c, c))
+
+
+def _screw_rows(points: Array, normals: Array) -> Array:
+    """One row (p x n / L, n) per point, (k, 6): how fast a twist (L w, v) about the middle opens it."""
+    arms = points - points.mean(axis=0) if len(points) else points
+    return np.hstack([np.cross(arms, normals) / _LENGTH_M, normals])

@@ -10,7 +10,6 @@ from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.assembly.touching import corners, touched_contacts
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import piece_corners
 from apo_bench.geometry.revolution import turned_alike
 from apo_bench.geometry.solid import Solid
 
@@ -146,4 +145,4 @@ def _farthest(moved: Array) -> float:
 
 def _corners(solid: Solid) -> Array:
     """The corners of all pieces, (k, 3), in the frame of the solid, [m]."""
-    return np.concatenate([piece_corners(piece) for piece in solid.pieces])
+    return np.concatenate([piece.corners for piece in solid.pieces])

@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Poses, placements
 from apo_bench.assembly.reached import Reached
 from apo_bench.assembly.topology import Assembly, Contact, Relation
 from apo_bench.geometry.arrays import Array

@@ -8,7 +8,7 @@ import numpy as np
 from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.errors import InputError, failed
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.rigid import is_rigid
+from apo_bench.geometry.pose import is_rigid
 from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.records.settings import level_pair
 

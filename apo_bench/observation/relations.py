@@ -16,10 +16,9 @@ import numpy as np
 
 from apo_bench.assembly.facing import height, opposed
 from apo_bench.assembly.facing_round import measure_round, round_pairs
-from apo_bench.assembly.goals import Observation, Poses
+from apo_bench.assembly.goals import Observation, Poses, placements
 from apo_bench.assembly.graph import relation_graph
 from apo_bench.assembly.kinds import contact_kind
-from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact, Gap, Operation, PartFace
 from apo_bench.errors import InputError, failed
 from apo_bench.geometry.arrays import Array

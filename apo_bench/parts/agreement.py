@@ -10,8 +10,7 @@ import numpy as np
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.convex import piece_corners
-from apo_bench.geometry.hull import SAGITTA_M, Hull
+from apo_bench.geometry.hull import SAGITTA_M
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Face, Piece, Solid
 
@@ -63,14 +62,8 @@ def check_faces(solid: Solid, path: Path) -> float:
 
 
 def _sides(pieces: tuple[Piece, ...]) -> _Sides:
-    found = [piece.planes if isinstance(piece, Hull) else _box_planes(piece) for piece in pieces]
-    first = np.cumsum([0, *(len(planes) for planes in found[:-1])])
-    return _Sides(np.concatenate(found), first, pieces)
-
-
-def _box_planes(box: Any) -> Array:
-    n = np.concatenate([np.eye(3), -np.eye(3)])
-    return np.column_stack([n, n @ box.center + np.tile(box.half, 2)])
+    planes = [piece.planes for piece in pieces]
+    return _Sides(np.concatenate(planes), np.cumsum([0, *map(len, planes[:-1])]), pieces)
 
 
 def _near(sides: _Sides, low: Array, high: Array) -> _Sides:
@@ -159,7 +152,7 @@ def _shadow(piece: Piece, side: Array, to_plane: Array) -> Any:
     """A side of a piece as a flat area."""
     from shapely import MultiPoint
 
-    corners = piece_corners(piece)
+    corners = piece.corners
     return MultiPoint(corners[np.abs(corners @ side[:3] - side[3]) < _IN_PLANE_M] @ to_plane).convex_hull
 
 

@@ -8,10 +8,9 @@ from apo_bench.errors import InputError, unknown
 from apo_bench.geometry.solid import Box, Face, Solid
 from apo_bench.parts.agreement import check_faces, check_receding
 from apo_bench.parts.allowed import HEAVIEST_KG, LIGHTEST_KG, MOST_FACES
-from apo_bench.parts.check import check_matter, check_solid
+from apo_bench.parts.check import check_matter, check_one_piece, check_solid
 from apo_bench.parts.faces import SIDES, Surface, unite
 from apo_bench.parts.mjcf import Mark, PartFile, read_part
-from apo_bench.parts.one_piece import check_one_piece
 from apo_bench.parts.stated import StatedPart
 from apo_bench.resources import folder
 

@@ -11,12 +11,10 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import all_boxes
 from apo_bench.geometry.hull import Cylinder, cylinder_hull
-from apo_bench.geometry.solid import Box, Piece
+from apo_bench.geometry.solid import Box, Piece, all_boxes
 from apo_bench.parts.allowed import MOST_BOXES, MOST_CORNERS_IN_ALL, WIDEST_M
-from apo_bench.parts.hulls import checked_hull
-from apo_bench.parts.picture_mesh import dress_picture, is_picture
+from apo_bench.parts.meshes import checked_hull, dress_picture, is_picture
 from apo_bench.parts.stated import USUAL_DENSITY, StatedPart, read_stated
 from apo_bench.parts.tree import read_tree
 

@@ -20,10 +20,9 @@ from typing import Literal, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Plan, Poses
+from apo_bench.assembly.goals import Plan, Poses, placements
 from apo_bench.assembly.joint_play import joint_play_mm
 from apo_bench.assembly.kinds import contact_kind, play_mm
-from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact, Operation
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.line import Attach

@@ -9,6 +9,7 @@ from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_pieces
+from apo_bench.geometry.convex import ball_around
 from apo_bench.geometry.intrusion import intrusion_depths
 from apo_bench.geometry.solid import Solid
 from apo_bench.insertion.line import Attach
@@ -71,10 +72,8 @@ def _pairs(operation: Operation, physical: Solids) -> list[tuple[str, str]]:
 
 def _deepest(a: Solid, T_a: Array, b: Solid, T_b: Array, shifts: Array) -> float:
     """The deepest intrusion over all displacements (k, 3) of a, [m]; far off ones are skipped."""
-    low, high = a.bounds
-    centre = (low + high) / 2
-    radius = np.linalg.norm(high - low) / 2
-    seen_from_b = pose.apply(pose.inverse(T_b), pose.apply(T_a, centre[None]) + shifts)
+    middle, radius = ball_around(a.pieces)
+    seen_from_b = pose.apply(pose.inverse(T_b), pose.apply(T_a, middle[None]) + shifts)
     near = np.linalg.norm(seen_from_b - np.clip(seen_from_b, *b.bounds), axis=1) < radius + FAR_M
     if not near.any():
         return -FAR_M

@@ -18,8 +18,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly.facing import face_gap
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Observation, placements
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.geometry.arrays import Array
 from apo_bench.recognition.contacts import Evidence, Recognised, Rival, without_contacts

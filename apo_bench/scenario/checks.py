@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Layout, Poses
+from apo_bench.assembly.goals import Layout, Poses, placements
 from apo_bench.assembly.kinds import ContactKind, contact_kind, geometric_play, play_mm
-from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose

@@ -11,9 +11,8 @@ from apo_bench.assembly.topology import Operation
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import all_boxes
 from apo_bench.geometry.holds import PAD_M, ROOM_M, holds, holds_whole
-from apo_bench.geometry.solid import Solid, extent
+from apo_bench.geometry.solid import Solid, all_boxes, extent
 from apo_bench.insertion.line import Preference
 from apo_bench.io.strict_json import JsonNode
 from apo_bench.parts import load_part, part_path

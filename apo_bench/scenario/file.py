@@ -18,10 +18,10 @@ from apo_bench.io.strict_json import JsonNode
 from apo_bench.io.strict_toml import read_toml
 from apo_bench.records.thresholds import MEANINGS, Meaning, Thresholds
 from apo_bench.resources import folder
-from apo_bench.scenario.attach import with_attach_lines
 from apo_bench.scenario.checks import check_scenario
 from apo_bench.scenario.entries import OperationEntry, read_operations, read_parts
 from apo_bench.scenario.keys import LARGEST_MM, read_span, read_unit_axis, refuse
+from apo_bench.scenario.nominal import with_attach_lines
 from apo_bench.scenario.scenario import Carelessness, Scenario, Shift, Site, Turn
 
 _SCHEMA = 1

@@ -4,8 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Layout, Poses
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Layout, Poses, placements
 from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.assembly.touching import touched_contacts
 from apo_bench.geometry.arrays import Array

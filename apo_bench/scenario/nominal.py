@@ -1,9 +1,16 @@
-"""The operations of a scenario at its nominal goals, in macros."""
+"""The operations of a scenario at its nominal goals, in macros, and the line on which each part comes to its goal."""
 
+from collections.abc import Sequence
+from dataclasses import replace
 from functools import lru_cache
 
+import numpy as np
+
 from apo_bench.assembly.goals import Poses
+from apo_bench.errors import InputError
 from apo_bench.geometry import pose
+from apo_bench.insertion.arrival import Arrival
+from apo_bench.insertion.line import Preference
 from apo_bench.insertion.operations import OperationMacros, understand
 from apo_bench.scenario.scenario import Scenario
 
@@ -22,3 +29,43 @@ def nominal_start(scenario: Scenario) -> Poses:
     site = pose.at((x, y, 0.0)) @ pose.exp([0.0, 0.0, 0.0, 0.0, 0.0, (low + high) / 2])
     back = pose.inverse(site)
     return {part: T if part in scenario.follows_site else back @ T for part, T in scenario.start.items()}
+
+
+_THROUGH = 1e-3
+"""Cosine to the normal of a face above which a direction leads through it."""
+
+
+def with_attach_lines(scenario: Scenario, stated: Sequence[Preference], file: str) -> Scenario:
+    """The scenario with the line of attach of every operation.
+
+    Args:
+        stated: What the file says of them.
+
+    Raises:
+        InputError: A stated direction leads through what the part shall touch, or a stated line begins inside of it.
+    """
+    found = understand(scenario.assembly, nominal_start(scenario), scenario.goals, stated)
+    for each, asked in zip(found, stated, strict=True):
+        _check(each.after, asked, f"{file}, operation {each.operation + 1}, attach", each.main)
+    return replace(scenario, attach=tuple(each.after.line for each in found))
+
+
+def _check(after: Arrival, asked: Preference, key: str, main: str) -> None:
+    """Whether a stated line can be one at all."""
+    if asked.direction is not None:
+        way = after.T[:3, :3] @ asked.direction
+        through = max(after.touched, key=lambda each: float(each.normal @ way), default=None)
+        if through is not None and through.normal @ way > _THROUGH:
+            face = next(of for of in through.contact if of.part == through.rests)
+            raise InputError(
+                f"{key}, along: '{main}' would come through '{face}', which it shall touch; "
+                f"give a direction that leads onto that face or along it, or leave 'along' out."
+            )
+    if asked.travel_m is not None and after.chain.way is not None:
+        least = after.chain.way.length_m
+        level = abs(after.chain.way.direction[2]) < 0.5
+        if level and asked.travel_m < least - 1e-6:
+            raise InputError(
+                f"{key}, travel_mm: {1e3 * asked.travel_m:g} mm before its goal '{main}' would still be inside of what "
+                f"it is put into; give at least {np.ceil(1e3 * least - 1e-6):g}, or leave 'travel_mm' out."
+            )

@@ -8,11 +8,10 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses, frozen_poses
+from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.records import copyable
+from apo_bench.geometry.arrays import Array, copyable, freeze
 from apo_bench.insertion.line import Attach
 from apo_bench.records.thresholds import Meaning, Thresholds
 
@@ -31,8 +30,7 @@ class Grasp:
     """Of what is held there, [m], where that is known."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "point", frozen(self.point, 3))
-        object.__setattr__(self, "across", frozen(self.across, 3))
+        freeze(self, point=(3,), across=(3,))
 
 
 @final
@@ -49,7 +47,7 @@ class Shift:
     high_m: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "axis", frozen(self.axis, 3))
+        freeze(self, axis=(3,))
 
 
 @final
@@ -68,8 +66,7 @@ class Turn:
     high_rad: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "axis", frozen(self.axis, 3))
-        object.__setattr__(self, "point", frozen(self.point, 3))
+        freeze(self, axis=(3,), point=(3,))
 
     def by(self, rad: float) -> Array:
         """The turn by an angle, (4, 4), in the frame of the part: T = P R P^-1 with P to the point."""
@@ -103,7 +100,7 @@ class Carelessness:
     high_m: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "axis", frozen(self.axis, 3))
+        freeze(self, axis=(3,))
 
     @property
     def rms_m(self) -> float:
@@ -152,7 +149,6 @@ class Scenario:
     """Fixed parts whose start is in the frame of the assembly, so that the site moves them too."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "goals", frozen(self.goals, len(self.assembly), 4, 4))
-        object.__setattr__(self, "start", frozen_poses(self.start))
+        freeze(self, goals=(len(self.assembly), 4, 4), start=(4, 4))
         object.__setattr__(self, "part_files", MappingProxyType(dict(self.part_files)))
         object.__setattr__(self, "colors", MappingProxyType(dict(self.colors)))

@@ -7,9 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation, Poses
+from apo_bench.assembly.goals import Observation, Poses, placements
 from apo_bench.assembly.graph import arc_residuals, relation_graph
-from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.mate import mate

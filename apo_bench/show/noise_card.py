@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Demonstration, placements
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.names import resolve

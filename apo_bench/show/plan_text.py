@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Plan
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Plan, placements
 from apo_bench.assembly.topology import spelled
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array

@@ -10,8 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.goals import Plan
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Plan, placements
 from apo_bench.files.robot_frames import RobotFrames
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array

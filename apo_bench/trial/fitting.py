@@ -12,8 +12,7 @@ import numpy as np
 
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Observation, Plan
-from apo_bench.assembly.schedule import stages
+from apo_bench.assembly.goals import Observation, Plan, goals_in_force
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -181,7 +180,7 @@ def _earlier_gaps(plan: Plan) -> list[Array]:
     assembly = plan.assembly
     return [
         equations(assembly.first(upto), plan.start, goals[:upto]).gaps(goals[:upto])
-        for upto, goals in stages(plan)[:-1]
+        for upto, goals in goals_in_force(plan)[:-1]
     ]
 
 

@@ -4,10 +4,9 @@ import math
 from dataclasses import dataclass
 from typing import Any, final
 
-from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly.correction_record import Correction, Look
 from apo_bench.assembly.equations import largest_gap
 from apo_bench.assembly.goals import Observation, Plan
-from apo_bench.assembly.look import Look
 from apo_bench.assembly.reached import Outcome
 from apo_bench.correction.own_code.own import correct_named
 from apo_bench.geometry.arrays import Array

@@ -8,8 +8,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation, Poses
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Observation, Poses, placements
 from apo_bench.geometry.arrays import Array
 from apo_bench.records.row import Row
 from apo_bench.records.settings import RANGE, TrialSettings

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench.assembly.equations import equations, largest_gap
+from apo_bench.assembly.goals import placements
 from apo_bench.assembly.lowering import lowered
-from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Contact, Operation, PartFace
 from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, displacement, least_step
 from apo_bench.geometry import pose

@@ -8,10 +8,9 @@ from math import radians, sin
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.goals import Poses, placements
 from apo_bench.assembly.joint_play import joint_play_mm
 from apo_bench.assembly.kinds import contact_kind
-from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Contact
 from apo_bench.geometry import pose
 from apo_bench.geometry.intrusion import intrusion_depths

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import placements
 from apo_bench.assembly.topology import Assembly, Operation, Term, inverted, product, simplified, spelled
 from apo_bench.geometry import pose
 from tests import scenes

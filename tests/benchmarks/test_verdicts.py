@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import placements
 from apo_bench.assembly.reached import Reached, Snapshot
 from apo_bench.geometry import pose
 from apo_bench.judging.judgement import FAULTS

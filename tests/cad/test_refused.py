@@ -21,7 +21,6 @@ from apo_bench.cad.importing import import_part, raw_solids
 from apo_bench.cad.patience import in_time
 from apo_bench.cli.app import main
 from apo_bench.errors import InputError
-from apo_bench.geometry.convex import piece_corners
 from tests.cad.made import block, rod, write_stl, write_triangles
 
 
@@ -247,7 +246,7 @@ def test_a_cavity_stays_empty_also_behind_a_round_hole(tmp_path: Path) -> None:
     mesh = block(40, 30, 20) - block(30, 20, 12, (0, 0, 4)) - rod(3, 4, (0, 0, 16))
     _, (raw,) = raw_solids(write_stl(mesh, tmp_path / "a.stl"), None)
     done = import_part(raw, "a", tmp_path, "a.stl")
-    pieces = sum(ConvexHull(1e3 * piece_corners(piece)).volume for piece in done.solid.pieces)
+    pieces = sum(ConvexHull(1e3 * piece.corners).volume for piece in done.solid.pieces)
     assert pieces == pytest.approx(1e9 * done.solid.volume, rel=1e-3)
     assert dict(done.refused) == {}
 

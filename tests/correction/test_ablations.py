@@ -10,8 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench.assembly.correction_record import Correction, Try
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Observation, placements
 from apo_bench.correction.baselines.ablations import MOST_SETS, last_only, minimal, no_disappeared, smallest
 from apo_bench.correction.baselines.no_history import no_history
 from apo_bench.correction.baselines.paper import paper

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench.assembly.equations import Equations, equations
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import placements
 from apo_bench.assembly.topology import product
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, moments
 from apo_bench.geometry import pose

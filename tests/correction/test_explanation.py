@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Observation, placements
 from apo_bench.assembly.topology import Assembly, Gap
 from apo_bench.correction.contact import contact
 from apo_bench.correction.directions import Direction, directions, held

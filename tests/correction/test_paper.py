@@ -23,7 +23,7 @@ from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, Solu
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.rigid import is_rigid
+from apo_bench.geometry.pose import is_rigid
 from apo_bench.records.outcomes import CODES
 from tests import scenes
 

@@ -18,7 +18,7 @@ from apo_bench.correction.baselines.paper import paper
 from apo_bench.correction.baselines.track import nested, paper_track, reached_back
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.rigid import is_rigid
+from apo_bench.geometry.pose import is_rigid
 from apo_bench.records.outcomes import CODES
 from tests import scenes
 from tests.correction.test_paper import contradiction

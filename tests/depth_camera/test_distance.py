@@ -9,7 +9,6 @@ from scipy.spatial import ConvexHull
 
 from apo_bench.depth_camera.distance import shape_of, signed_distance, strike_distances
 from apo_bench.geometry import pose
-from apo_bench.geometry.convex import piece_corners
 from apo_bench.geometry.hull import Cylinder, Hull, cylinder_hull
 from apo_bench.geometry.solid import Box
 
@@ -18,7 +17,7 @@ BOXES = (Box("a", np.array([0.01, 0.0, 0.0]), np.array([0.03, 0.01, 0.02])), Box
 
 
 def as_hull(box: Box) -> Hull:
-    return Hull(box.name, piece_corners(box))
+    return Hull(box.name, box.corners)
 
 
 def rays(rng: np.random.Generator, n: int) -> np.ndarray:

@@ -7,7 +7,6 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import pose
-from apo_bench.geometry.convex import piece_corners
 from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.revolution import revolution, turn_about
 from apo_bench.geometry.solid import Box, Face, Solid
@@ -61,7 +60,7 @@ def test_a_prism_has_the_turns_of_its_polygon(corners, height, order):
         solid = prism(corners - corners.mean(axis=0), height, at)
         found = symmetries(solid)
         assert len(found) == order
-        spots = piece_corners(solid.pieces[0])
+        spots = solid.pieces[0].corners
         for g in found:
             apart = np.linalg.norm(pose.apply(g, spots)[:, None] - spots[None], axis=-1)
             assert apart.min(axis=1).max() < 1e-9
@@ -76,7 +75,7 @@ def test_marks_of_fit_break_a_symmetry():
 def test_boxes_as_hulls_have_the_symmetries_of_boxes():
     """A plate with a slot, of three boxes: the same turns as those of its grid of cells."""
     block = scenes.block()
-    hulls = tuple(Hull(box.name, piece_corners(box)) for box in block.pieces)
+    hulls = tuple(Hull(box.name, box.corners) for box in block.pieces)
     found = symmetries(replace(block, pieces=hulls))
     assert len(found) == len(symmetries(block))
     for g in found:

@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.convex import piece_corners, separating_axes
+from apo_bench.geometry.convex import separating_axes
 from apo_bench.geometry.hull import SAGITTA_M, Cylinder, Hull, cylinder_hull, sides_of
 from apo_bench.geometry.intrusion import intrusion, intrusion_depths
 from apo_bench.geometry.round_face import RoundFace
@@ -29,7 +29,7 @@ def solid(*pieces: Box | Hull, **rounds: RoundFace) -> Solid:
 
 
 def as_hull(box: Box) -> Hull:
-    return Hull(box.name, piece_corners(box))
+    return Hull(box.name, box.corners)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -79,9 +79,9 @@ def bore(radius: float, fit: bool) -> RoundFace:
 def test_a_hole_that_fits_gets_wider_by_the_clearance(clearance_mm: float):
     plate = solid(*wedges(0.005, 70), bore=bore(0.005, fit=True))
     made = physical_pieces(plate, 1e-3 * clearance_mm)
-    inner = [np.linalg.norm(piece_corners(p)[:, :2], axis=1).min() * np.cos(np.pi / 70) for p in made]
+    inner = [np.linalg.norm(p.corners[:, :2], axis=1).min() * np.cos(np.pi / 70) for p in made]
     assert inner == pytest.approx(np.full(70, 0.005 + 1e-3 * clearance_mm), abs=1e-9)
-    outer = [np.linalg.norm(piece_corners(p)[:, :2], axis=1).max() for p in made]
+    outer = [np.linalg.norm(p.corners[:, :2], axis=1).max() for p in made]
     assert outer == pytest.approx(np.full(70, 0.02), abs=1e-9)
     plain = solid(*wedges(0.005, 70), bore=bore(0.005, fit=False))
     assert physical_pieces(plain, 1e-3 * clearance_mm) is plain.pieces

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.rigid import is_rigid
+from apo_bench.geometry.pose import is_rigid
 
 pytestmark = pytest.mark.numeric
 

@@ -9,7 +9,6 @@ from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import piece_corners
 from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.intrusion import intrusion_depths
 from apo_bench.geometry.solid import Box, Solid
@@ -114,7 +113,7 @@ def test_the_end_of_the_overlap_is_the_same_for_all_kinds_of_pieces() -> None:
         way = rng.standard_normal(3)
         way = way / np.linalg.norm(way)
         moving = Posed(a.pieces, np.eye(4))
-        hulls = [Posed(tuple(Hull(p.name, piece_corners(p)) for p in of.pieces), of.T) for of in (moving, *near)]
+        hulls = [Posed(tuple(Hull(p.name, p.corners) for p in of.pieces), of.T) for of in (moving, *near)]
         spans = np.concatenate([overlap_intervals(moving, way, of, -5e-5) for of in near])
         at = 0.0
         while len(on := spans[(spans[:, 0] <= at) & (spans[:, 1] > at)]):

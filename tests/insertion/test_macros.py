@@ -12,8 +12,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid
 from apo_bench.insertion.arrival import Arrival, arrive
 from apo_bench.insertion.line import Preference
-from apo_bench.insertion.macros import Chain, Way, chain, departure
-from apo_bench.insertion.peeling import peel
+from apo_bench.insertion.macros import Chain, Way, chain, departure, peel
 from apo_bench.insertion.states import State
 from tests import scenes
 

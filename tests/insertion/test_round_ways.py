@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import placements
 from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.round_face import RoundFace

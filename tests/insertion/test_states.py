@@ -9,8 +9,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.insertion.screw import screw_state
-from apo_bench.insertion.states import STATE_LETTERS, State, classify, null_space, row_rank, snap_normals
+from apo_bench.insertion.states import STATE_LETTERS, State, classify, null_space, row_rank, screw_state, snap_normals
 
 X, Y, Z = np.eye(3)
 TEN = {

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import placements
 from apo_bench.assembly.reached import Reached
 from apo_bench.geometry import pose
 from apo_bench.judging.finished import fixtures

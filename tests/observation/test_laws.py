@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench.assembly.goals import Demonstration, Layout, Observation
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Demonstration, Layout, Observation, placements
 from apo_bench.envs.apo_replay import LARGEST_DEVIATION, ROOM_M, packed
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array

@@ -11,7 +11,6 @@ import shapely
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry.convex import piece_corners
 from apo_bench.geometry.solid import Solid
 from apo_bench.parts import load_part
 from apo_bench.parts.check import check_matter
@@ -141,7 +140,7 @@ def random_solid(seed: int) -> Wanted:
 
 def free_radius(solid: Solid, origin: np.ndarray, R: np.ndarray, length: float, hole: bool, toward) -> float:
     """How near to an axis pieces come along a length, as shadows along it; of a shaft, how far from it they reach."""
-    pieces = [(piece_corners(piece) - origin) @ R for piece in solid.pieces]
+    pieces = [(piece.corners - origin) @ R for piece in solid.pieces]
     pieces = [x for x in pieces if x[:, 2].min() < length - 1e-7 and x[:, 2].max() > 1e-7]
     if not hole:
         return max(float(np.linalg.norm(x[:, :2], axis=1).max()) for x in pieces)
@@ -179,7 +178,7 @@ def test_random_solids_are_as_their_formulas_say(seed: int, tmp_path: Path):
         solid = load_part(write_part("thing", wanted.body, tmp_path, source="a test", licence="Apache-2.0"))
     assert 1e9 * solid.volume == pytest.approx(wanted.volume, rel=1e-9)
     check_walls(solid, wanted)
-    pieces = sum(ConvexHull(piece_corners(piece)).volume for piece in solid.pieces)
+    pieces = sum(ConvexHull(piece.corners).volume for piece in solid.pieces)
     room = SHARE * solid.volume + 1e-3 * FREE_MM * wall_area(wanted)
     assert pieces == pytest.approx(solid.volume, abs=room)
 

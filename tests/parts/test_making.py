@@ -10,7 +10,6 @@ import pytest
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.convex import piece_corners
 from apo_bench.geometry.solid import Box
 from apo_bench.parts import load_part
 from apo_bench.parts.making import (
@@ -83,7 +82,7 @@ def test_a_part_that_is_written_is_read_as_the_same_solid(name: str, tmp_path: P
     assert found.centroid == pytest.approx(wanted.centroid, abs=1e-10)
     assert [type(p) for p in found.pieces] == [type(p) for p in wanted.pieces]
     for piece, same in zip(found.pieces, wanted.pieces, strict=True):
-        assert piece_corners(piece) == pytest.approx(piece_corners(same), abs=1e-11)
+        assert piece.corners == pytest.approx(same.corners, abs=1e-11)
     assert set(found.faces) == set(wanted.faces)
     for name, face in wanted.faces.items():
         assert found.faces[name].normal == pytest.approx(face.normal, abs=1e-7)
@@ -113,7 +112,7 @@ def test_volumes_are_exact():
 
 def test_pieces_keep_a_bore_free_and_leave_no_gap_beside_it():
     middle = np.array([0.005, -0.003])
-    walls = [piece_corners(p)[:, :2] - middle for p in solid_of("plate", plate()).pieces]
+    walls = [p.corners[:, :2] - middle for p in solid_of("plate", plate()).pieces]
     near = min(float(np.linalg.norm(corners, axis=1).min()) for corners in walls)
     assert 0.0051 < near < 0.0051 + 6e-6
 
@@ -122,7 +121,7 @@ def free_radius(pieces, middle: np.ndarray) -> float:
     """How near pieces of prisms along z come to an axis along z, [m]."""
     import shapely
 
-    return min(shapely.MultiPoint(piece_corners(p)[:, :2]).convex_hull.distance(shapely.Point(middle)) for p in pieces)
+    return min(shapely.MultiPoint(p.corners[:, :2]).convex_hull.distance(shapely.Point(middle)) for p in pieces)
 
 
 def test_a_bore_without_room_for_wedges_is_a_hole_like_others(tmp_path: Path):
@@ -154,7 +153,7 @@ def test_bores_and_slots_that_fit_get_wider_by_the_clearance(clearance_mm: float
     assert free_radius(made, np.array([0.0, 0.010])) == pytest.approx(0.005 + 1e-3 * clearance_mm, abs=1e-8)
     for x in (-0.006, 0.0, 0.006):
         assert free_radius(made, np.array([x, -0.020])) == pytest.approx(0.004 + 1e-3 * clearance_mm, abs=1e-8)
-    assert max(float(np.abs(piece_corners(p)).max()) for p in made) == pytest.approx(0.035, abs=1e-9)
+    assert max(float(np.abs(p.corners).max()) for p in made) == pytest.approx(0.035, abs=1e-9)
 
 
 def test_a_rim_is_a_face_of_its_own(tmp_path: Path):

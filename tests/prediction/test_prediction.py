@@ -9,8 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.assembly.goals import Plan, Step
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Plan, Step, placements
 from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array

@@ -12,8 +12,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from apo_bench.assembly.facing import Facing, facing
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Observation, placements
 from apo_bench.assembly.topology import Assembly, Contact, Gap, Operation
 from apo_bench.correction.correctors import correct
 from apo_bench.errors import InputError

@@ -16,7 +16,6 @@ from apo_bench.assembly.topology import Assembly, Contact, Operation, PartFace
 from apo_bench.correction.contact import ContactCorrector
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
-from apo_bench.geometry.convex import piece_corners
 from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.intrusion import intrusion, ways_out
 from apo_bench.recognition.estimate import estimate
@@ -161,7 +160,7 @@ def test_ways_out_are_as_deep_as_the_intrusion_and_lead_out(hulls: bool) -> None
     a = scenes.block("A")
     b = scenes.block("B")
     if hulls:
-        a = replace(a, pieces=tuple(Hull(piece.name, piece_corners(piece)) for piece in a.pieces))
+        a = replace(a, pieces=tuple(Hull(piece.name, piece.corners) for piece in a.pieces))
     T_a = scenes.mm(45, 3, 26)
     T_b = scenes.mm(0, 0, 25) @ pose.exp(np.array([0, 0, 0, 0.1, 0.2, 0.3]))
     (way,) = ways_out(a, T_a, b, T_b, 1e-4)

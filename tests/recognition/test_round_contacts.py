@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose
 
 from apo_bench.assembly.facing import Facing, facing
 from apo_bench.assembly.facing_round import measure_round, round_pairs
+from apo_bench.assembly.goals import placements
 from apo_bench.assembly.kinds import contact_kind
-from apo_bench.assembly.placement import placements
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.round_face import RoundFace

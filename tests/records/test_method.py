@@ -2,7 +2,7 @@
 
 import pytest
 
-from apo_bench.assembly.look import LookingCorrector
+from apo_bench.assembly.correction_record import LookingCorrector
 from apo_bench.errors import InputError
 from apo_bench.names import resolve
 from apo_bench.records.method import checked_method, knows_relations, knows_truth, may_look, parsed

@@ -10,8 +10,7 @@ import pytest
 from shapely import MultiPoint
 
 from apo_bench.assembly.equations import largest_gap
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Poses, placements
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from apo_bench.assembly.goals import placements
 from apo_bench.assembly.graph import relation_graph
-from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Contact
 from apo_bench.show.axes import axes_of
 from apo_bench.show.graph.drawing import draw_graph

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import placements
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.scenario.file import load_scenario, scenario_names

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Plan, Poses, Step
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Plan, Poses, Step, placements
 from apo_bench.assembly.topology import Operation
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose

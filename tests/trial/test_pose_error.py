@@ -10,8 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Poses, placements
 from apo_bench.assembly.reached import Reached, Snapshot
 from apo_bench.correction.solvers.newton import solve_newton
 from apo_bench.geometry import pose

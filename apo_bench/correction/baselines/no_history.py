@@ -9,9 +9,8 @@ import numpy as np
 
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import equations, largest, largest_gap
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.goals import Observation, placements
 from apo_bench.assembly.lowering import lowered_observation
-from apo_bench.assembly.placement import placements
 from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.ending import refused_correction, solver_status, status_sentence

@@ -9,9 +9,8 @@ import math
 from collections.abc import Iterable
 from typing import Any, final
 
-from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly.correction_record import Correction, Look
 from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.look import Look
 from apo_bench.correction.correctors import CorrectorMisbehaved, checked_corrector, correct
 from apo_bench.correction.own_code.forms import observation_message, parse_correction
 from apo_bench.correction.own_code.message import Arrays, CorrectorMessage, GarbledMessage, MessageForm

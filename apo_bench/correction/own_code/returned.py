@@ -9,12 +9,11 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly.correction_record import Consistency, Correction, Try
-from apo_bench.assembly.goals import Step
-from apo_bench.assembly.schedule import REMEDY, schedule_fault
+from apo_bench.assembly.goals import SCHEDULE_REMEDY, Step, schedule_fault
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.rigid import FARTHEST_M, is_rigid
+from apo_bench.geometry.pose import FARTHEST_M, is_rigid
 from apo_bench.io.plain_text import UNSHOWN
 
 RIGID = "return a rotation matrix, a position [m] and the last row (0, 0, 0, 1)"
@@ -108,7 +107,7 @@ def _whole(value: Any) -> bool:
 
 def _check_schedule(found: Correction, name: str) -> None:
     if found.schedule and (wrong := schedule_fault(found.schedule, len(found.goals))):
-        raise InputError(f"the corrector '{name}' returned a schedule that {wrong}; {REMEDY}.")
+        raise InputError(f"the corrector '{name}' returned a schedule that {wrong}; {SCHEDULE_REMEDY}.")
     if found.targets is None:
         return
     if not found.schedule:

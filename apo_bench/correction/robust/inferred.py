@@ -19,8 +19,7 @@ from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.kinds import contact_kind
 from apo_bench.assembly.topology import Assembly, Contact, product
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.remembered import remembered
+from apo_bench.geometry.arrays import Array, remembered
 from apo_bench.geometry.symmetry import quarter_turns
 
 _APART = 0.1

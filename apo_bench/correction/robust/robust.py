@@ -11,10 +11,9 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly.correction_record import Correction, Look
 from apo_bench.assembly.equations import largest_gap
 from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.look import Look
 from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.correction.consistency import TEST_LEVEL

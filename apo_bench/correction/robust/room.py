@@ -13,8 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly.facing_round import measure_round
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Observation, placements
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.intrusion import intrusion

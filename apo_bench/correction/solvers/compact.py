@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from apo_bench.assembly.equations import Equations, Pattern, pattern
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.remembered import remembered
+from apo_bench.geometry.arrays import Array, remembered
 from apo_bench.geometry.twist import GENERATORS
 
 _GENERATORS = np.ascontiguousarray(np.swapaxes(GENERATORS, 0, 1).reshape(4, 24))

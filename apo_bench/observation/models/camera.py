@@ -12,7 +12,7 @@ import numpy as np
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.rigid import is_rigid
+from apo_bench.geometry.pose import is_rigid
 
 WORKSPACE_MIDDLE_M = np.array([0.12, 0.0, 0.03])
 """What the default camera looks at, in the world, [m]: the middle of where assemblies stand on the table."""

@@ -12,9 +12,8 @@ from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.polygon import straightened
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Face
-from apo_bench.parts.making.bands import bands
 from apo_bench.parts.making.body import Body
-from apo_bench.parts.making.cells import bore_cell, clipped, convex_cells, wedges
+from apo_bench.parts.making.cells import bands, bore_cell, clipped, convex_cells, wedges
 from apo_bench.parts.making.moments import Moments, extruded
 from apo_bench.parts.making.outline import Outline, arc_of, circle, goes_on, outline_moments, receding, ring
 from apo_bench.parts.making.steps import Step, at_height, heights_of, tangent

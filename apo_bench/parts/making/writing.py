@@ -9,10 +9,9 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import all_boxes, piece_corners
 from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
-from apo_bench.geometry.solid import Box, Face, Piece, Solid
+from apo_bench.geometry.solid import Box, Face, Piece, Solid, all_boxes
 from apo_bench.parts.allowed import THINNEST_M
 from apo_bench.parts.making.body import Body
 from apo_bench.parts.stated import SCHEMA
@@ -77,7 +76,7 @@ def _piece(name: str, hull: Hull) -> Piece:
     """A piece; a box where it is one."""
     if hull.cylinder is None and len(hull.corners) == 8 and hull.half.min() >= THINNEST_M:
         box = Box(name, hull.center, hull.half)
-        off = np.abs(hull.corners[:, None] - piece_corners(box)[None]).max(axis=2).min(axis=0)
+        off = np.abs(hull.corners[:, None] - box.corners[None]).max(axis=2).min(axis=0)
         if off.max() < _ALIGNED:
             return box
     return replace(hull, name=name)

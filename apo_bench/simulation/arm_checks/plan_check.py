@@ -10,9 +10,8 @@ import numpy as np
 
 from apo_bench.assembly.goals import Plan, Poses
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, remembered
 from apo_bench.geometry.intrusion import intrusion_depths
-from apo_bench.geometry.remembered import remembered
 from apo_bench.geometry.solid import Solid
 from apo_bench.prediction.arm import ArmMove
 from apo_bench.simulation.arm_checks.tip_error import TipError, motion_error

@@ -8,8 +8,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.records import copyable
+from apo_bench.geometry.arrays import Array, copyable, frozen
 from apo_bench.simulation.arms.hand import Hand
 
 

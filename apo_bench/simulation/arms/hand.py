@@ -8,8 +8,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.records import copyable
+from apo_bench.geometry.arrays import Array, copyable, frozen
 
 _GRADED = 0.6
 """A gripper of which one step of the command makes this part of its opening knows open and closed only."""

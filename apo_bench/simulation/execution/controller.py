@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.goals import Plan, Poses, Step
+from apo_bench.assembly.goals import Plan, Poses, Step, goals_in_force
 from apo_bench.assembly.reached import Outcome, Reached, ReplayResult, Snapshot
-from apo_bench.assembly.schedule import stages
 from apo_bench.prediction.stability import first_unstable
 from apo_bench.records.outcomes import sentence
 from apo_bench.simulation.execution.carry_out import bring, take
@@ -100,7 +99,7 @@ def _todo(plan: Plan, scene: Scene, searches: bool, error: RobotError | None) ->
 
 def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None:
     """What is wrong with the plan before anything moves."""
-    for upto, goals in stages(plan):
+    for upto, goals in goals_in_force(plan):
         k = first_unstable(plan.assembly.first(upto), plan.start, goals[:upto])
         if k is not None:
             return _outcome(plan, "plan", "unstable_goal", k)

@@ -10,9 +10,8 @@ import numpy as np
 from apo_bench.assembly.goals import Plan, Poses, Step
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, remembered
 from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.remembered import remembered
 from apo_bench.geometry.solid import extent
 from apo_bench.insertion.surroundings import (
     OVER_M,

@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Poses, placements
 from apo_bench.assembly.topology import PartFace
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array

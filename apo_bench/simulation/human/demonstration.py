@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, Layout
-from apo_bench.assembly.placement import placements
+from apo_bench.assembly.goals import Demonstration, Layout, placements
 from apo_bench.assembly.reached import Reached, Snapshot
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array

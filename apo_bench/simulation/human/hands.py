@@ -13,7 +13,7 @@ import numpy as np
 from apo_bench.assembly.goals import Poses, Step
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, Ints
-from apo_bench.geometry.convex import all_boxes
+from apo_bench.geometry.solid import all_boxes
 from apo_bench.simulation.hooks import BY_HAND, Doing, Hooks, hooks_of
 from apo_bench.simulation.robot.fast_forward import TINY_S, take_along
 from apo_bench.simulation.robot.near import Moving, near_spans

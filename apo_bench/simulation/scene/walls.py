@@ -13,10 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, remembered
 from apo_bench.geometry.clearance import physical_pieces
 from apo_bench.geometry.hull import SAGITTA_M, Hull, first_of_each
-from apo_bench.geometry.remembered import remembered
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Piece, Solid
 

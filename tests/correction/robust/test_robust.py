@@ -9,10 +9,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from apo_bench.assembly.equations import largest_gap, pattern
-from apo_bench.assembly.goals import Demonstration
+from apo_bench.assembly.goals import Demonstration, placements
 from apo_bench.assembly.opposing import looking_away
 from apo_bench.assembly.outlier_model import OutlierModel
-from apo_bench.assembly.placement import placements
 from apo_bench.correction.consistency import p_value
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.posterior import jacobian_rank
