@@ -86,9 +86,9 @@ def facing(
         heights = (posed_a.corners[i] - posed_b.corners[j][0]) @ posed_b.normals[j]
         if heights.min() > gap_m or heights.max() < -gap_m:
             continue
-        found = _pair(posed_a, i, T_a, posed_b, j, T_b, share)
-        if found is not None and abs(found.gap_m) <= gap_m:
-            yield found
+        pair = _pair(posed_a, i, T_a, posed_b, j, T_b, share)
+        if pair is not None and abs(pair.gap_m) <= gap_m:
+            yield pair
     for one, other in round_pairs(a, b):
         if (one.name, other.name) not in known:
             m = measure_round(one, T_a, other, T_b)

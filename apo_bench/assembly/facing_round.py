@@ -73,9 +73,9 @@ def _shaft_on_plane(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: A
     assert isinstance(flat, Face)
     n = T_flat[:3, :3] @ flat.normal
     u = T_shaft[:3, :3] @ shaft.axis
-    found = mate(shaft, T_shaft, flat, T_flat)
-    middle = found.points.mean(axis=0)
-    height = float(found.off.mean(axis=0) @ n)
+    touch = mate(shaft, T_shaft, flat, T_flat)
+    middle = touch.points.mean(axis=0)
+    height = float(touch.off.mean(axis=0) @ n)
     slope = np.array([[*n, *np.cross(middle, n)], [0.0, 0.0, 0.0, *np.cross(u, n)]])
     whole = min(shaft.length, float(np.ptp(flat.outline @ (T_flat[:3, :3].T @ u))))
     return RoundMeasure(
@@ -83,29 +83,29 @@ def _shaft_on_plane(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: A
         slope=-slope if isinstance(a, Face) else slope,
         lengths=1,
         gap_m=height,
-        angle_rad=found.angle_rad,
-        share=found.length_m / whole if whole > 0.0 else 0.0,
-        half_m=(found.length_m / 2,),
+        angle_rad=touch.angle_rad,
+        share=touch.length_m / whole if whole > 0.0 else 0.0,
+        half_m=(touch.length_m / 2,),
     )
 
 
 def _in_hole(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> RoundMeasure:
     """A cylinder in a cylinder."""
-    found = mate(a, T_a, b, T_b)
+    touch = mate(a, T_a, b, T_b)
     u = T_a[:3, :3] @ a.axis
     w = T_b[:3, :3] @ b.axis
     u = u if u @ w > 0.0 else -u
     across = (T_b[:3, :3] @ b.frame[:3, :2]).T
-    p = found.points.mean(axis=0)
-    off = across @ found.off.mean(axis=0)
-    half = found.length_m / 2
+    p = touch.points.mean(axis=0)
+    off = across @ touch.off.mean(axis=0)
+    half = touch.length_m / 2
     return RoundMeasure(
         residual=np.array([*off, *(across @ u)]),
         slope=np.array([*_offsets(across, p), *_tilts(across, u)]),
         lengths=2,
         gap_m=float(np.linalg.norm(off)),
-        angle_rad=found.angle_rad,
-        share=found.length_m / min(a.length, b.length),
+        angle_rad=touch.angle_rad,
+        share=touch.length_m / min(a.length, b.length),
         half_m=(half, half),
     )
 

@@ -71,20 +71,20 @@ def joint_play_mm(assembly: Assembly, contact: Contact, made: int, true: Poses, 
 
 
 @lru_cache(maxsize=1024)
-def _opening(faces: tuple[tuple[AnyFace, AnyFace], ...], asked: int, at: bytes, clearance_mm: float) -> float | None:
+def _opening(faces: tuple[tuple[AnyFace, AnyFace], ...], which: int, at: bytes, clearance_mm: float) -> float | None:
     """The largest gap of one of some pairs of faces, [mm]; remembered, since all trials of a seed share the true ones.
 
     With normals n into the free side and points p a motion (v, w) opens n v + (p x n) w.
     """
     if not {contact_kind(*pair) for pair in faces} <= {"plane on plane", "shaft in hole", "shaft on plane"}:
         return None
-    if contact_kind(*faces[asked]) == "shaft in hole":
+    if contact_kind(*faces[which]) == "shaft in hole":
         return None
     T = np.frombuffer(at).reshape(4, 4)
     touches = [_touch(*pair, T, clearance_mm) for pair in faces]
     rows = np.concatenate([_rows(touch) for touch in touches])
     limits = np.concatenate([np.full(len(touch.points), touch.limit_mm) for touch in touches])
-    widest = _widest(_rows(touches[asked]), rows, limits)
+    widest = _widest(_rows(touches[which]), rows, limits)
     return round(widest, _DIGITS) if np.isfinite(widest) else None
 
 
@@ -104,8 +104,8 @@ def _widest(own: Array, rows: Array, limits: Array) -> float:
     if not len(own):
         return np.inf
     together = np.kron(np.eye(len(own)), -rows)
-    found = linprog(-own.ravel(), together, np.tile(limits, len(own)), bounds=[(None, None)] * own.size)
-    return float((own * found.x.reshape(own.shape)).sum(axis=1).max()) if found.success else np.inf
+    optimum = linprog(-own.ravel(), together, np.tile(limits, len(own)), bounds=[(None, None)] * own.size)
+    return float((own * optimum.x.reshape(own.shape)).sum(axis=1).max()) if optimum.success else np.inf
 
 
 def _touch(moved: AnyFace, rests: AnyFace, T: Array, clearance_mm: float) -> _Touch:

@@ -58,12 +58,12 @@ def _lowered(assembly: Assembly) -> Assembly | None:
         return None
     gaps = dict(assembly.gaps)
     operations = []
-    made = _Sheets(assembly)
+    sheets = _Sheets(assembly)
     for operation in assembly.operations:
-        lower = tuple(low for contact in operation.contacts for low in made.of(contact))
+        lower = tuple(low for contact in operation.contacts for low in sheets.of(contact))
         operations.append(replace(operation, contacts=lower))
-    gaps.update({low: gaps[contact] for low, contact in made.origin.items() if contact in gaps})
-    return replace(assembly, operations=tuple(operations), gaps=gaps, sheets=made.sheets, origin=made.origin)
+    gaps.update({low: gaps[contact] for low, contact in sheets.origin.items() if contact in gaps})
+    return replace(assembly, operations=tuple(operations), gaps=gaps, sheets=sheets.sheets, origin=sheets.origin)
 
 
 class _Sheets:
@@ -82,19 +82,19 @@ class _Sheets:
         gap = self._assembly.gaps.get(contact, Gap())
         _check_gap(contact, kind, gap)
         if kind == "shaft on plane":
-            made = [self._on_plane(contact)]
+            lower = [self._on_plane(contact)]
         elif kind == "cone on rim":
             cone_of, rim_of = _first(contact, self._assembly.round_face(contact.manipulated).kind == "cone")
-            made = [*self._coaxial(cone_of, rim_of, 2), self._seated(cone_of, rim_of)]
+            lower = [*self._coaxial(cone_of, rim_of, 2), self._seated(cone_of, rim_of)]
         else:
             lengths = [self._assembly.round_face(of).length for of in contact]
             long, short = _first(contact, lengths[0] >= lengths[1] - _SAME_M)
-            made = self._coaxial(long, short, WALLS if gap.kind == "clearance" else 2)
-            made += [self._seated(long, short)] if kind == "cone in cone" else []
-        swapped = made[0].manipulated.part != contact.manipulated.part
-        made = [self._marked(low) if swapped else low for low in made]
-        self.origin.update(dict.fromkeys(made, contact))
-        return made
+            lower = self._coaxial(long, short, WALLS if gap.kind == "clearance" else 2)
+            lower += [self._seated(long, short)] if kind == "cone in cone" else []
+        swapped = lower[0].manipulated.part != contact.manipulated.part
+        lower = [self._marked(low) if swapped else low for low in lower]
+        self.origin.update(dict.fromkeys(lower, contact))
+        return lower
 
     def _on_plane(self, contact: Contact) -> Contact:
         """A shaft on a plane: its axis, in the plane a radius in front."""
@@ -108,13 +108,13 @@ class _Sheets:
     def _coaxial(self, planes_of: PartFace, points_of: PartFace, count: int) -> list[Contact]:
         """The axis of one face, or its point of a rim, in planes through the axis of another one, evenly turned."""
         face = self._assembly.round_face(planes_of)
-        made = []
+        contacts = []
         for i in range(count):
             tail = f"{i + 1} of {count}"
             n = _across(face, np.pi * i / count)
             sheet = self._sheet(planes_of, tail, face.middle[None], n, face.fit, opposes=False)
-            made.append(Contact(sheet, self._axis(points_of, tail, np.pi * i / count)))
-        return made
+            contacts.append(Contact(sheet, self._axis(points_of, tail, np.pi * i / count)))
+        return contacts
 
     def _seated(self, cone_of: PartFace, other_of: PartFace) -> Contact:
         """The middle of a face in the plane across a cone where both are as wide."""

@@ -73,12 +73,12 @@ def joint_covariance(goals: Array, covariance: Array, shared: Sequence[SharedErr
     n = len(goals)
     joint = np.zeros((n, 6, n, 6))
     six = np.arange(6)
-    for one in shared:
-        k = np.array(one.operations, dtype=np.intp)
-        A = one.ways(goals)
-        between = np.einsum("kab,bc,ldc->kald", A, one.covariance, A)
-        if one.correlation is not None:
-            between *= one.correlation[:, None, :, None]
+    for error in shared:
+        k = np.array(error.operations, dtype=np.intp)
+        A = error.ways(goals)
+        between = np.einsum("kab,bc,ldc->kald", A, error.covariance, A)
+        if error.correlation is not None:
+            between *= error.correlation[:, None, :, None]
         joint[np.ix_(k, six, k, six)] += between
     joint[np.arange(n), :, np.arange(n)] = covariance
     whole = joint.reshape(6 * n, 6 * n)

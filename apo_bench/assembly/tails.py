@@ -71,21 +71,21 @@ def _unit_draws(
     rng = np.random.default_rng(_SEED)
 
     def error(shape: tuple[int, ...]) -> Array:
-        made = rng.standard_normal((*shape, 6))
+        drawn = rng.standard_normal((*shape, 6))
         common = rng.chisquare(freedom[0], shape) / freedom[0] if joined else None
         for columns, scale, nu in zip(_COLUMNS, scales, freedom, strict=True):
             mixed = rng.chisquare(nu, shape) / nu if common is None else common
-            made[..., list(columns)] *= (scale / np.sqrt(mixed))[..., None]
-        return made
+            drawn[..., list(columns)] *= (scale / np.sqrt(mixed))[..., None]
+        return drawn
 
-    found = error((count, n))
+    errors = error((count, n))
     for half, limit in zip((slice(0, 3), slice(3, 6)), limits, strict=True):
         for _ in range(_ANEW):
-            far = np.linalg.norm(found[..., half], axis=-1) > limit
+            far = np.linalg.norm(errors[..., half], axis=-1) > limit
             if not far.any():
                 break
-            found[far, half] = error((int(far.sum()),))[:, half]
+            errors[far, half] = error((int(far.sum()),))[:, half]
     plain = rng.standard_normal((count, n, 6))
-    for array in (found, plain):
+    for array in (errors, plain):
         array.setflags(write=False)
-    return found, plain
+    return errors, plain

@@ -167,7 +167,7 @@ class Assembly:
         a = self.face_of(whole.manipulated)
         b = self.face_of(whole.environment)
         if contact in self.origin and self.face(contact.manipulated).opposes:
-            slope = max(abs(one.slope) for one in (a, b) if isinstance(one, RoundFace))
+            slope = max(abs(face.slope) for face in (a, b) if isinstance(face, RoundFace))
             return fits * math.hypot(1.0, slope) / slope
         return max(0.0, fits + geometric_play(a, b))
 

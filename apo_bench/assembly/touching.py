@@ -40,12 +40,12 @@ def touched_contacts(
 ) -> list[TouchedContact]:
     """The contacts between a part that moves and a part that rests, round ones once for each normal."""
     moving = set(moves)
-    found = []
+    touches = []
     for contact in contacts:
         rests = [of for of in contact if of.part not in moving]
         if len(rests) == 1:
-            found += list(_touched(assembly, contact, rests[0], poses))
-    return found
+            touches += list(_touched(assembly, contact, rests[0], poses))
+    return touches
 
 
 def corners(assembly: Assembly, touched: Iterable[TouchedContact], poses: Poses) -> tuple[Array, Array]:

@@ -236,8 +236,8 @@ def _middle(planes: Array) -> tuple[Array, float]:
     from scipy.optimize import linprog
 
     A = np.column_stack([planes[:, :3], np.ones(len(planes))])
-    found = linprog([0.0, 0.0, 0.0, -1.0], A, planes[:, 3], bounds=[(None, None)] * 3 + [(0.0, None)])
-    return (found.x[:3], float(found.x[3])) if found.success else (np.zeros(3), 0.0)
+    optimum = linprog([0.0, 0.0, 0.0, -1.0], A, planes[:, 3], bounds=[(None, None)] * 3 + [(0.0, None)])
+    return (optimum.x[:3], float(optimum.x[3])) if optimum.success else (np.zeros(3), 0.0)
 
 
 def _each_once(corners: Array) -> Array:

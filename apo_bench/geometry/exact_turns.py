@@ -36,12 +36,12 @@ class _Marks(NamedTuple):
 def exact_turns(solid: Solid) -> Array:
     """The displacements that leave a solid as it is, (m, 4, 4), the identity first; not of a part of revolution."""
     marks = _marks(solid)
-    found = [np.eye(3)]
+    turns = [np.eye(3)]
     for R in _candidates(marks):
-        new = all(np.abs(R - known).max() > 1e-6 for known in found)
+        new = all(np.abs(R - known).max() > 1e-6 for known in turns)
         if new and _carries(marks, R) and fills_the_same(solid, _about(solid, R), _doubt(solid)):
-            found.append(R)
-    return np.array([_about(solid, R) for R in found])
+            turns.append(R)
+    return np.array([_about(solid, R) for R in turns])
 
 
 def carries_faces(solid: Solid, g: Array) -> bool:
@@ -86,7 +86,7 @@ def _depth(piece: Piece, points: Array) -> Array:
 
 def _doubt(solid: Solid) -> float:
     """How far pieces may be from round walls, [m]."""
-    return _SAME_M + _COARSE * max((max(one.radii) for one in solid.rounds.values()), default=0.0)
+    return _SAME_M + _COARSE * max((max(face.radii) for face in solid.rounds.values()), default=0.0)
 
 
 def _about(solid: Solid, R: Array) -> Array:
@@ -103,21 +103,21 @@ def _marks(solid: Solid) -> _Marks:
     """
     points = list[Array]()
     tags = list[tuple[object, ...]]()
-    rounds = [one for one in solid.rounds.values() if one.kind != "rim"]
-    for face in solid.faces.values():
-        corners = np.concatenate([face.outline, *face.holes])
+    rounds = [wall for wall in solid.rounds.values() if wall.kind != "rim"]
+    for flat in solid.faces.values():
+        corners = np.concatenate([flat.outline, *flat.holes])
         corners = corners[~_on_walls(rounds, corners)]
-        middle = _middle(face)
-        for kind, own in (("middle", [middle]), ("above", [middle + 0.01 * face.normal]), ("corner", list(corners))):
+        middle = _middle(flat)
+        for kind, own in (("middle", [middle]), ("above", [middle + 0.01 * flat.normal]), ("corner", list(corners))):
             points += own
-            tags += [("flat", kind, face.fit, len(corners))] * len(own)
-    for one in rounds:
-        for end, radius, other in zip(one.ends, one.radii, one.radii[::-1], strict=True):
+            tags += [("flat", kind, flat.fit, len(corners))] * len(own)
+    for wall in rounds:
+        for end, radius, other in zip(wall.ends, wall.radii, wall.radii[::-1], strict=True):
             points.append(end)
-            tags.append((one.kind, one.hole, one.fit, *map(_key, (radius, other, one.length, one.extent_rad))))
-        if one.toward is not None:
-            points.append(one.middle + one.radius * one.toward)
-            tags.append(("toward", one.kind, one.hole, _key(one.radius)))
+            tags.append((wall.kind, wall.hole, wall.fit, *map(_key, (radius, other, wall.length, wall.extent_rad))))
+        if wall.toward is not None:
+            points.append(wall.middle + wall.radius * wall.toward)
+            tags.append(("toward", wall.kind, wall.hole, _key(wall.radius)))
     known = {tag: i for i, tag in enumerate(dict.fromkeys(tags))}
     at = np.array(points).reshape(-1, 3) - solid.centroid
     return _Marks(at, np.array([known[tag] for tag in tags], dtype=np.intp))
@@ -144,14 +144,14 @@ def _middle(face: Face) -> Array:
 
 def _on_walls(rounds: list[RoundFace], corners: Array) -> NDArray[np.bool_]:
     """Which corners, (k, 3), are those of a polygon that stands for a circle, (k,)."""
-    found = np.zeros(len(corners), dtype=np.bool_)
-    for one in rounds:
-        along = (corners - one.point) @ one.axis
-        radius = np.interp(along, one.span, one.radii)
-        far = np.linalg.norm(np.cross(corners - one.point, one.axis), axis=1)
-        within = (along > one.span[0] - _SAME_M) & (along < one.span[1] + _SAME_M)
-        found |= within & (np.abs(far - radius) <= _SAME_M + _COARSE * radius)
-    return found
+    on_wall = np.zeros(len(corners), dtype=np.bool_)
+    for wall in rounds:
+        along = (corners - wall.point) @ wall.axis
+        radius = np.interp(along, wall.span, wall.radii)
+        far = np.linalg.norm(np.cross(corners - wall.point, wall.axis), axis=1)
+        within = (along > wall.span[0] - _SAME_M) & (along < wall.span[1] + _SAME_M)
+        on_wall |= within & (np.abs(far - radius) <= _SAME_M + _COARSE * radius)
+    return on_wall
 
 
 def _candidates(marks: _Marks) -> list[Array]:
@@ -167,13 +167,13 @@ def _candidates(marks: _Marks) -> list[Array]:
     if second is None:
         return []
     q = marks.points[second]
-    found = list[Array]()
+    turns = list[Array]()
     base = _frame(p, q)
     for a in marks.points[_like(marks, far, first)]:
         for b in marks.points[_like(marks, far, second)]:
             if abs(a @ b - p @ q) < _SAME_M * (far[first] + far[second]):
-                found.append(_frame(a, b) @ base.T)
-    return found
+                turns.append(_frame(a, b) @ base.T)
+    return turns
 
 
 def _like(marks: _Marks, far: Array, i: int) -> NDArray[np.bool_]:

@@ -129,7 +129,7 @@ def _found(solid: Solid, up: Array, opening_m: float, over_m: float, ray_m: floa
     """With rows of rays so far apart, [m]."""
     bottom, top = extent(solid.pieces, up)
     best = max(bottom + _HEIGHT * (top - bottom), bottom + _OVER_M, top - _PALM_M)
-    found: list[tuple[float, int, Hold]] = []
+    candidates: list[tuple[float, int, Hold]] = []
     for across in _directions(solid, up):
         along = np.cross(up, across)
         low, high = extent(solid.pieces, along)
@@ -143,8 +143,8 @@ def _found(solid: Solid, up: Array, opening_m: float, over_m: float, ray_m: floa
                     point = (low + high) / 2 * across + place * along + tip * up
                     off = np.abs([(point - solid.centroid) @ across, (point - solid.centroid) @ along]).sum()
                     cost = float(off + 0.5 * abs(tip - best) + 0.25 * (high - low) + _UNEVEN_M * uneven)
-                    found.append((round(cost, 9), len(found), Hold(point, across, (high - low) / 2)))
-    return tuple(hold for _, _, hold in sorted(found, key=lambda each: each[:2]))
+                    candidates.append((round(cost, 9), len(candidates), Hold(point, across, (high - low) / 2)))
+    return tuple(hold for _, _, hold in sorted(candidates, key=lambda each: each[:2]))
 
 
 def _directions(solid: Solid, up: Array) -> Iterator[Array]:

@@ -61,8 +61,8 @@ class Hull:
         """Its sides, (s, 4): outward unit normal n and d, so that n . x <= d inside, [m]."""
         from scipy.spatial import ConvexHull
 
-        found = ConvexHull(self.corners).equations * [1.0, 1.0, 1.0, -1.0]
-        return frozen(found[first_of_each(found[:, :3], signed=True)], None, 4)
+        planes = ConvexHull(self.corners).equations * [1.0, 1.0, 1.0, -1.0]
+        return frozen(planes[first_of_each(planes[:, :3], signed=True)], None, 4)
 
     @cached_property
     def normals(self) -> Array:

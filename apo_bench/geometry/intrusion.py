@@ -121,12 +121,12 @@ def _piece_by_piece(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece,
         near = (room <= 0.0) & (-room > deepest)
         if not near.any():
             continue
-        found = np.full(len(at), -np.inf)
-        found[near] = _depths(a[i], R_a, at[near], b[j], T_b, across_sides(a[i], R_a, b[j], R_b))
-        near &= found > deepest
+        across = np.full(len(at), -np.inf)
+        across[near] = _depths(a[i], R_a, at[near], b[j], T_b, across_sides(a[i], R_a, b[j], R_b))
+        near &= across > deepest
         if near.any():
             edges = _depths(a[i], R_a, at[near], b[j], T_b, across_edges(a[i], R_a, b[j], R_b))
-            deepest[near] = np.maximum(deepest[near], np.minimum(found[near], edges))
+            deepest[near] = np.maximum(deepest[near], np.minimum(across[near], edges))
     return deepest
 
 

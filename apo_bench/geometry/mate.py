@@ -183,9 +183,11 @@ def _lines(ends: Array, flat: Face) -> list[tuple[float, float]]:
     way = ends[1] - ends[0]
     if way @ way < _EDGE_ON**2 * 1e-6:
         return []
-    found = LineString(ends).intersection(_flat_shape(flat))
+    covered = LineString(ends).intersection(_flat_shape(flat))
     pieces = [
-        piece for piece in getattr(found, "geoms", (found,)) if piece.geom_type == "LineString" and piece.length > 0.0
+        piece
+        for piece in getattr(covered, "geoms", (covered,))
+        if piece.geom_type == "LineString" and piece.length > 0.0
     ]
     cut = [np.sort((np.asarray(piece.coords)[[0, -1]] - ends[0]) @ way / (way @ way)) for piece in pieces]
     return [(float(low), float(high)) for low, high in cut if high > low]

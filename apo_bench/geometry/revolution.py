@@ -44,23 +44,23 @@ def revolution(solid: Solid) -> Revolution | None:
     known within 8 % of the largest radius.
     """
     rounds = list(solid.rounds.values())
-    if not rounds or not all(_about(one, solid.centroid, rounds[0].axis) for one in rounds):
+    if not rounds or not all(_about(wall, solid.centroid, rounds[0].axis) for wall in rounds):
         return None
-    found = Revolution(solid.centroid, rounds[0].axis, reversible=False)
+    about = Revolution(solid.centroid, rounds[0].axis, reversible=False)
     for face in solid.faces.values():
-        across = abs(face.normal @ found.axis) > 1.0 - _SAME
-        if not across or not all(_is_circle(found, loop) for loop in (face.outline, *face.holes)):
+        across = abs(face.normal @ about.axis) > 1.0 - _SAME
+        if not across or not all(_is_circle(about, loop) for loop in (face.outline, *face.holes)):
             return None
-    turns = [turn_about(found.point, found.axis, angle) for angle in _TURNS]
+    turns = [turn_about(about.point, about.axis, angle) for angle in _TURNS]
     J = solid.inertia
     R = turns[0][:3, :3]
     if J is not None and np.abs(R @ J @ R.T - J).max() > _EVEN * np.trace(J):
         return None
-    coarse = _COARSE * max(max(one.radii) for one in rounds)
+    coarse = _COARSE * max(max(wall.radii) for wall in rounds)
     if not all(fills_the_same(solid, g, coarse) for g in turns):
         return None
-    over = turn_about(found.point, across_axis(found.axis), np.pi)
-    return found._replace(reversible=carries_faces(solid, over))
+    over = turn_about(about.point, across_axis(about.axis), np.pi)
+    return about._replace(reversible=carries_faces(solid, over))
 
 
 def turn_about(point: Array, axis: Array, angle_rad: float) -> Array:
@@ -74,18 +74,18 @@ def turned_alike(solid: Solid, T: Array, true: Array) -> Array:
 
     Of that one the rotation (3, 3) is enough. Any other part stays as it is.
     """
-    found = revolution(solid)
-    if found is None:
+    about = revolution(solid)
+    if about is None:
         return T
     M = true[:3, :3].T @ T[:3, :3]
-    a = found.axis
+    a = about.axis
     across = across_axis(a)
-    flips = [np.eye(3), 2.0 * np.outer(across, across) - np.eye(3)] if found.reversible else [np.eye(3)]
+    flips = [np.eye(3), 2.0 * np.outer(across, across) - np.eye(3)] if about.reversible else [np.eye(3)]
     turns = [flip @ _least_turn(M @ flip, a) for flip in flips]
     best = max(turns, key=lambda g: float(np.trace(M @ g)))
     out = np.array(T)
     out[:3, :3] = T[:3, :3] @ best
-    out[:3, 3] += T[:3, :3] @ (found.point - best @ found.point)
+    out[:3, 3] += T[:3, :3] @ (about.point - best @ about.point)
     return out
 
 
@@ -109,7 +109,7 @@ def _about(face: RoundFace, point: Array, axis: Array) -> bool:
     return bool(face.toward is None and abs(face.axis @ axis) > 1.0 - _SAME and np.sqrt(off @ off) < _SAME_M)
 
 
-def _is_circle(found: Revolution, loop: Array) -> bool:
+def _is_circle(about: Revolution, loop: Array) -> bool:
     """Whether corners, (k, 3), lie on a circle about the axis, and are as many as a coarse wall has at least."""
-    far = np.linalg.norm(np.cross(loop - found.point, found.axis), axis=1)
+    far = np.linalg.norm(np.cross(loop - about.point, about.axis), axis=1)
     return len(loop) >= _FEWEST and float(np.ptp(far)) <= _SAME_M

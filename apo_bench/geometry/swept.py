@@ -43,8 +43,8 @@ def overlap_intervals(
     if all_boxes(moving.pieces) and all_boxes(resting.pieces):
         return spans
     near = (spans[:, 1] > within[0]) & (spans[:, 0] < within[1])
-    found = [_exactly(moving, way, resting, slack_m, int(k)) for k in pairs[near]]
-    return np.concatenate([np.zeros((0, 2)), *found])
+    exact = [_exactly(moving, way, resting, slack_m, int(k)) for k in pairs[near]]
+    return np.concatenate([np.zeros((0, 2)), *exact])
 
 
 def _boxed(moving: Posed, way: Array, resting: Posed, slack_m: float) -> tuple[NDArray[np.intp], Array]:
@@ -101,18 +101,18 @@ def exit_distance(moving: Sequence[Posed], way: Array, resting: Sequence[Posed])
     """
     spans = list[Array]()
     exact = list[bool]()
-    asked = list[tuple[Posed, Posed, int]]()
+    owners = list[tuple[Posed, Posed, int]]()
     for m, r in product(moving, resting):
-        pairs, found = _boxed(m, way, r, -_SLACK_M)
-        spans += list(found)
-        exact += [all_boxes(m.pieces) and all_boxes(r.pieces)] * len(found)
-        asked += [(m, r, int(k)) for k in pairs]
+        pairs, intervals = _boxed(m, way, r, -_SLACK_M)
+        spans += list(intervals)
+        exact += [all_boxes(m.pieces) and all_boxes(r.pieces)] * len(intervals)
+        owners += [(m, r, int(k)) for k in pairs]
     at = 0.0
     last = np.array([span[1] for span in spans])
     order = np.argsort(-last, kind="stable")
     while (i := next((i for i in order if spans[i][0] <= at < spans[i][1]), None)) is not None:
         if not exact[i]:
-            m, r, k = asked[i]
+            m, r, k = owners[i]
             met = _exactly(m, way, r, -_SLACK_M, k)
             spans[i] = met[0] if len(met) else np.array([np.inf, -np.inf])
             exact[i] = True

@@ -20,14 +20,14 @@ _SAME_M = 1e-6
 @lru_cache(maxsize=1)
 def quarter_turns() -> Array:
     """The rotations that carry the axes of a frame onto each other, (24, 3, 3), the identity first."""
-    found = []
+    rotations = []
     for order in permutations(range(3)):
         for signs in product((1.0, -1.0), repeat=3):
             R = np.zeros((3, 3))
             R[range(3), order] = signs
             if np.linalg.det(R) > 0.0:
-                found.append(R)
-    turns = np.array(found)
+                rotations.append(R)
+    turns = np.array(rotations)
     turns.flags.writeable = False
     return turns
 
@@ -60,11 +60,11 @@ def symmetries(solid: Solid) -> Array:
 
 
 def _of_any_pieces(solid: Solid) -> Array:
-    found = revolution(solid)
-    if found is None:
+    about = revolution(solid)
+    if about is None:
         return exact_turns(solid)
-    over = turn_about(found.point, across_axis(found.axis), np.pi)
-    return np.array([np.eye(4), over] if found.reversible else [np.eye(4)])
+    over = turn_about(about.point, across_axis(about.axis), np.pi)
+    return np.array([np.eye(4), over] if about.reversible else [np.eye(4)])
 
 
 def nearest_alike(solid: Solid, T: Array, expected: Array) -> Array:

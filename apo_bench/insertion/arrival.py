@@ -124,12 +124,12 @@ def arrive(
                 return ways[-1]._replace(free=True)
         return ways[0]
 
-    found = chain(normals, out, float(np.sin(angle_rad)))
-    if found.way is not None:
-        line = Attach(_own(-found.way.direction, T), reach(found.way.length_m))
-        is_free = found.way.free
+    macros = chain(normals, out, float(np.sin(angle_rad)))
+    if macros.way is not None:
+        line = Attach(_own(-macros.way.direction, T), reach(macros.way.length_m))
+        is_free = macros.way.free
     else:
-        there = list(_admissible(found, normals, T)) if direction is None else [-(T[:3, :3] @ direction)]
+        there = list(_admissible(macros, normals, T)) if direction is None else [-(T[:3, :3] @ direction)]
         over = [resting[part] for part in dict.fromkeys(each.rests for each in touched if each.normal @ UP < -_LIFTED)]
         tried = [(way, reach(far)) for way in there for far in dict.fromkeys((0.0, _past(moving, way, over)))]
         found_free = next((each for each in tried if clear(*each)), None)
@@ -139,7 +139,7 @@ def arrive(
     if direction is not None:
         line = Attach(direction, line.travel_m)
     supports = tuple(i for i, n in enumerate(normals) if n @ UP > _LIFTED)
-    return Arrival(moves[0], T, touched, found, departure(found, supports), line, is_free and not found.locked)
+    return Arrival(moves[0], T, touched, macros, departure(macros, supports), line, is_free and not macros.locked)
 
 
 def _out_of(assembly: Assembly, touched: TouchedContact, poses: Poses, way: Array) -> float:
@@ -156,31 +156,31 @@ def _past(moving: Sequence[Posed], way: Array, roofs: Sequence[Posed]) -> float:
     return max(0.0, float(np.max(ends[1]) - np.min(ends[0]))) if roofs and abs(way @ UP) < 0.5 else 0.0
 
 
-def turning_state(assembly: Assembly, found: Arrival, poses: Poses) -> Screw:
+def turning_state(assembly: Assembly, arrival: Arrival, poses: Poses) -> Screw:
     """The state of what has arrived if it may also turn; `poses` as it was understood at."""
-    return screw_state(*corners(assembly, found.touched, poses))
+    return screw_state(*corners(assembly, arrival.touched, poses))
 
 
 def _readable(basis: Array, T: Array) -> Array:
     """A basis of the span of (m, 3) that people can read: axes of the part at T that lie in it, then what is left."""
-    found: list[Array] = []
+    axes: list[Array] = []
     inside = [axis for axis in T[:3, :3].T if np.linalg.norm(basis.T @ (basis @ axis) - axis) < 1e-6]
     for axis in (*inside, *basis):
         rest = basis.T @ (basis @ axis)
-        rest = rest - sum(((rest @ other) * other for other in found), np.zeros(3))
-        if np.linalg.norm(rest) > 1e-6 and len(found) < len(basis):
-            found.append(rest / np.linalg.norm(rest) + 0.0)
-    return np.array(found).reshape(-1, 3)
+        rest = rest - sum(((rest @ other) * other for other in axes), np.zeros(3))
+        if np.linalg.norm(rest) > 1e-6 and len(axes) < len(basis):
+            axes.append(rest / np.linalg.norm(rest) + 0.0)
+    return np.array(axes).reshape(-1, 3)
 
 
-def _admissible(found: Chain, normals: Array, T: Array) -> Iterator[Array]:
+def _admissible(macros: Chain, normals: Array, T: Array) -> Iterator[Array]:
     """Ways off contacts that enclose nothing: straight up if that is one, as the first contact or the last one opens,
     any other."""
     cone = classify(normals)
-    if found.locked:
+    if macros.locked:
         yield UP
         return
-    back = [-found.macros[i].direction for i in (0, -1)] if found.macros else []
+    back = [-macros.macros[i].direction for i in (0, -1)] if macros.macros else []
     inside = [cone.direction] if cone.direction.any() else []
     for way in (UP, *back, *inside, *(sign * axis for axis in T[:3, :3].T for sign in (-1.0, 1.0))):
         if cone.admits(way):

@@ -139,13 +139,13 @@ def chain(normals: Array, out: _Out, slack: float = ANGLE_RAD) -> Chain:
     return Chain(state, tuple(macros), way, False)
 
 
-def departure(found: Chain, supports: tuple[int, ...]) -> tuple[Macro, ...]:
+def departure(arrival: Chain, supports: tuple[int, ...]) -> tuple[Macro, ...]:
     """The macros by which a part leaves the contacts of a chain: the same ways back, in reverse order.
 
     A part that only rests on supports is simply lifted, which belongs to every transfer; that is no macro.
     """
     back: list[Macro] = []
-    for macro in reversed(found.macros):
+    for macro in reversed(arrival.macros):
         d = -macro.direction
         length = macro.length_m
         last = back[-1] if back else None
@@ -171,17 +171,17 @@ def _contacts(normals: Array, layer: Layer, slack: float) -> list[Macro]:
     """The guarded motions that close what can be opened: down onto what carries first, then sideways, one by one."""
     macros: list[Macro] = []
     left = layer.breaks
-    made = layer.keeps
+    closed_before = layer.keeps
     while left:
-        along = null_space(normals[list(made)]) if made else np.eye(3)
+        along = null_space(normals[list(closed_before)]) if closed_before else np.eye(3)
         off, closed = _next(normals, left, along, slack)
         if not closed:  # nothing is left to move along, so the rest closes with what was made last
             return _together(normals, layer, macros, left)
         name: MacroName = "slide-to-contact" if macros else "move-to-contact"
         if layer.cone.state.constraining == 2:
             name = "move-to-bottom"
-        macros.append(Macro(name, -off, closed, made))
-        made = (*made, *closed)
+        macros.append(Macro(name, -off, closed, closed_before))
+        closed_before = (*closed_before, *closed)
         left = tuple(i for i in left if i not in closed)
     return macros
 

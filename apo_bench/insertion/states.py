@@ -98,15 +98,15 @@ def _opened(rows: bytes, k: int, n: int) -> tuple[NDArray[np.bool_], Array]:
     from scipy.optimize import linprog
 
     N = np.frombuffer(rows).reshape(k, n)
-    found = linprog(
+    optimum = linprog(
         np.concatenate([np.zeros(n), -np.ones(k)]),
         A_ub=np.hstack([-N, np.eye(k)]),
         b_ub=np.zeros(k),
         bounds=[(-_FASTEST, _FASTEST)] * n + [(0.0, 1.0)] * k,
         method="highs",
     )
-    opens = found.x[n:] > 0.5
-    x = found.x[:n] if opens.any() else np.zeros(n)
+    opens = optimum.x[n:] > 0.5
+    x = optimum.x[:n] if opens.any() else np.zeros(n)
     return opens, x / max(float(np.linalg.norm(x)), 1e-300)
 
 
@@ -116,14 +116,14 @@ def evenly_open(rows: Array) -> Array:
     from scipy.optimize import linprog
 
     k, n = rows.shape
-    found = linprog(
+    optimum = linprog(
         np.append(np.zeros(n), -1.0),
         A_ub=np.hstack([-rows, np.ones((k, 1))]),
         b_ub=np.zeros(k),
         bounds=[(-1.0, 1.0)] * n + [(0.0, None)],
         method="highs",
     )
-    x = found.x[:n] if found.x[n] > 1.0 / _FASTEST else np.zeros(n)
+    x = optimum.x[:n] if optimum.x[n] > 1.0 / _FASTEST else np.zeros(n)
     return np.asarray(x / max(float(np.linalg.norm(x)), 1e-300))
 
 
@@ -148,14 +148,14 @@ def snap_normals(normals: Array, angle_rad: float = ANGLE_RAD) -> Array:
     Between two walls a part is held; between two that are seen a little askew it would seem to be in a wedge.
     """
     axes: list[Array] = []
-    made = np.empty_like(normals)
+    snapped = np.empty_like(normals)
     for i, n in enumerate(normals):
         near = [a for a in axes if np.linalg.norm(np.cross(a, n)) < np.sin(angle_rad)]
         axis = max(near, key=lambda a: abs(a @ n), default=None)
         if axis is None:
             axes.append(n)
-        made[i] = n if axis is None else np.sign(axis @ n) * axis
-    return made
+        snapped[i] = n if axis is None else np.sign(axis @ n) * axis
+    return snapped
 
 
 class Screw(NamedTuple):

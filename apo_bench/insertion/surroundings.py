@@ -17,38 +17,38 @@ OVER_M = 0.02
 """Room between what is carried and what it is carried over."""
 
 
-def slide_directions(assembly: Assembly, found: Arrival, poses: Poses) -> tuple[Array, ...]:
+def slide_directions(assembly: Assembly, arrival: Arrival, poses: Poses) -> tuple[Array, ...]:
     """The level directions of `slide-to-contact`, (3,) each, world, towards the faces where they are believed to be."""
     sides: list[Array] = []
-    for macro in found.macros:
+    for macro in arrival.macros:
         if macro.name == "slide-to-contact":
-            first = found.touched[macro.makes[0]]
-            side = -_now(assembly, found, macro.makes[0], poses)
+            first = arrival.touched[macro.makes[0]]
+            side = -_now(assembly, arrival, macro.makes[0], poses)
             if first.normal @ macro.direction > -1.0 + _STRAIGHT:
-                side = poses[found.main][:3, :3] @ found.own(macro.direction)
+                side = poses[arrival.main][:3, :3] @ arrival.own(macro.direction)
             if abs(side[2]) < 0.5:
                 sides.append(side)
     return tuple(sides)
 
 
-def _now(assembly: Assembly, found: Arrival, i: int, poses: Poses) -> Array:
+def _now(assembly: Assembly, arrival: Arrival, i: int, poses: Poses) -> Array:
     """A normal of what is touched, (3,), world, where the parts are believed to be."""
-    contact = found.touched[i].contact
-    rests = found.touched[i].rests
-    place = sum(each.contact == contact for each in found.touched[:i])
+    contact = arrival.touched[i].contact
+    rests = arrival.touched[i].rests
+    place = sum(each.contact == contact for each in arrival.touched[:i])
     moves = [of.part for of in contact if of.part != rests]
     return touched_contacts(assembly, [contact], moves, poses)[place].normal
 
 
-def _walls(found: Arrival) -> tuple[Contact, ...]:
+def _walls(arrival: Arrival) -> tuple[Contact, ...]:
     """The contacts between which the part is inserted."""
-    return tuple(contact for macro in found.macros if macro.inserts for contact in found.contacts(macro))
+    return tuple(contact for macro in arrival.macros if macro.inserts for contact in arrival.contacts(macro))
 
 
-def slow_before(assembly: Assembly, found: Arrival, poses: Poses, way: Array) -> float:
+def slow_before(assembly: Assembly, arrival: Arrival, poses: Poses, way: Array) -> float:
     """How far before the goal a motion from above turns slow: where an insertion begins, or just above the floor."""
     depth = _SLOW_M
-    for contact in _walls(found):
+    for contact in _walls(arrival):
         depth = max(depth, _reach(assembly, contact, poses, way) + WALL_MARGIN_M)
     return depth
 
@@ -63,9 +63,9 @@ def _reach(assembly: Assembly, contact: Contact, poses: Poses, way: Array) -> fl
     return float(np.ptp(corners @ way)) if len(corners) else 0.0
 
 
-def mouths(assembly: Assembly, found: Arrival, poses: Poses, way: Array) -> tuple[float, ...]:
+def mouths(assembly: Assembly, arrival: Arrival, poses: Poses, way: Array) -> tuple[float, ...]:
     """How far before the goal the part comes to where walls begin that it goes between, [m], the first one first."""
-    ends = {mouth(assembly, *contact, poses, way) for contact in _walls(found)}
+    ends = {mouth(assembly, *contact, poses, way) for contact in _walls(arrival)}
     return tuple(sorted(ends, reverse=True))
 
 

@@ -81,12 +81,12 @@ class ContactJudge(NamedTuple):
             poses: Where the parts are, world frame, [m].
             true: Where they are when it is made, if all goals are the true ones.
         """
-        asked = self.thresholds
-        gaps, angle, found = _measured(self.assembly, contact, poses)
+        thresholds = self.thresholds
+        gaps, angle, common = _measured(self.assembly, contact, poses)
         allowed, gap = self._nearest_limit(contact, operation, true, gaps)
-        covered = share(found, face_overlap(self.assembly, contact, true))
-        covering = gap is not None and covered >= asked.overlap_fraction
-        near = angle <= asked.loose_angle_deg and (gap is None or gap <= asked.loose_gap_mm)
+        covered = share(common, face_overlap(self.assembly, contact, true))
+        covering = gap is not None and covered >= thresholds.overlap_fraction
+        near = angle <= thresholds.loose_angle_deg and (gap is None or gap <= thresholds.loose_gap_mm)
         touching = near and (gap is None or gap <= allowed)
         loose = near and covering
         return ContactVerdict(
@@ -165,8 +165,8 @@ def _mate(assembly: Assembly, contact: Contact, poses: Poses) -> Mate:
     return mate(assembly.face_of(m), poses[m.part], assembly.face_of(e), poses[e.part])
 
 
-def _when(found: ContactVerdict) -> str:
-    return f" after operation {found.operation + 1}" if found.moment == "made" else ""
+def _when(verdict: ContactVerdict) -> str:
+    return f" after operation {verdict.operation + 1}" if verdict.moment == "made" else ""
 
 
 def _measured(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[Gaps | None, float, Overlap]:
@@ -180,13 +180,13 @@ def _measured(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[Gaps 
         return Gaps(off, off) if between.common else None, float(np.degrees(between.angle_rad)), between.common
     plane = assembly.face(contact.manipulated).plane
     normal = assembly.face(contact.environment).normal
-    found = face_overlap(assembly, contact, poses)
+    common = face_overlap(assembly, contact, poses)
     T_m = poses[contact.manipulated.part]
     T_e = poses[contact.environment.part]
     n = T_m[:3, :3] @ plane[:3]
     angle = float(np.degrees(np.arccos(np.clip(-n @ T_e[:3, :3] @ normal, -1.0, 1.0))))
-    if not found:
-        return None, angle, found
+    if not common:
+        return None, angle, common
     # Seen from the manipulated face, a corner on the plane of the other one is in front of it where the two are apart.
-    e = 1e3 * ((found.corners - T_m[:3, 3]) @ n + plane[3])
-    return Gaps(max(0.0, float(e.max())), max(0.0, float(-e.min()))), angle, found
+    e = 1e3 * ((common.corners - T_m[:3, 3]) @ n + plane[3])
+    return Gaps(max(0.0, float(e.max())), max(0.0, float(-e.min()))), angle, common

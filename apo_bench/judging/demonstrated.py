@@ -34,10 +34,10 @@ def judge_demonstrated(
     """
     after = reached.after
     final = reached.final
-    asked = ContactJudge(assembly, thresholds, clearance_mm)
+    judge = ContactJudge(assembly, thresholds, clearance_mm)
     states = [snapshot for snapshot in (*after, final) if snapshot is not None]
     return judgement(
-        _contacts(asked, after, final, reference),
+        _contacts(judge, after, final, reference),
         states,
         [(part, push * 1e3) for part, push in (*_pushes(assembly, after, final), *_corners_at_end(assembly, reached))],
         thresholds,
@@ -46,19 +46,19 @@ def judge_demonstrated(
 
 
 def _contacts(
-    asked: ContactJudge, after: Sequence[Snapshot | None], final: Snapshot | None, reference: Array
+    judge: ContactJudge, after: Sequence[Snapshot | None], final: Snapshot | None, reference: Array
 ) -> tuple[ContactVerdict, ...]:
     """Every contact in the snapshot after its operation, and at the end if it still stands.
 
     Moments of which there is no snapshot are left out.
     """
-    true = _true_poses(asked.assembly, (*after, final), reference)
+    true = _true_poses(judge.assembly, (*after, final), reference)
     out = []
-    for contact, made, lost in asked.assembly.relations():
+    for contact, made, lost in judge.assembly.relations():
         moments: Mapping[Moment, Snapshot | None] = {"made": after[made], "end": final if lost is None else None}
         for moment, snapshot in moments.items():
             if snapshot is not None:
-                out.append(asked.verdict(contact, made, moment, snapshot.poses, true[made], Overlap.share))
+                out.append(judge.verdict(contact, made, moment, snapshot.poses, true[made], Overlap.share))
     return tuple(out)
 
 

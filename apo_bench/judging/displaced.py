@@ -78,14 +78,14 @@ def faults_of_place(
 
 def _standing(assembly: Assembly, away: Collection[str]) -> dict[tuple[str, str], list[Contact]]:
     """The contacts that stand at the end, by the two parts that touch; all fixed parts count as one, the first."""
-    found = dict[tuple[str, str], list[Contact]]()
+    standing = dict[tuple[str, str], list[Contact]]()
     ground = min(assembly.fixed, default="")
     for contact, _, lost in assembly.relations():
         m, e = (ground if end.part in assembly.fixed else end.part for end in contact)
         if lost is None and not {m, e} & set(away):
-            pair = (m, e) if m == ground or (m, e) in found else (e, m)
-            found.setdefault(pair, []).append(contact)
-    return found
+            pair = (m, e) if m == ground or (m, e) in standing else (e, m)
+            standing.setdefault(pair, []).append(contact)
+    return standing
 
 
 def _is_mate(assembly: Assembly, contacts: Sequence[Contact], part: str, seen: Poses) -> bool:

@@ -31,7 +31,7 @@ def judge_finished(
         reference: (n, 4, 4), the true goals, world frame, [m].
     """
     final = reached.final
-    made = all(snapshot is not None for snapshot in (*reached.after, reached.final))
+    all_made = all(snapshot is not None for snapshot in (*reached.after, reached.final))
     if final is None:
         return judgement((), (), (), thresholds, all_made=False)
     away = fixtures(assembly)
@@ -42,7 +42,7 @@ def judge_finished(
         [final],
         [(what, 1e3 * m) for what, m in faults_of_place(assembly, reached.after, final, away, seen)],
         thresholds,
-        all_made=made,
+        all_made=all_made,
         disturbed=[1e3 * m for _, m in displacements(assembly, reached.after, final, away)],
     )
 
@@ -69,13 +69,13 @@ def _on_fixed(assembly: Assembly, contact: Contact) -> bool:
     return any(end.part in assembly.fixed for end in contact)
 
 
-def _contacts(asked: ContactJudge, seen: Poses, true: Poses, away: frozenset[str]) -> Iterator[ContactVerdict]:
+def _contacts(judge: ContactJudge, seen: Poses, true: Poses, away: frozenset[str]) -> Iterator[ContactVerdict]:
     """The contacts that stand at the end, of parts that are no fixtures."""
-    assembly = asked.assembly
+    assembly = judge.assembly
     for contact, made, lost in assembly.relations():
         if lost is None and not away & {end.part for end in contact}:
             share = _share_of_area if _on_fixed(assembly, contact) else Overlap.share
-            yield asked.verdict(contact, made, "end", seen, true, share)
+            yield judge.verdict(contact, made, "end", seen, true, share)
 
 
 def _nearest_alike(assembly: Assembly, part: str, T: Array, true: Array) -> Array:
@@ -85,5 +85,5 @@ def _nearest_alike(assembly: Assembly, part: str, T: Array, true: Array) -> Arra
     return nearest_alike(assembly.solids[part], T, true)
 
 
-def _share_of_area(found: Overlap, true: Overlap) -> float:
-    return min(1.0, found.area / true.area) if true else 1.0
+def _share_of_area(reached: Overlap, true: Overlap) -> float:
+    return min(1.0, reached.area / true.area) if true else 1.0

@@ -43,7 +43,7 @@ class Judgement:
     @property
     def code(self) -> str:
         """The first fault, or `ok`."""
-        return next((fault for fault, found in self.conditions.items() if found), "ok")
+        return next((fault for fault, is_there in self.conditions.items() if is_there), "ok")
 
 
 def judgement(
@@ -73,7 +73,7 @@ def judgement(
         "not_released": any(not s.released for s in states),
         "not_at_rest": any(not _rests(s, thresholds) for s in states),
     }
-    first = next((fault for fault, found in conditions.items() if found), "ok")
+    first = next((fault for fault, is_there in conditions.items() if is_there), "ok")
     return Judgement(
         loose=all_made and all(c.loose for c in contacts),
         conditions=MappingProxyType(conditions),

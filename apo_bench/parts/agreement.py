@@ -124,16 +124,16 @@ def supported(face: Face, pieces: tuple[Piece, ...]) -> tuple[Face, float] | Non
 
     to_plane = _plane(face.normal)
     stated = shapely.make_valid(shapely.Polygon(face.outline @ to_plane, [hole @ to_plane for hole in face.holes]))
-    found = stated.intersection(shapely.unary_union(_below(face, _sides(pieces), to_plane), grid_size=_SNAP_M))
+    lying = stated.intersection(shapely.unary_union(_below(face, _sides(pieces), to_plane), grid_size=_SNAP_M))
     for by in (-_BESIDE_M, 1.5 * _BESIDE_M, -0.5 * _BESIDE_M):
-        found = found.buffer(by, join_style="mitre")
-    found = shapely.set_precision(found.simplify(_ROUNDED_M), _WRITTEN_M)
-    if found.geom_type != "Polygon" or found.is_empty:
+        lying = lying.buffer(by, join_style="mitre")
+    lying = shapely.set_precision(lying.simplify(_ROUNDED_M), _WRITTEN_M)
+    if lying.geom_type != "Polygon" or lying.is_empty:
         return None
     off = (face.normal @ face.outline[0]) * face.normal
-    rings = [np.asarray(ring.coords)[:-1] @ to_plane.T + off for ring in (found.exterior, *found.interiors)]
+    rings = [np.asarray(ring.coords)[:-1] @ to_plane.T + off for ring in (lying.exterior, *lying.interiors)]
     oriented = [ring if (_winding(ring, face.normal) > 0.0) == (k == 0) else ring[::-1] for k, ring in enumerate(rings)]
-    return Face(face.name, oriented[0], tuple(oriented[1:])), float(found.area / stated.area)
+    return Face(face.name, oriented[0], tuple(oriented[1:])), float(lying.area / stated.area)
 
 
 def _winding(ring: Array, n: Array) -> float:
@@ -204,7 +204,7 @@ def _check_round(wall: RoundFace, sides: _Sides, place: str) -> float:
     sides = _near(sides, low, high)
     if not sides.pieces:
         _fail(place, "no piece is near the face")
-    found = 0
+    near_wall = 0
     off = 0.0
     allowed = max(_COARSE * max(wall.radii), _BESIDE_M) if wall.name.startswith("auto_") else _BESIDE_M
     for height, radius in zip(heights, radii, strict=True):
@@ -219,15 +219,15 @@ def _check_round(wall: RoundFace, sides: _Sides, place: str) -> float:
         )
         if into.any():
             true = np.abs(at[into][0])
-            said = f"{1e3 * true:.4f} mm from its axis" if np.isfinite(true) else "before it"
-            _fail(place, f"pieces have a side {said}, {1e3 * radius:.4f} mm is stated, which may differ by 0.005 mm")
+            where = f"{1e3 * true:.4f} mm from its axis" if np.isfinite(true) else "before it"
+            _fail(place, f"pieces have a side {where}, {1e3 * radius:.4f} mm is stated, which may differ by 0.005 mm")
         gap = np.maximum(sign * (at - radius), 0.0)
-        found += int((gap <= allowed).sum())
+        near_wall += int((gap <= allowed).sum())
         off = max(off, float(gap[gap <= allowed].max(initial=0.0)))
-    if found < _LEAST_WALL * _RAYS * len(heights):
+    if near_wall < _LEAST_WALL * _RAYS * len(heights):
         _fail(
             place,
-            f"pieces lie along {found / (_RAYS * len(heights)):.0%} of the wall, within {1e3 * allowed:.3g} mm; "
+            f"pieces lie along {near_wall / (_RAYS * len(heights)):.0%} of the wall, within {1e3 * allowed:.3g} mm; "
             f"{_LEAST_WALL:.0%} is needed",
         )
     return off * wall.extent_rad * max(wall.radii) * max(wall.length, 0.0)

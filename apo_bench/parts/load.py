@@ -74,10 +74,16 @@ def check_part(file: PartFile, solid: Solid) -> None:
     check_receding(solid, beside)
 
 
-def _stated(file: PartFile, said: StatedPart) -> Solid:
+def _stated(file: PartFile, stated: StatedPart) -> Solid:
     """The solid of any convex pieces, with the faces that are stated."""
     return Solid(
-        file.path.stem, said.faces, file.pieces, said.centroid, said.volume, rounds=said.rounds, inertia=said.inertia
+        file.path.stem,
+        stated.faces,
+        file.pieces,
+        stated.centroid,
+        stated.volume,
+        rounds=stated.rounds,
+        inertia=stated.inertia,
     )
 
 
@@ -97,15 +103,15 @@ def _united(file: PartFile) -> Solid:
 
 def _matched(file: PartFile, surfaces: tuple[Surface, ...]) -> dict[int, Mark]:
     """Which mark lies on which surface."""
-    found: dict[int, Mark] = {}
+    marks: dict[int, Mark] = {}
     for mark in file.marks:
         k = _under(file, mark, surfaces)
-        if k in found:
+        if k in marks:
             raise InputError(
-                f"{file.path}: sites '{found[k].name}' and '{mark.name}' lie on one face; keep one of them."
+                f"{file.path}: sites '{marks[k].name}' and '{mark.name}' lie on one face; keep one of them."
             )
-        found[k] = mark
-    return found
+        marks[k] = mark
+    return marks
 
 
 def _under(file: PartFile, mark: Mark, surfaces: tuple[Surface, ...]) -> int:

@@ -67,12 +67,12 @@ _HIDDEN_GROUP = "3"
 """Of MuJoCo's groups of geoms, 0 to 2 are shown."""
 
 
-def is_picture(said: Mapping[str, str]) -> bool:
+def is_picture(attributes: Mapping[str, str]) -> bool:
     """Whether a geom says that it is no piece."""
-    return any(key in said for key in NEVER_COLLIDES)
+    return any(key in attributes for key in NEVER_COLLIDES)
 
 
-def dress_picture(path: Path, root: Element, body: Element, geom: Element, said: Mapping[str, str]) -> None:
+def dress_picture(path: Path, root: Element, body: Element, geom: Element, attributes: Mapping[str, str]) -> None:
     """Write the triangles of the picture into the tree in place of the file, and hide the pieces.
 
     Raises:
@@ -80,9 +80,9 @@ def dress_picture(path: Path, root: Element, body: Element, geom: Element, said:
     """
     called = f"<geom> '{geom.attrib['name']}'"
     meshes = {mesh.attrib["name"]: mesh for mesh in root.iterfind("asset/mesh")}
-    mesh = meshes.get(said.get("mesh", ""))
-    right = all(said.get(key) == value for key, value in NEVER_COLLIDES.items())
-    if said.get("type") != "mesh" or not right or mesh is None or "file" not in mesh.attrib:
+    mesh = meshes.get(attributes.get("mesh", ""))
+    right = all(attributes.get(key) == value for key, value in NEVER_COLLIDES.items())
+    if attributes.get("type") != "mesh" or not right or mesh is None or "file" not in mesh.attrib:
         wanted = " ".join(f'{key}="{value}"' for key, value in NEVER_COLLIDES.items())
         raise InputError(
             f"{path}: {called} is a picture if it has {wanted} and a mesh with file=; give it these, or none of them."

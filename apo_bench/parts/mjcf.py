@@ -66,8 +66,8 @@ def read_part(path: Path) -> PartFile:
     pictures = [(e, a) for e, a in elements if e.tag == "geom" and is_picture(a)]
     if len(pictures) > 1:
         raise InputError(f"{path}: {_called(pictures[1][0])} is a second picture; a part has one at most.")
-    for element, said in pictures:
-        dress_picture(path, root, body, element, said)
+    for element, attributes in pictures:
+        dress_picture(path, root, body, element, attributes)
     meshes = _meshes(path, root)
     geoms = [(_piece(path, e, a, meshes), a) for e, a in elements if e.tag == "geom" and not is_picture(a)]
     marks = tuple(_mark(path, e, a) for e, a in elements if e.tag == "site")
@@ -81,7 +81,7 @@ def read_part(path: Path) -> PartFile:
     if all_boxes(pieces):
         if len(pieces) > MOST_BOXES:
             raise InputError(f"{path}: the part has {len(pieces)} boxes; {MOST_BOXES} are the most that it may have.")
-        density = _density(path, [said for _, said in geoms])
+        density = _density(path, [attributes for _, attributes in geoms])
         return PartFile(path, pieces, marks, None, density, tostring(root, encoding="unicode"))
     if marks:
         raise InputError(
@@ -93,8 +93,8 @@ def read_part(path: Path) -> PartFile:
     return PartFile(path, pieces, (), stated, stated.density, tostring(root, encoding="unicode"))
 
 
-def _density(path: Path, said: list[Mapping[str, str]]) -> float:
-    densities = sorted({float(each.get("density", USUAL_DENSITY)) for each in said})
+def _density(path: Path, geoms: list[Mapping[str, str]]) -> float:
+    densities = sorted({float(each.get("density", USUAL_DENSITY)) for each in geoms})
     if len(densities) > 1:
         raise InputError(
             f"{path}: the geoms have densities from {densities[0]:g} to {densities[-1]:g} kg/m^3; a part has one."
@@ -130,28 +130,28 @@ _Defaults = Mapping[str, Mapping[str, Mapping[str, str]]]
 
 
 def _defaults(path: Path, root: Element) -> _Defaults:
-    found: dict[str, Mapping[str, Mapping[str, str]]] = {}
-    for name, said in _classes(path, root.find("default"), "main", {}):
-        if name in found:
+    classes: dict[str, Mapping[str, Mapping[str, str]]] = {}
+    for name, values in _classes(path, root.find("default"), "main", {}):
+        if name in classes:
             raise InputError(f"{path}: two <default> have class '{name}'; give each its own name.")
-        found[name] = said
-    return found
+        classes[name] = values
+    return classes
 
 
 def _classes(
     path: Path, element: Element | None, name: str, outer: Mapping[str, Mapping[str, str]]
 ) -> Iterator[tuple[str, Mapping[str, Mapping[str, str]]]]:
     inside = [] if element is None else list(element)
-    said = {tag: dict(values) for tag, values in outer.items()}
+    values = {tag: dict(own) for tag, own in outer.items()}
     for child in inside:
         if child.tag != "default":
-            said.setdefault(child.tag, {}).update(child.attrib)
-    yield name, said
+            values.setdefault(child.tag, {}).update(child.attrib)
+    yield name, values
     for child in inside:
         if child.tag == "default":
             if "class" not in child.attrib:
                 raise InputError(f"{path}: a nested <default> has no class=; give it one.")
-            yield from _classes(path, child, child.attrib["class"], said)
+            yield from _classes(path, child, child.attrib["class"], values)
 
 
 def _resolved(path: Path, element: Element, defaults: _Defaults) -> Mapping[str, str]:
@@ -172,14 +172,14 @@ def _meshes(path: Path, root: Element) -> dict[str, Array]:
             raise InputError(f"{path}: {_called(mesh)} has file=, which only a picture has; give its corners.")
         if "vertex" not in mesh.attrib:
             raise InputError(f"{path}: {_called(mesh)} has no vertex=; give its corners.")
-    found = {mesh.attrib["name"]: _numbers(mesh.attrib["vertex"]).reshape(-1, 3) for mesh in meshes}
-    count = sum(map(len, found.values()))
+    corners = {mesh.attrib["name"]: _numbers(mesh.attrib["vertex"]).reshape(-1, 3) for mesh in meshes}
+    count = sum(map(len, corners.values()))
     if count > MOST_CORNERS_IN_ALL:
         raise InputError(
             f"{path}: the meshes have {count} corners; {MOST_CORNERS_IN_ALL} are the most that a part may have, so cut "
             "round walls that no contact uses into fewer sides."
         )
-    return found
+    return corners
 
 
 _NEEDED: Mapping[str, Mapping[str, str]] = {
@@ -195,47 +195,47 @@ _OF_TYPE: Mapping[str, tuple[str, ...]] = {
 }
 
 
-def _piece(path: Path, element: Element, said: Mapping[str, str], meshes: dict[str, Array]) -> Piece:
+def _piece(path: Path, element: Element, attributes: Mapping[str, str], meshes: dict[str, Array]) -> Piece:
     """The piece of a geom; its mesh is taken out of those that are left."""
     name = element.attrib["name"]
-    kind = said.get("type")
+    kind = attributes.get("type")
     if kind is None:
         raise InputError(
             f'{path}: {_called(element)} has no type=, which MuJoCo takes for a sphere; say type="box", or another one.'
         )
     for key, words in _NEEDED[kind].items():
-        if key not in said:
+        if key not in attributes:
             raise InputError(f"{path}: {_called(element)} has no {key}=; {words}.")
     for key in ("pos", "size", "zaxis", "mesh"):
-        if key in said and key not in _OF_TYPE[kind]:
+        if key in attributes and key not in _OF_TYPE[kind]:
             raise InputError(f"{path}: {_called(element)} has {key}=, which a {kind} has not; remove it.")
-    at = _numbers(said.get("pos", "0 0 0"))
-    size = _numbers(said.get("size", ""))
+    at = _numbers(attributes.get("pos", "0 0 0"))
+    size = _numbers(attributes.get("size", ""))
     if kind == "mesh":
-        if said["mesh"] not in meshes:
+        if attributes["mesh"] not in meshes:
             raise InputError(
-                f"{path}: {_called(element)} has the mesh '{said['mesh']}', which <asset> has not, or another geom "
-                "has; give each geom its own."
+                f"{path}: {_called(element)} has the mesh '{attributes['mesh']}', which <asset> has not, or another "
+                "geom has; give each geom its own."
             )
-        return checked_hull(path, name, meshes.pop(said["mesh"]))
+        return checked_hull(path, name, meshes.pop(attributes["mesh"]))
     if len(size) != (3 if kind == "box" else 2):
         raise InputError(f"{path}: {_called(element)} has {len(size)} numbers in size=; {_NEEDED[kind]['size']}.")
     if kind == "box":
         return Box(name, at, size)
     if size[0] > WIDEST_M:
         raise InputError(f"{path}: {_called(element)} has a radius of {size[0]:g} m; {WIDEST_M:g} is the most allowed.")
-    axis = _numbers(said.get("zaxis", "0 0 1"))
+    axis = _numbers(attributes.get("zaxis", "0 0 1"))
     length = float(np.linalg.norm(axis))
     if length < _SHORTEST_AXIS:
         raise InputError(f"{path}: {_called(element)} has a zaxis= of no length; give a direction.")
     return cylinder_hull(name, Cylinder(at, axis / length, float(size[0]), float(size[1])))
 
 
-def _mark(path: Path, element: Element, said: Mapping[str, str]) -> Mark:
+def _mark(path: Path, element: Element, attributes: Mapping[str, str]) -> Mark:
     name = element.attrib["name"]
     if name.startswith("auto_"):
         raise InputError(f"{path}: site '{name}' begins with auto_, which is kept for faces without a name; rename it.")
-    return Mark(name, _numbers(said.get("pos", "0 0 0")), element.get("class") == _FIT_CLASS)
+    return Mark(name, _numbers(attributes.get("pos", "0 0 0")), element.get("class") == _FIT_CLASS)
 
 
 def _numbers(text: str) -> Array:

@@ -57,10 +57,10 @@ def read_stated(path: Path) -> StatedPart:
     top = read_toml(path, "file that states the faces of a part").fields_of(
         SCHEMA, ("faces", "volume_mm3", "centroid_mm", "inertia_mm5"), ("density", "friction", "source", "licence")
     )
-    found = [_face(name, node) for name, node in _named(top["faces"])]
+    faces = [_face(name, node) for name, node in _named(top["faces"])]
     return StatedPart(
-        faces={face.name: face for face in found if isinstance(face, Face)},
-        rounds={face.name: face for face in found if isinstance(face, RoundFace)},
+        faces={face.name: face for face in faces if isinstance(face, Face)},
+        rounds={face.name: face for face in faces if isinstance(face, RoundFace)},
         volume=1e-9 * top["volume_mm3"].number(0.0, 1e15, above=True),
         centroid=1e-3 * _within(top["centroid_mm"], 3),
         inertia=1e-15 * _inertia(top["inertia_mm5"]),
@@ -96,18 +96,18 @@ def _face(name: str, node: JsonNode) -> Face | RoundFace:
 
 
 def _plane(name: str, node: JsonNode) -> Face:
-    said = node.fields(("kind", "outline_mm"), ("holes_mm", "fit"))
-    outline = _ring(said["outline_mm"])
-    holes = tuple(_ring(each) for each in said["holes_mm"].items("hole")) if "holes_mm" in said else ()
+    keys = node.fields(("kind", "outline_mm"), ("holes_mm", "fit"))
+    outline = _ring(keys["outline_mm"])
+    holes = tuple(_ring(each) for each in keys["holes_mm"].items("hole")) if "holes_mm" in keys else ()
     across = _across(outline)
     if np.linalg.norm(across) < 2.0 * _SMALLEST_MM2:
-        said["outline_mm"].fail("corners around an area are needed")
+        keys["outline_mm"].fail("corners around an area are needed")
     n = across / np.linalg.norm(across)
     for ring in (outline, *holes):
         if np.abs((ring - outline[0]) @ n).max() > _FLAT_MM:
             node.fail(f"corners within {_FLAT_MM:g} mm of one plane are needed")
     _check_rings(node, n, outline, holes)
-    return Face(name, 1e-3 * outline, tuple(1e-3 * hole for hole in holes), _flag(said, "fit"))
+    return Face(name, 1e-3 * outline, tuple(1e-3 * hole for hole in holes), _flag(keys, "fit"))
 
 
 def _check_rings(node: JsonNode, n: Array, outline: Array, holes: tuple[Array, ...]) -> None:
@@ -140,30 +140,30 @@ def _ring(node: JsonNode) -> Array:
 def _round(name: str, node: JsonNode, kind: str) -> RoundFace:
     sizes = {"cylinder": ("radius_mm", "span_mm"), "cone": ("radii_mm", "span_mm"), "rim": ("radius_mm",)}[kind]
     around = () if kind == "rim" else ("fit", "extent_deg", "toward")
-    said = node.fields(("kind", "at_mm", "axis", *sizes, "hole"), around)
-    if "radius_mm" in said:
-        radii = [said["radius_mm"].number(_THINNEST_RADIUS_MM, _LARGEST_MM)] * 2
+    keys = node.fields(("kind", "at_mm", "axis", *sizes, "hole"), around)
+    if "radius_mm" in keys:
+        radii = [keys["radius_mm"].number(_THINNEST_RADIUS_MM, _LARGEST_MM)] * 2
     else:
-        radii = [each.number(0.0, _LARGEST_MM) for each in said["radii_mm"].items("radius", 2)]
+        radii = [each.number(0.0, _LARGEST_MM) for each in keys["radii_mm"].items("radius", 2)]
         if abs(radii[1] - radii[0]) < 1e-3:
-            said["radii_mm"].fail('two radii that differ are needed, else kind = "cylinder"')
-    span = _within(said["span_mm"], 2) if "span_mm" in said else np.zeros(2)
+            keys["radii_mm"].fail('two radii that differ are needed, else kind = "cylinder"')
+    span = _within(keys["span_mm"], 2) if "span_mm" in keys else np.zeros(2)
     if kind != "rim" and span[1] - span[0] < 1e-3:
-        said["span_mm"].fail("a start and an end that is greater are needed")
-    axis = _unit(said["axis"])
-    extent = np.radians(said["extent_deg"].number(0.0, 360.0, above=True)) if "extent_deg" in said else WHOLE_TURN
-    if (extent < WHOLE_TURN - 1e-9) != ("toward" in said):
+        keys["span_mm"].fail("a start and an end that is greater are needed")
+    axis = _unit(keys["axis"])
+    extent = np.radians(keys["extent_deg"].number(0.0, 360.0, above=True)) if "extent_deg" in keys else WHOLE_TURN
+    if (extent < WHOLE_TURN - 1e-9) != ("toward" in keys):
         node.fail("extent_deg below 360 and toward are needed together, or none of them")
     return RoundFace(
         name=name,
-        point=1e-3 * _within(said["at_mm"], 3),
+        point=1e-3 * _within(keys["at_mm"], 3),
         axis=axis,
         span=(1e-3 * float(span[0]), 1e-3 * float(span[1])),
         radii=(1e-3 * radii[0], 1e-3 * radii[1]),
-        hole=said["hole"].flag(),
-        fit=_flag(said, "fit"),
+        hole=keys["hole"].flag(),
+        fit=_flag(keys, "fit"),
         extent_rad=float(extent),
-        toward=_beside(said["toward"], axis) if "toward" in said else None,
+        toward=_beside(keys["toward"], axis) if "toward" in keys else None,
     )
 
 
@@ -185,10 +185,10 @@ def _beside(node: JsonNode, axis: Array) -> Array:
 
 
 def _within(node: JsonNode, count: int) -> Array:
-    found = node.numbers(count)
-    if np.abs(found).max() > _LARGEST_MM:
+    lengths = node.numbers(count)
+    if np.abs(lengths).max() > _LARGEST_MM:
         node.fail(f"{count} numbers of {-_LARGEST_MM:g} to {_LARGEST_MM:g} are needed")
-    return found
+    return lengths
 
 
 def _inertia(node: JsonNode) -> Array:
@@ -201,12 +201,12 @@ def _inertia(node: JsonNode) -> Array:
 
 
 def _friction(node: JsonNode) -> tuple[float, ...]:
-    given = node.value if isinstance(node.value, list) else [node.value]
-    numbers = node.child(given, "numbers").numbers(len(given)) if 1 <= len(given) <= 3 else None
+    values = node.value if isinstance(node.value, list) else [node.value]
+    numbers = node.child(values, "numbers").numbers(len(values)) if 1 <= len(values) <= 3 else None
     if numbers is None or not all(low <= x <= high for x, (low, high) in zip(numbers, FRICTION.spans, strict=False)):
         node.fail(f"{FRICTION.said()} are needed")
     return tuple(float(x) for x in numbers)
 
 
-def _flag(said: Mapping[str, JsonNode], key: str) -> bool:
-    return said[key].flag() if key in said else False
+def _flag(keys: Mapping[str, JsonNode], key: str) -> bool:
+    return keys[key].flag() if key in keys else False

@@ -162,8 +162,8 @@ def predict(
     """
     worst_mm = 0.0
     refused = next((move for move in arm if move.refused is not None), None)
-    found = measures(plan, clearance_mm, thresholds, attach, arm=arm)
-    for _, alike in groupby(found, lambda one: (one.operation, one.kind)):
+    measured = measures(plan, clearance_mm, thresholds, attach, arm=arm)
+    for _, alike in groupby(measured, lambda one: (one.operation, one.kind)):
         worst = max(alike, key=lambda one: one.size)
         if refused is not None and worst.kind != "falls":
             return _out_of_reach(plan, refused)
@@ -257,19 +257,19 @@ def _walk(plan: Plan, settling: bool) -> Iterator[tuple[int, Assembly, Poses, Po
 def _fit(doing: _Doing, how: Attach | None, clearance_mm: float, thresholds: Thresholds) -> Measure:
     """The |e| across the way in, nominal faces as planned, of the contact that enters and exceeds its play the most."""
     k = doing.operation
-    found = [(0.0, clearance_mm + thresholds.fit_margin_mm)]
+    sides = [(0.0, clearance_mm + thresholds.fit_margin_mm)]
     for contact in _operation(doing).contacts:
         if enters(doing.alone, contact):
             a, b = map(doing.alone.face_of, contact)
             play = play_mm(a, b, clearance_mm)
             allowed = thresholds.support_mm if play is None else play + thresholds.fit_margin_mm
             deep_m, apart_m = _misfits_m(doing, contact, None if how is None else _way(doing, how))
-            found.append((1e3 * deep_m, allowed))
+            sides.append((1e3 * deep_m, allowed))
             if 1e3 * apart_m > allowed:
                 play = joint_play_mm(doing.alone, contact, 0, doing.planned, clearance_mm)
                 allowed = allowed if play is None else max(allowed, play + thresholds.fit_margin_mm)
-            found.append((1e3 * apart_m, allowed))
-    size, allowed = max(found, key=lambda each: each[0] - each[1])
+            sides.append((1e3 * apart_m, allowed))
+    size, allowed = max(sides, key=lambda each: each[0] - each[1])
     return Measure(k, "fit", size, allowed)
 
 

@@ -77,8 +77,8 @@ def _deepest(a: Solid, T_a: Array, b: Solid, T_b: Array, shifts: Array) -> float
     near = np.linalg.norm(seen_from_b - np.clip(seen_from_b, *b.bounds), axis=1) < radius + FAR_M
     if not near.any():
         return -FAR_M
-    found = intrusion_depths(a.pieces, T_a[:3, :3], T_a[:3, 3] + shifts[near], b.pieces, T_b)
-    return max(-FAR_M, float(found.max()))
+    depths = intrusion_depths(a.pieces, T_a[:3, :3], T_a[:3, 3] + shifts[near], b.pieces, T_b)
+    return max(-FAR_M, float(depths.max()))
 
 
 def _way_back(goal: Array, how: Attach | None) -> Array:

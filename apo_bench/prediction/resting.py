@@ -67,8 +67,8 @@ def residual(assembly: Assembly, contact: Contact, poses: Poses) -> tuple[Array,
             -1.0 if m.face in assembly.solids[m.part].rounds else 1.0
         )
     plane = assembly.face(m).plane
-    found = overlap(assembly.face(m), T_m, assembly.face(e), T_e)
-    corners = found.corners if found and len(found.corners) else pose.apply(T_e, assembly.face(e).outline)
+    common = overlap(assembly.face(m), T_m, assembly.face(e), T_e)
+    corners = common.corners if common and len(common.corners) else pose.apply(T_e, assembly.face(e).outline)
     n = T_m[:3, :3] @ plane[:3]
     return (corners - T_m[:3, 3]) @ n + plane[3], n
 
@@ -101,14 +101,14 @@ def _flat(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
 
 def _laid(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
     """The same for a shaft on a plane, or a plane on a shaft: the least turn that makes them parallel, and a shift."""
-    found = between(assembly, contact, poses)
+    touch = between(assembly, contact, poses)
     up = _up(assembly, contact, poses)
-    middle = found.points.mean(axis=0)
-    off = found.off.mean(axis=0)
+    middle = touch.points.mean(axis=0)
+    off = touch.off.mean(axis=0)
     if isinstance(assembly.face_of(contact.manipulated), RoundFace):
-        turned = _turn(found.axis, _across(found.axis, up))
+        turned = _turn(touch.axis, _across(touch.axis, up))
         return np.asarray(_shift(middle - off) @ turned @ _shift(-middle))
-    turned = _turn(up, _across(up, found.axis))
+    turned = _turn(up, _across(up, touch.axis))
     return np.asarray(_shift(middle + off) @ turned @ _shift(-middle))
 
 

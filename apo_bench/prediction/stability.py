@@ -84,11 +84,11 @@ def _of_normals(assembly: Assembly, operation: Operation, poses: Poses, at: Arra
     """`imbalance` where pieces are no boxes: six equations, for each place of the centre of mass, (k, 3)."""
     from scipy.optimize import nnls
 
-    found = [pushes(assembly, contact, poses) for contact in operation.contacts]
-    normals = np.concatenate([np.zeros((0, 3)), *(each.normals for each in found)])
+    pushing = [pushes(assembly, contact, poses) for contact in operation.contacts]
+    normals = np.concatenate([np.zeros((0, 3)), *(each.normals for each in pushing)])
     if not len(normals) or nnls(normals.T, _UP)[1] > _LEFT or not (ceilings or normals[:, 2].min() < -_LEFT):
         return 0.0
-    points, forces = with_friction(found)
+    points, forces = with_friction(pushing)
     carrying = forces[:, 2] > (-np.inf if ceilings else -_LEFT)
     if not carrying.any():
         return 1.0
@@ -143,9 +143,9 @@ class Pushes(NamedTuple):
     """Along which forces would act if the faces met: as `forces`, also where they miss each other, (n, 3)."""
 
 
-def with_friction(found: Iterable[Pushes]) -> tuple[Array, Array]:
+def with_friction(pushing: Iterable[Pushes]) -> tuple[Array, Array]:
     """Points and forces, (k, 3) each: those along normals, and four edges of the cone of friction around each."""
-    every = list(found)
+    every = list(pushing)
     points, n = (np.concatenate([each[i] for each in every]) for i in (0, 1))
     carrying = np.abs(n[:, 2]) >= _WALL
     held = points[carrying]

@@ -94,9 +94,9 @@ def _refuse(file: str, case: Case, key: str, sentence: str, remedy: str) -> Inpu
 
 def _check_starts(scenario: Scenario, file: str, case: Case) -> None:
     """Every movable part starts on something."""
-    found = in_the_air(scenario.assembly, case.layout.start)
-    if found is not None:
-        part, sentence = found
+    airborne = in_the_air(scenario.assembly, case.layout.start)
+    if airborne is not None:
+        part, sentence = airborne
         raise _refuse(file, case, f"parts, {part}, start, at_mm", sentence, "let it start on a part, such as the table")
 
 
@@ -175,16 +175,16 @@ def check_clearance(scenario: Scenario, clearance_mm: float) -> None:
     Raises:
         InputError: It leaves a shaft no play in its hole.
     """
-    found = without_play(scenario.assembly, clearance_mm)
-    if found is not None:
-        raise InputError(f"a clearance of {clearance_mm:g} mm was given, with which {found[1]}; give more.")
+    tight = without_play(scenario.assembly, clearance_mm)
+    if tight is not None:
+        raise InputError(f"a clearance of {clearance_mm:g} mm was given, with which {tight[1]}; give more.")
 
 
 def _check_play(scenario: Scenario, file: str) -> None:
     """A shaft goes into a hole only if that is wider, by its size or by the clearance."""
-    found = without_play(scenario.assembly, scenario.clearance_mm)
-    if found is not None:
-        contact, sentence = found
+    tight = without_play(scenario.assembly, scenario.clearance_mm)
+    if tight is not None:
+        contact, sentence = tight
         k = next(k for k, operation in enumerate(scenario.assembly.operations) if contact in operation.contacts)
         number = scenario.assembly.operations[k].contacts.index(contact) + 1
         raise InputError(
@@ -197,15 +197,15 @@ def _check_round(scenario: Scenario, file: str, case: Case, key: str, contact: C
     m, e = contact
     face_of = scenario.assembly.face_of
     kind = contact_kind(face_of(m), face_of(e))
-    found = mate(face_of(m), poses[m.part], face_of(e), poses[e.part])
-    angle = float(np.degrees(found.angle_rad))
+    touch = mate(face_of(m), poses[m.part], face_of(e), poses[e.part])
+    angle = float(np.degrees(touch.angle_rad))
     if angle > _ANGLE_DEG and kind != "cone on rim":
         what = "the axis is tilted against the plane" if kind == "shaft on plane" else "the axes are turned"
         raise _refuse(file, case, key, f"'{contact}': {what} by {angle:.4g} degrees", "0 are needed: turn the part")
-    if found.gap_m > _GAP_M:
+    if touch.gap_m > _GAP_M:
         remedy = "vary along an axis that no contact fixes" if "vary" in case.key else "move a goal until they meet"
-        raise _refuse(file, case, key, f"'{contact}': {_apart(kind, 1e3 * found.gap_m)}", remedy)
-    if not found.common:
+        raise _refuse(file, case, key, f"'{contact}': {_apart(kind, 1e3 * touch.gap_m)}", remedy)
+    if not touch.common:
         sentence = f"'{contact}': the faces have no length in common"
         remedy = "vary by less" if "vary" in case.key else "move a goal until they do, or take the contact out"
         raise _refuse(file, case, key, sentence, remedy)

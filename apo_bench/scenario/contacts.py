@@ -37,20 +37,20 @@ def read_contacts(
         main: The part whose faces need no name before them.
         there: Parts that stand there before the operation.
     """
-    found: dict[Contact, Gap] = {}
+    contacts: dict[Contact, Gap] = {}
     for node in nodes:
-        contact, asked = _contact(node, main, solids)
+        contact, gap = _contact(node, main, solids)
         _check(contact, node, (main, *carries), there)
-        if contact in found:
+        if contact in contacts:
             refuse(node, f"'{contact}' stands here twice; keep one")
-        found[contact] = asked
-    return found
+        contacts[contact] = gap
+    return contacts
 
 
-def check_kinds(node: JsonNode, asked: Sequence[Asked]) -> None:
+def check_kinds(node: JsonNode, gaps: Sequence[Asked]) -> None:
     """A contact that the last of some operations makes again is asked for in the same way as before."""
-    for contact, gap in asked[-1].items():
-        for k, earlier in enumerate(asked[:-1], start=1):
+    for contact, gap in gaps[-1].items():
+        for k, earlier in enumerate(gaps[:-1], start=1):
             wanted = earlier.get(contact, gap)
             if wanted != gap:
                 refuse(

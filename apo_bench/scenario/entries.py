@@ -151,12 +151,12 @@ def _entry(
     contacts = _items(keys["contacts"], "contact")
     if len(contacts) > _MOST_CONTACTS:
         refuse(keys["contacts"], f"at most {_MOST_CONTACTS} contacts are allowed, {len(contacts)} were given")
-    asked = read_contacts(contacts, main, carries, solids, there)
-    if not asked:
+    gaps = read_contacts(contacts, main, carries, solids, there)
+    if not gaps:
         refuse(keys["contacts"], 'no contact was given; say what the part touches, such as [["bottom", "table.top"]]')
     return OperationEntry(
-        Operation(main, tuple(asked), carries),
-        asked,
+        Operation(main, tuple(gaps), carries),
+        gaps,
         goal,
         _attach(keys["attach"]) if "attach" in keys else Preference(),
         _grasp(keys.get("grasp"), node, parts[main].solid, poses[main]),
@@ -204,8 +204,8 @@ def _grasp(node: JsonNode | None, entry: JsonNode, solid: Solid, before: Array) 
         ends = np.minimum(low, low + over), np.maximum(high, high + over)
         if ((point < ends[0]) | (point > ends[1])).any():
             span = " to ".join("(" + ", ".join(f"{1e3 * x:g}" for x in corner) + ")" for corner in ends)
-            said = f"a point of the part, or up to {1e3 * PAD_M[1]:g} mm over it, from {span} mm, is needed"
-            keys["at_mm"].fail(said, "pads reach so far below the point")
+            needed = f"a point of the part, or up to {1e3 * PAD_M[1]:g} mm over it, from {span} mm, is needed"
+            keys["at_mm"].fail(needed, "pads reach so far below the point")
     if "across" in keys:
         across = read_unit_axis(keys["across"])
         if abs((before[:3, :3] @ across)[2]) > _LEVEL:
@@ -230,11 +230,11 @@ def _holds_box(solid: Solid, grasp: Grasp, T: Array) -> bool:
 
 def _by_shape(keys: Mapping[str, JsonNode], entry: JsonNode, solid: Solid, T: Array, point: Array) -> Grasp:
     """The best place for pads; of those that are near to what is stated, if something is."""
-    found = [Grasp(hold.point, hold.across) for hold in holds(solid, np.round(T[2, :3], 9), _OPENING_M)]
+    grasps = [Grasp(hold.point, hold.across) for hold in holds(solid, np.round(T[2, :3], 9), _OPENING_M)]
     if "across" in keys:
         across = read_unit_axis(keys["across"])
-        found = [grasp for grasp in found if abs(grasp.across @ across) > 1.0 - _LEVEL]
-    if not found:
+        grasps = [grasp for grasp in grasps if abs(grasp.across @ across) > 1.0 - _LEVEL]
+    if not grasps:
         size = " x ".join(f"{round(1e3 * x, 1):g}" for x in solid.bounds[1] - solid.bounds[0])
         refuse(
             entry,
@@ -243,8 +243,8 @@ def _by_shape(keys: Mapping[str, JsonNode], entry: JsonNode, solid: Solid, T: Ar
             "grasp = { at_mm = [x, y, z], across = [x, y, z] }, give it something to hold, or let it stand otherwise",
         )
     if "at_mm" in keys:
-        return Grasp(point, min(found, key=lambda grasp: float(np.linalg.norm(grasp.point - point))).across)
-    return found[0]
+        return Grasp(point, min(grasps, key=lambda grasp: float(np.linalg.norm(grasp.point - point))).across)
+    return grasps[0]
 
 
 def _above_middle(solid: Solid, T: Array) -> Array:

@@ -52,8 +52,8 @@ def load_scenario(given: str | Path | Scenario) -> Scenario:
 def _stamps() -> tuple[tuple[str, int, int], ...]:
     """Name, time and size of every file that scenarios of the package are made of."""
     folders = (folder("scenarios"), folder("assets") / "parts")
-    found = [(each.path, each.stat(follow_symlinks=False)) for place in folders for each in os.scandir(place)]
-    return tuple(sorted((path, stat.st_mtime_ns, stat.st_size) for path, stat in found))
+    entries = [(each.path, each.stat(follow_symlinks=False)) for place in folders for each in os.scandir(place)]
+    return tuple(sorted((path, stat.st_mtime_ns, stat.st_size) for path, stat in entries))
 
 
 @lru_cache(maxsize=64)

@@ -44,16 +44,16 @@ def with_attach_lines(scenario: Scenario, stated: Sequence[Preference], file: st
     Raises:
         InputError: A stated direction leads through what the part shall touch, or a stated line begins inside of it.
     """
-    found = understand(scenario.assembly, nominal_start(scenario), scenario.goals, stated)
-    for each, asked in zip(found, stated, strict=True):
-        _check(each.after, asked, f"{file}, operation {each.operation + 1}, attach", each.main)
-    return replace(scenario, attach=tuple(each.after.line for each in found))
+    operations = understand(scenario.assembly, nominal_start(scenario), scenario.goals, stated)
+    for each, preference in zip(operations, stated, strict=True):
+        _check(each.after, preference, f"{file}, operation {each.operation + 1}, attach", each.main)
+    return replace(scenario, attach=tuple(each.after.line for each in operations))
 
 
-def _check(after: Arrival, asked: Preference, key: str, main: str) -> None:
+def _check(after: Arrival, stated: Preference, key: str, main: str) -> None:
     """Whether a stated line can be one at all."""
-    if asked.direction is not None:
-        way = after.T[:3, :3] @ asked.direction
+    if stated.direction is not None:
+        way = after.T[:3, :3] @ stated.direction
         through = max(after.touched, key=lambda each: float(each.normal @ way), default=None)
         if through is not None and through.normal @ way > _THROUGH:
             face = next(of for of in through.contact if of.part == through.rests)
@@ -61,11 +61,11 @@ def _check(after: Arrival, asked: Preference, key: str, main: str) -> None:
                 f"{key}, along: '{main}' would come through '{face}', which it shall touch; "
                 f"give a direction that leads onto that face or along it, or leave 'along' out."
             )
-    if asked.travel_m is not None and after.chain.way is not None:
+    if stated.travel_m is not None and after.chain.way is not None:
         least = after.chain.way.length_m
         level = abs(after.chain.way.direction[2]) < 0.5
-        if level and asked.travel_m < least - 1e-6:
+        if level and stated.travel_m < least - 1e-6:
             raise InputError(
-                f"{key}, travel_mm: {1e3 * asked.travel_m:g} mm before its goal '{main}' would still be inside of what "
-                f"it is put into; give at least {np.ceil(1e3 * least - 1e-6):g}, or leave 'travel_mm' out."
+                f"{key}, travel_mm: {1e3 * stated.travel_m:g} mm before its goal '{main}' would still be inside of "
+                f"what it is put into; give at least {np.ceil(1e3 * least - 1e-6):g}, or leave 'travel_mm' out."
             )

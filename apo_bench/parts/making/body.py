@@ -162,16 +162,16 @@ def _lifted(flat: Array, to_plane: Array, d: float) -> Array:
 
 def _joined_rounds(rounds: Sequence[RoundFace]) -> list[RoundFace]:
     """Walls of one radius, one name and one axis that follow each other, as one."""
-    found: list[RoundFace] = []
+    joined: list[RoundFace] = []
     for face in rounds:
-        for i, other in enumerate(found):
+        for i, other in enumerate(joined):
             whole = _together(other, face)
             if whole is not None:
-                found[i] = whole
+                joined[i] = whole
                 break
         else:
-            found.append(face)
-    return found
+            joined.append(face)
+    return joined
 
 
 def _together(a: RoundFace, b: RoundFace) -> RoundFace | None:

@@ -24,11 +24,11 @@ def convex_cells(area: Any) -> list[Array]:
     Triangles are joined across their common sides while what they make stays convex (Hertel and Mehlhorn), so that
     there are at most four times as many as need be.
     """
-    found: list[Array] = []
+    cells: list[Array] = []
     for polygon in getattr(area, "geoms", (area,)):
         if polygon.area > _SLIVER_MM2:
-            found += _cut(polygon)
-    return found
+            cells += _cut(polygon)
+    return cells
 
 
 def _cut(polygon: Any) -> list[Array]:
@@ -66,11 +66,11 @@ def _length(points: Array, side: tuple[int, int]) -> float:
     return float(np.linalg.norm(points[side[0]] - points[side[1]]))
 
 
-def _joined(one: list[int], other: list[int], a: int, b: int) -> list[int]:
+def _joined(first: list[int], second: list[int], a: int, b: int) -> list[int]:
     """Two cells as one, without their common side, which goes from a to b in the first one."""
-    i = one.index(b)
-    k = other.index(a)
-    return [*one[i:], *one[:i], *(other[k:] + other[:k])[1:-1]]
+    i = first.index(b)
+    k = second.index(a)
+    return [*first[i:], *first[:i], *(second[k:] + second[:k])[1:-1]]
 
 
 def is_convex(ring: Array) -> bool:
@@ -115,7 +115,7 @@ def _holds(cell: Array, at: Array, radius: float) -> bool:
 
 def clipped(ring: Array, n: Array, d: float) -> Array:
     """What of a convex area has n . x <= d; (0, 2) if nothing has."""
-    found: list[tuple[float, float]] = []
+    kept: list[tuple[float, float]] = []
     heights = (ring @ n - d).tolist()
     corners = ring.tolist()
     for i, (x, y) in enumerate(corners):
@@ -125,22 +125,22 @@ def clipped(ring: Array, n: Array, d: float) -> Array:
         if abs(h) > _ON_MM and h * after < 0.0:
             u, v = corners[i - 1]
             share = h / (h - after)
-            found.append((u + share * (x - u), v + share * (y - v)))
+            kept.append((u + share * (x - u), v + share * (y - v)))
         if after <= 0.0:
-            found.append((x, y))
-    return np.array(found, dtype=np.float64).reshape(-1, 2)
+            kept.append((x, y))
+    return np.array(kept, dtype=np.float64).reshape(-1, 2)
 
 
 def wedges(cell: Array, at: Array, sides: int) -> list[tuple[Array, Array]]:
     """A convex area around a point cut into sectors: the middle direction of each, (2,), and its area, (k, 2)."""
-    found = []
+    sectors = []
     for i in range(sides):
         a, b, m = (2.0 * np.pi * (i + off) / sides for off in (-0.5, 0.5, 0.0))
         right = np.array([np.sin(a), -np.cos(a)])
         left = np.array([-np.sin(b), np.cos(b)])
         area = clipped(clipped(cell, right, float(right @ at)), left, float(left @ at))
-        found.append((np.array([np.cos(m), np.sin(m)]), area))
-    return found
+        sectors.append((np.array([np.cos(m), np.sin(m)]), area))
+    return sectors
 
 
 def bands(area: Any, rings: list[tuple[Array, NDArray[np.bool_]]]) -> list[Array]:
@@ -162,16 +162,16 @@ def _band(area: Any, corners: Array, fit: NDArray[np.bool_]) -> list[Array]:
 
     for width in _WIDTHS_MM:
         inner = [_inner(corners, fit, i, width) for i in range(len(corners))]
-        found = []
+        quads = []
         for i in np.flatnonzero(fit):
             k = (int(i) + 1) % len(corners)
-            found.append(np.array([corners[i], corners[k], inner[k][0], inner[int(i)][1]]))
-        shapes = [Polygon(quad) for quad in found]
+            quads.append(np.array([corners[i], corners[k], inner[k][0], inner[int(i)][1]]))
+        shapes = [Polygon(quad) for quad in quads]
         whole = unary_union(shapes)
-        fits = all(is_convex(quad) and shape.is_valid for quad, shape in zip(found, shapes, strict=True))
+        fits = all(is_convex(quad) and shape.is_valid for quad, shape in zip(quads, shapes, strict=True))
         apart = abs(sum(shape.area for shape in shapes) - whole.area) < _SAME * area.area
         if fits and apart and whole.difference(area.buffer(_SAME)).area < _SAME * area.area:
-            return found
+            return quads
     return []
 
 

@@ -151,15 +151,15 @@ def _cells(area: Any, bores: Sequence[Bore]) -> list[Array]:
     """A convex area around each bore, none of which overlap, up to the first one that has no room for one."""
     from shapely import Polygon
 
-    found: list[Array] = []
+    cells: list[Array] = []
     for i, each in enumerate(bores):
         others = [(np.array(b.at), b.widest) for k, b in enumerate(bores) if k != i]
         cell = bore_cell(area, np.array(each.at), each.widest, others)
         if cell is None:
             break
         area = area.difference(Polygon(cell))
-        found.append(cell)
-    return found
+        cells.append(cell)
+    return cells
 
 
 def _bored(each: Bore, cell: Array, low: float, high: float) -> Iterator[Array]:
@@ -240,7 +240,7 @@ def _ends(
     fit: Sequence[str],
 ) -> Iterator[Face]:
     for z, name, above in ((low, bottom, True), (high, top, False)):
-        openings = [tangent(b.at, *found) for b in bores if (found := at_height(b.steps, z, above))[1]]
+        openings = [tangent(b.at, *opening) for b in bores if (opening := at_height(b.steps, z, above))[1]]
         inner = [*(ring(hole, hole=True) for hole in holes), *openings]
         yield flat_face(name, ring(outline), inner, z, up=not above, fit=name in fit and bool(name))
 

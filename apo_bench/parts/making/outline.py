@@ -106,11 +106,11 @@ def slot(
 
 def rounded(outline: Outline, radius: float, corners: Sequence[int] | None = None, sides: int | None = None) -> Outline:
     """An outline of straight sides with corners, else all, rounded."""
-    found: list[Edge] = []
+    edges: list[Edge] = []
     points = np.array([edge.start for edge in outline])
     for i, edge in enumerate(outline):
         if corners is not None and i not in corners:
-            found.append(edge)
+            edges.append(edge)
             continue
         into = points[i] - points[i - 1]
         out = points[(i + 1) % len(points)] - points[i]
@@ -121,9 +121,9 @@ def rounded(outline: Outline, radius: float, corners: Sequence[int] | None = Non
         a = points[i] - back * into
         b = points[i] + back * out
         center = a + np.sign(turn) * radius * np.array([-into[1], into[0]])
-        found.append(Edge(_pair(a), center=_pair(center), clockwise=turn < 0.0, sides=sides))
-        found.append(replace(edge, start=_pair(b)))
-    return found
+        edges.append(Edge(_pair(a), center=_pair(center), clockwise=turn < 0.0, sides=sides))
+        edges.append(replace(edge, start=_pair(b)))
+    return edges
 
 
 def arc_of(outline: Outline, i: int) -> Arc | None:
@@ -195,13 +195,13 @@ def sides_of_arc(edge: Edge, radius_mm: float) -> int:
 
 def outline_moments(outline: Outline) -> Moments:
     """Of the exact area inside, arcs included, [mm]."""
-    found = polygon_moments(np.array([edge.start for edge in outline], dtype=np.float64))
+    moments = polygon_moments(np.array([edge.start for edge in outline], dtype=np.float64))
     for i in range(len(outline)):
         arc = arc_of(outline, i)
         if arc is not None:
             segment = segment_moments(arc.center, arc.radius, arc.middle, abs(arc.turn))
-            found = found.plus(segment, float(np.sign(arc.turn)))
-    return found
+            moments = moments.plus(segment, float(np.sign(arc.turn)))
+    return moments
 
 
 def _pair(point: Array) -> tuple[float, float]:

@@ -48,12 +48,12 @@ _Some = TypeVar("_Some", Face, RoundFace)
 def _called(faces: Iterable[_Some]) -> list[_Some]:
     """Faces, each with a name: those without get one, with a number that counts all of their kind, and come last."""
     counts: dict[str, int] = {}
-    found = []
+    named = []
     for face in faces:
         stem = _stem(face)
         counts[stem] = counts.get(stem, 0) + 1
-        found.append(face if face.name else replace(face, name=f"auto_{stem}_{counts[stem]}"))
-    return sorted(found, key=lambda face: face.name.startswith("auto_"))
+        named.append(face if face.name else replace(face, name=f"auto_{stem}_{counts[stem]}"))
+    return sorted(named, key=lambda face: face.name.startswith("auto_"))
 
 
 def _place(face: Face) -> tuple[float, ...]:
@@ -115,10 +115,10 @@ def write_part(
     return path
 
 
-def _tree(solid: Solid, said: dict[str, Any]) -> Element:
+def _tree(solid: Solid, attributes: dict[str, Any]) -> Element:
     root = Element("mujoco", model=solid.name)
     default = SubElement(root, "default")
-    SubElement(default, "geom", type="box" if all_boxes(solid.pieces) else "mesh", **said)
+    SubElement(default, "geom", type="box" if all_boxes(solid.pieces) else "mesh", **attributes)
     meshes = [p for p in solid.pieces if isinstance(p, Hull) and p.cylinder is None]
     if all_boxes(solid.pieces):
         SubElement(default, "site", size="0.0015", group="4")
@@ -154,9 +154,9 @@ def _inside(face: Face) -> Array:
     axis = int(np.abs(face.normal).argmax())
     plane = [(axis + 1) % 3, (axis + 2) % 3]
     point = Polygon(face.outline[:, plane], [hole[:, plane] for hole in face.holes]).representative_point()
-    found = np.array(face.outline[0])
-    found[plane] = point.x, point.y
-    return found
+    inside = np.array(face.outline[0])
+    inside[plane] = point.x, point.y
+    return inside
 
 
 def stated_text(solid: Solid, density: float, friction: Sequence[float], source: str, licence: str) -> str:
