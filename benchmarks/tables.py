@@ -5,11 +5,12 @@ from __future__ import annotations
 import gzip
 import json
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import MISSING
 from pathlib import Path
 from typing import Any
 
 from apo_bench.records.row import ROW_FIELDS
-from apo_bench.records.run.checked import as_usual
+from apo_bench.records.settings import SETTINGS
 from apo_bench.report.tables.calibration import CALIBRATION_NOTE, calibration_table
 from apo_bench.report.tables.confusion import CONFUSION_NOTE, confusion_table
 from apo_bench.statistics.calibration import calibrations
@@ -129,11 +130,12 @@ def main() -> None:
 
 def unpacked(packed: Path) -> list[dict[str, Any]]:
     """The rows, with what they do not hold as null or as usual; the one verdict of then is both verdicts of today."""
+    usual = {info.column: info.default for info in SETTINGS.values() if info.default is not MISSING}
     rows = []
     with gzip.open(packed) as source:
         for line in source:
-            row = dict.fromkeys(ROW_FIELDS) | json.loads(line)
-            rows.append(dict(as_usual(row | {"as_demonstrated": row["success"]})))
+            row = dict.fromkeys(ROW_FIELDS) | usual | json.loads(line)
+            rows.append(row | {"as_demonstrated": row["success"]})
     return rows
 
 

@@ -24,9 +24,9 @@ from msgspec.inspect import (
 )
 
 from apo_bench.cli.setting_options import axis_flag
-from apo_bench.records.key import KEY
 from apo_bench.records.outcomes import CODES, STAGES
-from apo_bench.records.row import LARGEST, REQUIRED, ROW_FIELDS, Row
+from apo_bench.records.row import LARGEST_NUMBER, REQUIRED, ROW_FIELDS, Row
+from apo_bench.records.setting_columns import KEY
 from apo_bench.records.setting_info import SettingInfo
 from apo_bench.records.settings import ROW, SETTINGS, TrialSettings
 
@@ -104,7 +104,7 @@ def words(kind: Type) -> str:
     match kind:
         case IntType(ge=low, le=high):
             return f"whole number, {low} to {high}"
-        case FloatType(ge=low, gt=above, le=high) if high is not None and high < LARGEST:
+        case FloatType(ge=low, gt=above, le=high) if high is not None and high < LARGEST_NUMBER:
             return f"number above {above:g}, to {high:g}" if low is None else f"number, {low:g} to {high:g}"
         case FloatType(ge=low):
             return "number from 0" if low == 0 else "number"

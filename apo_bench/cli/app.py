@@ -165,7 +165,7 @@ def scene(
     scenario: ScenarioArgument, out: Annotated[Path, typer.Option(help="The MJCF file to write.")], **asked: Any
 ) -> None:
     """Write the scene of a scenario as one MJCF file that opens in MuJoCo's viewer."""
-    from apo_bench.records.asked import in_python
+    from apo_bench.records.setting_columns import in_python
     from apo_bench.records.settings import check
     from apo_bench.scenario.file import load_scenario
     from apo_bench.simulation.scene.scene import scene_xml

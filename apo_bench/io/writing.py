@@ -4,6 +4,7 @@ import os
 import secrets
 import stat
 from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
 
@@ -32,8 +33,11 @@ def to_write(path: Path, mode: str = "wb", buffering: int = -1) -> IO[Any]:
     return open(path, mode, buffering, opener=_unlinked, **text)  # type: ignore[call-overload]
 
 
-def write_whole(path: Path, text: str) -> None:
-    """Write a file that only its owner can read, all of it or nothing, in place of whatever file stands there.
+def write_whole(path: Path, text: str, *, over: bool = True) -> None:
+    """Write a file that only its owner can read: all of it or nothing, and never through a link.
+
+    Args:
+        over: Take the place of a file that stands there; if not, that one is left as it is.
 
     Raises:
         OSError: It cannot be written.
@@ -41,9 +45,15 @@ def write_whole(path: Path, text: str) -> None:
     beside = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
     flags = os.O_WRONLY | os.O_CREAT | os.O_EXCL | _flag("O_CLOEXEC")
     try:
-        with os.fdopen(os.open(beside, flags, 0o600), "w", encoding="utf-8", newline="") as whole:
-            whole.write(text)
-        os.replace(beside, path)
+        with os.fdopen(os.open(beside, flags, 0o600), "w", encoding="utf-8", newline="") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        if over:
+            os.replace(beside, path)
+        else:
+            with suppress(FileExistsError):
+                os.link(beside, path)
     finally:
         beside.unlink(missing_ok=True)
 

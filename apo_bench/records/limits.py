@@ -5,8 +5,6 @@ from typing import final
 
 CORRECTOR_LIMIT_S = 120.0
 """What one correction in a process of its own may take."""
-_TRIAL_LIMIT_S = 600.0
-"""What one trial of a sweep may take."""
 
 
 @final
@@ -14,8 +12,8 @@ _TRIAL_LIMIT_S = 600.0
 class Limits:
     """Of a sweep; said of a trial whose process, or that of its corrector, died or was ended."""
 
-    trial_s: float | None = _TRIAL_LIMIT_S
-    """None where trials had no process of their own."""
+    trial_s: float | None = 600.0
+    """What one trial may take; None where trials had no process of their own."""
     corrector_s: float = CORRECTOR_LIMIT_S
 
 

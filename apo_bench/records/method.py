@@ -7,7 +7,7 @@ from apo_bench.records.short_names import LOOKING, METHODS, UNCORRECTED
 
 _SEARCH = "search"
 """What was seen, carried out by a robot that feels for holes; after a `+` the same for any other method."""
-_ENDING = f"+{_SEARCH}"
+_SEARCH_SUFFIX = f"+{_SEARCH}"
 
 
 class Method(NamedTuple):
@@ -22,7 +22,7 @@ def parsed(method: str) -> Method:
     """The parts of a method's name."""
     if method == _SEARCH:
         return Method("none", True)
-    return Method(method.removesuffix(_ENDING), method.endswith(_ENDING))
+    return Method(method.removesuffix(_SEARCH_SUFFIX), method.endswith(_SEARCH_SUFFIX))
 
 
 def checked_method(method: str) -> str:

@@ -21,32 +21,32 @@ SHIFT_MM = 2.0
 _LARGEST_SHIFT_MM = 50.0
 
 
-def relations_name(given: str) -> str:
+def relations_name(text: str) -> str:
     """How rows spell it: `shifted` stands for 2 mm, `shifted:3.0` is `shifted:3`.
 
     Raises:
         InputError: A size that is not allowed.
     """
-    kind, _, size = given.partition(":")
+    kind, _, size = text.partition(":")
     if kind != "shifted":
-        return given
+        return text
     try:
         size_mm = float(size or SHIFT_MM)
     except ValueError:
         size_mm = math.nan
     if not 0.0 < size_mm <= _LARGEST_SHIFT_MM:
         raise InputError(
-            f"the relations '{given}' were given; a size above 0 and up to {_LARGEST_SHIFT_MM:g} mm is allowed: "
+            f"the relations '{text}' were given; a size above 0 and up to {_LARGEST_SHIFT_MM:g} mm is allowed: "
             "shifted:3."
         )
     return f"shifted:{size_mm:g}"
 
 
-def checked_relations(given: str) -> str:
+def checked_relations(text: str) -> str:
     """The relations as rows spell them; raise an `InputError` unless there are such."""
-    name = relations_name(given)
+    name = relations_name(text)
     if name.partition(":")[0] in _KINDS and name not in _KINDS and not name.startswith("shifted:"):
-        raise InputError(f"the relations '{given}' were given; only shifted has a size, as in shifted:3.")
+        raise InputError(f"the relations '{text}' were given; only shifted has a size, as in shifted:3.")
     if ":" not in name and name not in _KINDS:
-        raise InputError(unknown("kind of relations", given, _KINDS) + " Or give your own as 'package.module:name'.")
+        raise InputError(unknown("kind of relations", text, _KINDS) + " Or give your own as 'package.module:name'.")
     return name

@@ -14,8 +14,8 @@ from typing import NamedTuple
 
 from apo_bench.errors import InputError, unknown
 
-NONE = "none"
-LARGEST = 20.0
+NO_ROBOT_ERROR = "none"
+_LARGEST = 20.0
 """Standard deviation, [mm] or [deg]."""
 _UNITS = {"hand_eye": ("mm", "degrees"), "joints": ("degrees",), "tool": ("mm",), "in_hand": ("mm", "degrees")}
 """Kind -> what its numbers are; the second one may be left out and is 0 then."""
@@ -30,59 +30,53 @@ class Sigmas(NamedTuple):
     in_hand: tuple[float, float] = (0.0, 0.0)
 
 
-def robot_sigmas(given: str) -> Sigmas:
+def robot_sigmas(name: str) -> Sigmas:
     """The standard deviations that a name stands for.
 
     Raises:
         InputError: An unknown kind, one that is there twice, or a number that is not allowed.
     """
-    if given == NONE:
-        return Sigmas()
-    found: dict[str, tuple[float, ...]] = {}
-    for one in given.split("+"):
-        kind, _, sizes = one.partition(":")
+    sigmas: dict[str, tuple[float, float]] = {}
+    for entry in name.split("+") if name != NO_ROBOT_ERROR else ():
+        kind, _, sizes = entry.partition(":")
         if kind not in _UNITS:
-            raise InputError(unknown("kind of robot error", kind, (NONE, *_UNITS)))
-        if kind in found:
-            raise InputError(f"the robot error '{given}' was given, which has {kind} twice; say it once.")
-        found[kind] = _numbers(given, kind, sizes)
-    hand_eye, in_hand = (_pair(found.get(kind, ())) for kind in ("hand_eye", "in_hand"))
-    return Sigmas(hand_eye, found.get("joints", (0.0,))[0], found.get("tool", (0.0,))[0], in_hand)
+            raise InputError(unknown("kind of robot error", kind, (NO_ROBOT_ERROR, *_UNITS)))
+        if kind in sigmas:
+            raise InputError(f"the robot error '{name}' was given, which has {kind} twice; say it once.")
+        sigmas[kind] = _numbers(name, kind, sizes)
+    hand_eye, joints, tool, in_hand = (sigmas.get(kind, (0.0, 0.0)) for kind in _UNITS)
+    return Sigmas(hand_eye, joints[0], tool[0], in_hand)
 
 
-def checked_robot_error(given: str) -> str:
+def checked_robot_error(name: str) -> str:
     """The robot's errors as rows spell them, `none` if all are zero.
 
     Raises:
         InputError: As in `robot_sigmas`.
     """
-    hand_eye, joints_deg, tool_mm, in_hand = robot_sigmas(given)
+    hand_eye, joints_deg, tool_mm, in_hand = robot_sigmas(name)
     sizes = {"hand_eye": hand_eye, "joints": (joints_deg,), "tool": (tool_mm,), "in_hand": in_hand}
-    said = [f"{kind}:{_spelled(size)}" for kind, size in sizes.items() if any(size)]
-    return "+".join(said) or NONE
+    return "+".join(f"{kind}:{_spelled(size)}" for kind, size in sizes.items() if any(size)) or NO_ROBOT_ERROR
 
 
-def _numbers(given: str, kind: str, sizes: str) -> tuple[float, ...]:
+def _numbers(name: str, kind: str, sizes: str) -> tuple[float, float]:
+    """The one or two numbers of a kind; the second is 0 if it is left out."""
     units = _UNITS[kind]
     try:
-        found = tuple(float(size) + 0.0 for size in sizes.split("/"))
+        numbers = tuple(float(size) + 0.0 for size in sizes.split("/"))
     except ValueError:
-        found = (math.nan,)
-    if len(found) > len(units) or not all(0.0 <= size <= LARGEST for size in found):
+        numbers = (math.nan,)
+    if len(numbers) > len(units) or not all(0.0 <= size <= _LARGEST for size in numbers):
         example = f"{kind}:{'/'.join(('0.5', '0.1')[: len(units)])}"
         raise InputError(
-            f"the robot error '{given}' was given; standard deviations in {' and '.join(units)} from 0 to {LARGEST:g} "
+            f"the robot error '{name}' was given; standard deviations in {' and '.join(units)} from 0 to {_LARGEST:g} "
             f"are allowed: {example}."
         )
-    return found
-
-
-def _pair(sizes: tuple[float, ...]) -> tuple[float, float]:
-    mm, deg = (*sizes, 0.0, 0.0)[:2]
-    return mm, deg
+    first, second = (*numbers, 0.0)[:2]
+    return first, second
 
 
 def _spelled(size: tuple[float, ...]) -> str:
     """`1`, or `1/0.2`: numbers that read back as they are."""
-    shown = size[:1] if len(size) > 1 and not size[1] else size
-    return "/".join(repr(x).removesuffix(".0") for x in shown)
+    needed = size[:1] if len(size) > 1 and not size[1] else size
+    return "/".join(repr(x).removesuffix(".0") for x in needed)

@@ -6,11 +6,10 @@ checked by these types: finite numbers in their range, and no other fields.
 
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Annotated, Any, Literal, NotRequired, TypedDict, get_args, get_type_hints
+from typing import Annotated, Any, Literal, NotRequired, TypedDict, get_type_hints
 
 from msgspec import Meta
 
-from apo_bench.records.key import KEY
 from apo_bench.records.outcomes import CODES, STAGES
 from apo_bench.records.settings import (
     LARGEST_SEED,
@@ -27,10 +26,10 @@ from apo_bench.records.settings import (
 )
 
 LONGEST_SENTENCE = 1000
-LARGEST = 1e15
+LARGEST_NUMBER = 1e15
 """Of a number that physics or a solver gave; beyond, sums and pictures of it say nothing."""
-_Number = Annotated[float, Meta(ge=-LARGEST, le=LARGEST)]
-_Size = Annotated[float, Meta(ge=0.0, le=LARGEST)]
+_Number = Annotated[float, Meta(ge=-LARGEST_NUMBER, le=LARGEST_NUMBER)]
+_Size = Annotated[float, Meta(ge=0.0, le=LARGEST_NUMBER)]
 _Share = Annotated[float, Meta(ge=0.0, le=1.0)]
 _Count = Annotated[int, Meta(ge=0, le=1_000_000)]
 _Operation = Annotated[int, Meta(ge=1, le=100_000)]
@@ -90,9 +89,9 @@ class Row(TypedDict, total=False):
 
     schema: Name
     """Version of these fields."""
-    env_id: Name | None
+    env_id: Name
     """Version of the environment."""
-    spec_hash: Name | None
+    spec_hash: Name
     """16 digits over the code, the files and all settings but method and seed: rows with the same may be counted
     together."""
     scenario: Name
@@ -105,13 +104,13 @@ class Row(TypedDict, total=False):
     """How far the human deviates: 0 is a careful one, 1 the scenario's. Null if measured."""
     clearance_mm: ClearanceMm
     """Room per side between parts that fit into one another [mm]."""
-    eye: Eye | None
+    eye: Eye
     """`noise`: poses with noise that is drawn; `range`: measured in depth images."""
     noise: Name
     """The noise model; `range` with that eye, `measured` for an observation from a file."""
     grasp: Name
     """`friction`, or `weld` for an ideal gripper."""
-    arm: Name | None
+    arm: Name
     """The robot."""
     robot_error: Name
     """What is wrong with the robot itself: `none`, or standard deviations of what was drawn, `hand_eye:1/0.2`."""
@@ -119,15 +118,15 @@ class Row(TypedDict, total=False):
     """What the corrector was told of the contacts: `given`, `recognised`, or wrong ones."""
     method: Name
     """Who planned: `oracle`, `none`, `by-heart`, `search` or a corrector."""
-    looks: LooksAllowed | None
+    looks: LooksAllowed
     """How often a corrector that can ask was allowed to look at operations again."""
     seed: Seed
     """Number of the trial: trials of one seed meet the same layout, human and noise."""
     salt: Name | None
     """Hash of the secret that the trial was drawn with; null for one that everybody can draw."""
-    timestep_s: TimestepS | None
+    timestep_s: TimestepS
     """Time step of the physics [s]."""
-    fidelity: Fidelity | None
+    fidelity: Fidelity
     """`full`, or `contact`: only the part of each motion in which things may touch was simulated."""
     thresholds: dict[str, _Size] | None
     """What the judge demands: lengths in mm, angles in degrees."""
@@ -225,20 +224,16 @@ class Row(TypedDict, total=False):
 
 _ENDS: Any = Literal
 _CODE = _ENDS[tuple(CODES)] | None
-_STAGE = _ENDS[STAGES] | None
-_CLOSED = {"failure_stage": _STAGE} | dict.fromkeys(("demonstration", "failure_code", "as_demonstrated_code"), _CODE)
+_CLOSED = dict.fromkeys(("demonstration", "failure_code", "as_demonstrated_code"), _CODE)
+_CLOSED["failure_stage"] = _ENDS[STAGES] | None
 ROW_FIELDS: Mapping[str, Any] = MappingProxyType(get_type_hints(Row, include_extras=True) | _CLOSED)
 """Column -> its type, with the range that it may have."""
-_NEEDED = ("demonstration", "success", "loose_success", "failure_stage", "failure_code")
-"""What every row says, besides its key."""
-_LATER = {info.column for info in SETTINGS.values() if info.later}
-REQUIRED = ("schema", *(column for column in KEY if column not in _LATER), *_NEEDED)
-"""Without them a line is no row; what else a row does not say is null, or as usual."""
-
-
-def nullable(column: str) -> bool:
-    """Whether a column may be null."""
-    return type(None) in get_args(ROW_FIELDS[column])
+_SETTING_COLUMNS = (info.column for info in SETTINGS.values() if info.name != "salt")
+REQUIRED = (
+    *("schema", "env_id", "spec_hash", *_SETTING_COLUMNS),
+    *("demonstration", "success", "loose_success", "failure_stage", "failure_code"),
+)
+"""Without them a line is no row; what else a row does not say is null."""
 
 
 def look_up(row: Row, column: str) -> Any:
@@ -248,4 +243,4 @@ def look_up(row: Row, column: str) -> Any:
 
 def finite(x: float | None) -> float | None:
     """A number that a row can hold, else null."""
-    return float(x) if x is not None and abs(x) <= LARGEST else None
+    return float(x) if x is not None and abs(x) <= LARGEST_NUMBER else None

@@ -6,7 +6,6 @@ import os
 import re
 import secrets
 from collections.abc import Iterable, Mapping
-from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -16,10 +15,11 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.io.reading import read_bytes
+from apo_bench.io.writing import write_whole
 
-FEWEST = 16
-_MOST = 512
-"""Bytes of a salt; 16 are 128 bits."""
+FEWEST_BYTES = 16
+_MOST_BYTES = 512
+"""Of a salt; 16 are 128 bits."""
 _FEWEST_DIFFERENT = 8
 """Of 16 bytes at random fewer are different in one of 10^11 cases."""
 _FORM = re.compile(rb"((?:[0-9a-fA-F]{2})+)\r?\n?")
@@ -50,9 +50,9 @@ def read_salt(path: str | Path) -> Salt:
     Raises:
         InputError: There is no such file, it cannot be read, or it holds something else.
     """
-    found = _FORM.fullmatch(read_bytes(path, "salt file"))
-    secret = bytes.fromhex(found[1].decode()) if found is not None else b""
-    if not FEWEST <= len(secret) <= _MOST or len(set(secret)) < _FEWEST_DIFFERENT:
+    match = _FORM.fullmatch(read_bytes(path, "salt file"))
+    secret = bytes.fromhex(match[1].decode()) if match is not None else b""
+    if not FEWEST_BYTES <= len(secret) <= _MOST_BYTES or len(set(secret)) < _FEWEST_DIFFERENT:
         raise InputError(f"'{path}' is not a salt file; it must hold {_TEXT}.")
     return Salt(secret)
 
@@ -87,17 +87,7 @@ def make_salt(path: Path) -> None:
     Raises:
         OSError: The file cannot be made.
     """
-    beside = path.with_name(f".{path.name}.{secrets.token_hex(8)}")
-    file = os.open(beside, os.O_WRONLY | os.O_CREAT | os.O_EXCL | getattr(os, "O_CLOEXEC", 0), 0o600)
-    try:
-        with os.fdopen(file, "wb") as whole:
-            whole.write(secrets.token_hex(32).encode() + b"\n")
-            whole.flush()
-            os.fsync(whole.fileno())
-        with suppress(FileExistsError):
-            os.link(beside, path)  # whole or not at all, and never over another file or through a link
-    finally:
-        os.unlink(beside)
+    write_whole(path, f"{secrets.token_hex(32)}\n", over=False)
 
 
 def one_salt(rows: Iterable[Mapping[str, Any]]) -> str | None:
@@ -106,28 +96,28 @@ def one_salt(rows: Iterable[Mapping[str, Any]]) -> str | None:
     Raises:
         InputError: They were drawn with several.
     """
-    found = sorted({row.get("salt") or "" for row in rows})
-    if len(found) > 1:
+    hashes = sorted({row.get("salt") or "" for row in rows})
+    if len(hashes) > 1:
         raise InputError(
-            f"the rows were drawn {' and '.join(map(with_salt, found))}; count trials of one salt at a time."
+            f"the rows were drawn {' and '.join(map(with_salt, hashes))}; count trials of one salt at a time."
         )
-    return found[0] or None if found else None
+    return hashes[0] or None if hashes else None
 
 
-def check_one(asked: str, given: str | None, drawn: str | None) -> None:
+def check_same_salt(holder: str, given: str | None, drawn: str | None) -> None:
     """Raise an `InputError` unless a salt, or none, is the one that trials were drawn with.
 
     Args:
-        asked: What holds the trials, in words.
+        holder: What holds the trials, in words.
         given: The hash of the salt at hand; None if there is none.
         drawn: The hash in their rows.
     """
     if given == drawn:
         return
     if drawn is None:
-        raise InputError(f"{asked} holds trials drawn without a salt; leave --salt-file out.")
+        raise InputError(f"{holder} holds trials drawn without a salt; leave --salt-file out.")
     what = "no salt file was given" if given is None else f"the salt file given is that of {given}"
-    raise InputError(f"{asked} holds trials drawn with the salt {drawn}, and {what}; give theirs with --salt-file.")
+    raise InputError(f"{holder} holds trials drawn with the salt {drawn}, and {what}; give theirs with --salt-file.")
 
 
 def with_salt(drawn: str | None) -> str:

@@ -32,8 +32,6 @@ class SettingInfo:
     """What help says of the default; the default itself if empty."""
     key: bool = False
     """Whether it tells the trials of one sweep apart."""
-    later: bool = False
-    """Whether rows were written before there was this setting: what does not say it means the default."""
     axis: str = ""
     """Field of `SweepSettings` and key of a sweep file, if a sweep has several of it."""
     axis_option: str = ""

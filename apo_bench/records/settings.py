@@ -15,7 +15,7 @@ from msgspec import Meta
 from apo_bench.errors import InputError
 from apo_bench.records.method import checked_method, is_own, parsed
 from apo_bench.records.relations import checked_relations
-from apo_bench.records.robot_error import NONE, checked_robot_error
+from apo_bench.records.robot_error import NO_ROBOT_ERROR, checked_robot_error
 from apo_bench.records.salt import Salt
 from apo_bench.records.setting_info import SettingInfo, about, check_value
 from apo_bench.records.short_names import CORRECTOR
@@ -149,14 +149,13 @@ class TrialSettings:
     )
     """The robot, by name, as a file, or `module:name`."""
     robot_error: Name = field(
-        default=NONE,
+        default=NO_ROBOT_ERROR,
         metadata=about(
             "Standard deviations of the robot's own errors: none, hand_eye:1/0.2 (mm/degrees), joints:0.05 (degrees), "
             "tool:0.5 (mm), in_hand:0.5/1 (mm/degrees), or several joined by +",
             spelled=checked_robot_error,
             key=True,
             axis="robot_errors",
-            later=True,
         ),
     )
     """What is wrong with the robot itself: `none`, or standard deviations by kind, `hand_eye:1/0.2+tool:0.5`."""
@@ -192,7 +191,6 @@ class TrialSettings:
             called="number of looks",
             key=True,
             axis="looks",
-            later=True,
         ),
     )
     """How often a corrector that can ask may look at operations again; each look has the errors of the first."""
@@ -242,11 +240,12 @@ class TrialSettings:
 
 def _settings() -> Iterable[SettingInfo]:
     kinds = get_type_hints(TrialSettings, include_extras=True)
-    for one in fields(TrialSettings):
-        info: SettingInfo = one.metadata["info"]
-        column = info.column or one.name
-        option = info.option or one.name.replace("_", "-")
-        yield replace(info, name=one.name, kind=kinds[one.name], default=one.default, column=column, option=option)
+    for setting in fields(TrialSettings):
+        name = setting.name
+        info: SettingInfo = setting.metadata["info"]
+        column = info.column or name
+        option = info.option or name.replace("_", "-")
+        yield replace(info, name=name, kind=kinds[name], default=setting.default, column=column, option=option)
 
 
 SETTINGS: Mapping[str, SettingInfo] = {info.name: info for info in _settings()}
@@ -287,14 +286,14 @@ def check_asks(method: str, looks: int) -> None:
 def level_pair(level: float | Sequence[float], eye: str = "noise") -> tuple[float, float]:
     """A level in mm and in degrees: one number stands for both, a pair for each; of a ray it is one, in mm."""
     several = tuple(level) if isinstance(level, Iterable) and not isinstance(level, str) else (level,)
-    numbers = all(isinstance(x, Real) and not isinstance(x, bool | np.bool_) for x in several)
-    given = tuple(map(float, several)) if numbers else ()
-    if eye == RANGE and len(given) != 1:
+    is_numbers = all(isinstance(x, Real) and not isinstance(x, bool | np.bool_) for x in several)
+    numbers = tuple(map(float, several)) if is_numbers else ()
+    if eye == RANGE and len(numbers) != 1:
         raise InputError(f"the level {level!r} was given with the eye 'range'; one number is allowed, mm per ray.")
-    if len(given) not in (1, 2):
+    if len(numbers) not in (1, 2):
         raise InputError(f"the level {level!r} was given; one number is allowed, or a pair of mm and degrees.")
-    mm = given[0]
-    deg = 0.0 if eye == RANGE else given[-1]
+    mm = numbers[0]
+    deg = 0.0 if eye == RANGE else numbers[-1]
     check("level_mm", mm, eye)
     check("level_deg", deg)
     return mm, deg

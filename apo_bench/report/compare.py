@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any, NamedTuple, final
 
 from apo_bench.errors import InputError
-from apo_bench.records.key import Key, row_key
 from apo_bench.records.row import Row
 from apo_bench.records.run.report_rows import NUMBERS, report_rows
 from apo_bench.records.run.run_file import read_run
 from apo_bench.records.salt import one_salt, with_salt
+from apo_bench.records.setting_columns import Key, row_key
 from apo_bench.records.settings import SETTINGS
 from apo_bench.statistics.confusion import ALL
 from apo_bench.statistics.paired import tango

@@ -3,10 +3,10 @@
 from collections.abc import Callable
 from typing import Any
 
-from apo_bench.records.key import KEY, row_key
 from apo_bench.records.row import Row
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.report_rows import NUMBERS
+from apo_bench.records.setting_columns import KEY, row_key
 from apo_bench.report.compare import Agreement, Comparison, Pair, Side
 from apo_bench.report.run_facts import limits_of, scenario_files, value_words
 from apo_bench.report.tables.saying import level_text, percents, points

@@ -12,7 +12,7 @@ from apo_bench.records.row import Row
 from apo_bench.records.run.report_rows import COLUMNS as KEPT
 from apo_bench.records.run.report_rows import report_rows
 from apo_bench.records.run.run_file import read_run
-from apo_bench.records.salt import check_one, one_salt, read_salt
+from apo_bench.records.salt import check_same_salt, one_salt, read_salt
 from apo_bench.report.answer import answer
 from apo_bench.report.failures import Draw, Failures
 from apo_bench.report.figures.every import figures
@@ -96,7 +96,7 @@ def report(
         raise InputError(f"'{folder}' holds no finished trial yet; run the sweep before its report.")
     salt = None if salt_file is None else read_salt(salt_file)
     if salt is not None:
-        check_one(f"'{folder}'", salt.hash, one_salt(rows))
+        check_same_salt(f"'{folder}'", salt.hash, one_salt(rows))
     found = summary(rows)
     if not found.cells:
         raise InputError(

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 from apo_bench.records.method import knows_relations, knows_truth, may_look
-from apo_bench.records.robot_error import NONE
+from apo_bench.records.robot_error import NO_ROBOT_ERROR
 from apo_bench.records.settings import RANGE, USUAL
 from apo_bench.statistics.rate_text import level_label
 from apo_bench.statistics.rates import Place, rank_relations
@@ -23,7 +23,7 @@ class Setting(NamedTuple):
     grasp: str
     fidelity: str
     looks: int = 0
-    robot_error: str = NONE
+    robot_error: str = NO_ROBOT_ERROR
 
     def holds(self, cell: Place) -> bool:
         """Whether a cell belongs here.
@@ -53,7 +53,7 @@ class Setting(NamedTuple):
             said.append(f"relations {self.relations}")
         if self.grasp != "friction":
             said.append(f"{self.grasp} grasp")
-        if self.robot_error != NONE:
+        if self.robot_error != NO_ROBOT_ERROR:
             said.append(f"robot error {self.robot_error}")
         if self.fidelity != "full":
             said.append(f"fidelity {self.fidelity}")

@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from typing import Any, final
 
 from apo_bench.io.plain_text import clean
-from apo_bench.records.key import KEY
 from apo_bench.records.row import Row, look_up
+from apo_bench.records.setting_columns import KEY
 
 Count = Callable[[Row], None]
 """Takes every row as it comes."""

@@ -6,12 +6,12 @@ from functools import partial
 from pathlib import Path
 
 from apo_bench.errors import InputError, unknown
-from apo_bench.records.key import trial_key
 from apo_bench.records.limits import CORRECTOR_LIMIT_S, Limits
 from apo_bench.records.row import Row
 from apo_bench.records.run.run_file import run_record
 from apo_bench.records.run.run_folder import RunFolder
 from apo_bench.records.salt import salt_of_sweep
+from apo_bench.records.setting_columns import trial_key
 from apo_bench.records.short_names import CORRECTOR
 from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.scenario import Scenario

@@ -16,9 +16,8 @@ from apo_bench.files import json_forms as files
 from apo_bench.io.reading import read_bytes
 from apo_bench.names import admit
 from apo_bench.observation.presets import noise_path
-from apo_bench.records.relations import WRONG
+from apo_bench.records.run.own_code import DATA_PREFIXES, is_own_code
 from apo_bench.records.settings import ROW, TrialSettings
-from apo_bench.records.short_names import FOREIGN_ARMS, RESIDUALS
 from apo_bench.resources import folder
 from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.scenario import Scenario
@@ -88,8 +87,7 @@ def own_content(kind: str, *names: str) -> dict[str, str]:
 
     What that module imports in turn does not count.
     """
-    not_modules = (RESIDUALS, *FOREIGN_ARMS, *(f"{wrong}:" for wrong in WRONG))
-    own = [name for name in names if ":" in name and not name.startswith(not_modules)]
+    own = [name for name in names if is_own_code(name, DATA_PREFIXES[kind])]
     return {f"{kind} {name}": hashed for name in own if (hashed := _module_hash(name.partition(":")[0])) is not None}
 
 

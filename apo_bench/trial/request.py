@@ -9,10 +9,10 @@ from typing import Any, final
 
 from apo_bench.assembly.goals import Observation
 from apo_bench.errors import InputError
-from apo_bench.records.asked import in_python
 from apo_bench.records.limits import CORRECTOR_LIMIT_S
 from apo_bench.records.relations import RECOGNISED
 from apo_bench.records.salt import read_salt
+from apo_bench.records.setting_columns import in_python
 from apo_bench.records.settings import LEVEL, RANGE, TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene

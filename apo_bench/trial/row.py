@@ -6,8 +6,8 @@ from typing import cast
 
 from apo_bench.assembly.reached import Outcome
 from apo_bench.io.plain_text import clean
-from apo_bench.records.asked import asked
 from apo_bench.records.row import LONGEST_SENTENCE, ROW_FIELDS, Row
+from apo_bench.records.setting_columns import setting_columns
 from apo_bench.records.settings import ENV_ID, ROW, TrialSettings
 from apo_bench.scenario.scenario import Scenario
 
@@ -21,9 +21,9 @@ def head(spec: TrialSettings, scenario: Scenario, hashed: str) -> Row:
     Args:
         hashed: From `spec_hash`.
     """
-    settings = asked(spec, scenario.name)
-    said = {"schema": ROW, "env_id": ENV_ID, "spec_hash": hashed, **settings, "thresholds": asdict(scenario.thresholds)}
-    return cast(Row, said)
+    versions = {"schema": ROW, "env_id": ENV_ID, "spec_hash": hashed}
+    columns = setting_columns(spec, scenario.name)
+    return cast(Row, versions | columns | {"thresholds": asdict(scenario.thresholds)})
 
 
 def result(end: Outcome, *, success: bool | None) -> Row:

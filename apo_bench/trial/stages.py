@@ -22,7 +22,7 @@ from apo_bench.observation.noise import Noise
 from apo_bench.observation.observing import observe
 from apo_bench.prediction.failure import ARM_CODES, predict
 from apo_bench.records.outcomes import sentence
-from apo_bench.records.robot_error import NONE, robot_sigmas
+from apo_bench.records.robot_error import NO_ROBOT_ERROR, robot_sigmas
 from apo_bench.records.row import Predicted
 from apo_bench.records.salt import Salt
 from apo_bench.records.settings import RANGE
@@ -165,7 +165,7 @@ def draw_robot_error(given: str, scene: Scene, seed: int, salt: Salt | None = No
     Args:
         given: As in a row.
     """
-    if given == NONE:
+    if given == NO_ROBOT_ERROR:
         return None
     sigmas = robot_sigmas(given)
     drawn = stream(seed, HAND_EYE, salt).standard_normal(6)

@@ -275,4 +275,4 @@ def test_the_name_of_a_salt_says_nothing_of_the_streams() -> None:
     assert HERE.hash not in "".join(f"{word:08x}" for word in words)
     assert words != HERE.words(3, 2) != HERE.words(31, 2)
     assert HERE.words(3, 11) != HERE.words(31, 1)
-    assert module.FEWEST * 8 == 128
+    assert module.FEWEST_BYTES * 8 == 128

@@ -16,10 +16,9 @@ from apo_bench.cli import app as cli
 from apo_bench.cli.setting_options import sweep_options, trial_options
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.errors import InputError
-from apo_bench.records.asked import asked, settings_of
-from apo_bench.records.key import KEY
 from apo_bench.records.row import REQUIRED, ROW_FIELDS, look_up
 from apo_bench.records.run.run_folder import read_rows
+from apo_bench.records.setting_columns import KEY, setting_columns, settings_of
 from apo_bench.records.settings import LEVEL, SETTINGS, TrialSettings
 from apo_bench.report.compare import compare
 from apo_bench.sweeps.grid import SweepSettings
@@ -38,11 +37,7 @@ def test_columns_of_a_row_are_the_settings_in_their_order_with_their_ranges() ->
         column = ROW_FIELDS[SETTINGS[name].column]
         if not SETTINGS[name].choices and name != "salt":
             assert column in (kind, kind | None)
-    assert (
-        set(KEY) - set(REQUIRED)
-        == {info.column for info in SETTINGS.values() if info.later}
-        == {"looks", "robot_error"}
-    )
+    assert {*KEY, *columns} - {*REQUIRED} == {"salt"}
 
 
 def test_sweeps_have_an_axis_or_one_value_of_every_setting() -> None:
@@ -71,8 +66,7 @@ def test_the_environment_has_the_same_defaults() -> None:
 
 def test_settings_of_a_row_are_those_that_it_was_made_with() -> None:
     made = TrialSettings("block_on_block", 2.0, 0.5, 0.0, 0.5, method="none", seed=3, timestep_s=0.0005)
-    assert settings_of(asked(made, "block_on_block"), "block_on_block") == made
-    assert settings_of({"level": 2.0}, "block_on_block") == TrialSettings("block_on_block", 2.0)
+    assert settings_of(setting_columns(made, "block_on_block"), "block_on_block") == made
 
 
 @pytest.mark.parametrize(

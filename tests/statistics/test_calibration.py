@@ -1,4 +1,4 @@
-"""Calibration: what rows say about coverage, alarms and culprits; rows of the schema before are still read."""
+"""Calibration: what rows say about coverage, alarms and culprits."""
 
 from __future__ import annotations
 
@@ -11,12 +11,9 @@ import pytest
 from apo_bench.errors import InputError
 from apo_bench.records.row import ROW_FIELDS
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.records.settings import SETTINGS
-from apo_bench.report.report import report
 from apo_bench.report.tables.calibration import calibration_table
 from apo_bench.statistics.calibration import calibrations
-from tests import pages
-from tests.statistics.test_rates import UNCOUNTED, UNKNOWN, row, write
+from tests.statistics.test_rates import row, write
 
 
 def corrected(seed: int, passes: bool, suspects: tuple[str, ...] = (), **more: Any) -> dict[str, Any]:
@@ -56,14 +53,8 @@ def test_calibration_counts_coverage_alarms_and_culprits() -> None:
     assert "| shifted:3 | contact | 3 | 66.7 % of 3 | 0.408 | 1.63 | 2.000 | 66.7 % of 3 | 50.0 % of 2 |" in lines
 
 
-def test_rows_of_the_schema_before_are_read(tmp_path: Path) -> None:
-    usual = {info.column: info.default for info in SETTINGS.values() if not info.key}
-    unsaid = {**UNKNOWN, **UNCOUNTED, **usual, "robot_error": "none"}
-    old = {k: v for k, v in row().items() if k not in unsaid} | {"schema": "apo-bench/row/6"}
-    new = row() | {"seed": 1}
-    folder = write(tmp_path / "old", [old, new])
-    empty = dict.fromkeys(ROW_FIELDS)
-    assert read_rows(folder) == [{**empty, **unsaid, **old}, {**empty, **unsaid, **new}]
-    assert "stick_in_tower, careless human, 0.25 mm clearance" in pages.words(report(folder).page)
-    with pytest.raises(InputError, match="a row of schema 'apo-bench/row/5' was given"):
-        read_rows(write(tmp_path / "older", [old | {"schema": "apo-bench/row/5"}]))
+def test_rows_of_a_schema_before_are_refused(tmp_path: Path) -> None:
+    folder = write(tmp_path / "new", [row()])
+    assert read_rows(folder) == [dict.fromkeys(ROW_FIELDS) | row()]
+    with pytest.raises(InputError, match="a row of schema 'apo-bench/row/6' was given"):
+        read_rows(write(tmp_path / "older", [row() | {"schema": "apo-bench/row/6"}]))

@@ -45,6 +45,8 @@ def row(method: str = "none", seed: int = 0, success: bool | None = True, **more
     failed = success is False
     return {
         "schema": ROW,
+        "env_id": "APOReplay-v0",
+        "spec_hash": "0123456789abcdef",
         "scenario": "stick_in_tower",
         "clearance_mm": 0.25,
         "careless": 0.0 if method == "oracle" else 1.0,
@@ -54,10 +56,14 @@ def row(method: str = "none", seed: int = 0, success: bool | None = True, **more
         "relations": "given",
         "grasp": "friction",
         "fidelity": "full",
+        "arm": "six_axis",
+        "eye": "noise",
+        "timestep_s": 0.001,
         "method": method,
         "looks": 0,
         "robot_error": "none",
         "seed": seed,
+        "salt": None,
         **UNKNOWN,
         "demonstration": "demonstration_failed" if success is None else "ok",
         "success": success,

@@ -22,8 +22,8 @@ import pytest
 
 from apo_bench.assembly.reached import Outcome
 from apo_bench.errors import InputError
-from apo_bench.records.key import KEY, row_key, trial_key
 from apo_bench.records.run.run_folder import read_rows
+from apo_bench.records.setting_columns import KEY, row_key, trial_key
 from apo_bench.records.settings import ROW
 from apo_bench.records.short_names import CORRECTORS
 from apo_bench.scenario.file import load_scenario

@@ -1,32 +1,56 @@
-"""Lines and documents of the folder of a sweep, read and written by the table of fields.
+"""Lines and documents of the folder of a sweep, read and written by tables of fields; those of a row are in `row`.
 
 Every complaint is one sentence that names the file, the line and the field.
 """
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
-from typing import Any, Never, cast
+from typing import Annotated, Any, Never, cast
 
 import msgspec
+from msgspec import Meta
 
 from apo_bench.errors import InputError
 from apo_bench.io.plain_text import CONTROL, clean
 from apo_bench.io.whole_json import HALF_BUT_OF_FILES, HALF_LETTER, WHOLE_LETTERS, half_letter, is_whole, read_whole
 from apo_bench.records.row import REQUIRED, ROW_FIELDS, Row
-from apo_bench.records.run.fields import RUN_FIELDS, TIMING_FIELDS, Said
-from apo_bench.records.settings import RANGE, ROW, SETTINGS, TrialSettings
+from apo_bench.records.setting_columns import KEY
+from apo_bench.records.settings import ROW, Name
 
-_USUAL: Mapping[str, Any] = MappingProxyType(
+_Text = Annotated[str, Meta(max_length=100_000)]
+_Plain = None | bool | int | float | _Text
+_Listed = list[_Plain | list[_Plain]]
+_Inner = _Plain | _Listed | dict[Name, _Plain | _Listed]
+_RunValue = _Plain | list[_Plain | list[_Plain] | dict[Name, _Inner]] | dict[Name, _Inner]
+"""Any value of `run.json`: no deeper than one that a sweep writes."""
+_Texts = dict[Name, _Text]
+RUN_FIELDS: Mapping[str, Any] = MappingProxyType(
     {
-        info.column: info.default
-        for name, info in SETTINGS.items()
-        if (info.later or not info.key) and name not in ("eye", "salt")
+        "schema": Name,
+        "grids": list[dict[Name, _Inner]],
+        "files": _Texts,
+        "content": _Texts,
+        "versions": _Texts,
+        "python": _Text,
+        "platform": _Text,
+        "command": _Text,
+        "salt": _Text,
+        "limits": dict[Name, Annotated[float, Meta(gt=0.0, le=1e9)] | None],  # wall times [s]
+        "code": _Texts,
     }
 )
-"""What a row that does not say means."""
-_READABLE = ("apo-bench/row/6", ROW)
-"""Schemas of rows; those before today's say nothing of looks."""
+"""Of `run.json`: all may be missing, and what else stands there is shown as it is."""
+_Seconds = Annotated[float, Meta(ge=0.0, le=1e9)]
+TIMING_FIELDS: Mapping[str, Any] = MappingProxyType(
+    {
+        **{name: ROW_FIELDS[name] for name in KEY},
+        **dict.fromkeys(("compile_s", "demonstrate_s", "trial_s"), _Seconds),
+        "host": Name,
+        "worker": int | Name,
+    }
+)
+"""Of a line of `timing.jsonl`."""
 _NAMES = ("scenario", "noise", "relations", "grasp", "arm", "method", "spec_hash", "eye", "robot_error")
 """Texts of a row that stand in commands, so that nothing in them may be obeyed by a terminal."""
 _TOGETHER = (
@@ -40,8 +64,7 @@ _TOGETHER = (
 )
 """Fields that are null together."""
 _LONGEST_QUOTE = 60
-_TIMED = ("scenario", "method")
-_KINDS = {
+_TYPE_WORDS = {
     "object": "an object",
     "array": "a list",
     "str": "text",
@@ -51,18 +74,18 @@ _KINDS = {
 }
 
 
-def _struct(name: str, fields: Mapping[str, Any], required: Sequence[str], **more: Any) -> type[msgspec.Struct]:
-    given = []
-    for field, kind in fields.items():
-        given.append((field, kind) if field in required else (field, kind | None, None))
-    return msgspec.defstruct(name, given, kw_only=True, gc=False, **more)
+def _struct(name: str, fields: Mapping[str, Any], required: Iterable[str] = (), **more: Any) -> type[msgspec.Struct]:
+    columns: list[Any] = [
+        (field, kind) if field in required else (field, kind | None, None) for field, kind in fields.items()
+    ]
+    return msgspec.defstruct(name, columns, kw_only=True, gc=False, **more)
 
 
 _ROW = msgspec.json.Decoder(_struct("Row", ROW_FIELDS, REQUIRED))
-_TIMING = msgspec.json.Decoder(_struct("Timing", TIMING_FIELDS, _TIMED))
+_TIMING = msgspec.json.Decoder(_struct("Timing", TIMING_FIELDS, ("scenario", "method")))
 _WRITTEN = _struct("Written", ROW_FIELDS, REQUIRED, forbid_unknown_fields=True)
 _RUN = msgspec.json.Decoder(dict[str, Any])
-_KNOWN = _struct("Run", RUN_FIELDS, ())
+_KNOWN = _struct("Run", RUN_FIELDS)
 
 
 def row_of(line: bytes, where: str) -> Row:
@@ -75,21 +98,13 @@ def row_of(line: bytes, where: str) -> Row:
         InputError: A line that is no row.
     """
     row = _decoded(_ROW, line, where, "this is not a row of a sweep")
-    if row["schema"] not in _READABLE:
-        raise InputError(
-            f"{where}: a row of schema '{_short(row['schema'])}' was given; {', '.join(_READABLE)} can be read."
-        )
-    wrong = _fault(row)
-    if wrong is not None:
-        raise _wrong(where, *wrong)
+    if row["schema"] != ROW:
+        raise InputError(f"{where}: a row of schema '{_short(row['schema'])}' was given; {ROW} can be read.")
+    fault = _fault(row)
+    if fault is not None:
+        raise _wrong(where, *fault)
     row["sentence"] = row["sentence"] and clean(row["sentence"])
-    return as_usual(row)
-
-
-def as_usual(row: Mapping[str, Any]) -> Row:
-    """A row with what it does not say about how it was run."""
-    usual = {"eye": RANGE if row["noise"] == RANGE else TrialSettings.eye, **_USUAL}
-    return cast(Row, {**row, **{name: value for name, value in usual.items() if row.get(name) is None}})
+    return cast(Row, row)
 
 
 def timing_of(line: bytes, where: str) -> dict[str, Any]:
@@ -108,23 +123,23 @@ def run_of(text: bytes, file: str) -> dict[str, Any]:
         InputError: It is no such document.
     """
     try:
-        said = _parsed(_RUN, text, file, HALF_BUT_OF_FILES)
-        msgspec.convert(said, _KNOWN)
-        for name, value in said.items():
-            _check_said(value, file, name)
+        run = _parsed(_RUN, text, file, HALF_BUT_OF_FILES)
+        msgspec.convert(run, _KNOWN)
+        for name, value in run.items():
+            _check_value(value, file, name)
     except _UNREADABLE as error:
         _refuse(error, file, "this is not a document that a sweep wrote")
-    for name, path in (said.get("files") or {}).items():
+    for name, path in (run.get("files") or {}).items():
         if CONTROL.search(name + path):
             raise _wrong(file, "files", "text without control characters is needed")
-    return {name: value for name, value in said.items() if value is not None}
+    return {name: value for name, value in run.items() if value is not None}
 
 
-def _check_said(value: Any, file: str, name: str) -> None:
+def _check_value(value: Any, file: str, name: str) -> None:
     try:
-        msgspec.convert(value, Said)
+        msgspec.convert(value, _RunValue)
     except msgspec.ValidationError as error:
-        place, what = _said(error)
+        place, what = _in_words(error)
         gap = " " * place.startswith("(")
         raise _wrong(file, f"{_short(name)}{gap}{place}", what) from error
 
@@ -134,10 +149,10 @@ def unwritable(row: Mapping[str, Any]) -> str:
     try:
         msgspec.convert(dict(row), _WRITTEN)
         half = half_letter(dict(row), HALF_LETTER)
-        wrong = _fault(row) if half is None else (half, WHOLE_LETTERS)
+        fault = _fault(row) if half is None else (half, WHOLE_LETTERS)
     except msgspec.ValidationError as error:
-        wrong = _said(error)
-    return "" if wrong is None else f"field {wrong[0]}: {wrong[1]}"
+        fault = _in_words(error)
+    return "" if fault is None else f"field {fault[0]}: {fault[1]}"
 
 
 _UNREADABLE = (msgspec.DecodeError, msgspec.ValidationError, RecursionError, ValueError)
@@ -152,8 +167,10 @@ def _decoded(decoder: Any, line: bytes, where: str, none: str) -> dict[str, Any]
 
 def _parsed(decoder: Any, text: bytes, where: str, half: re.Pattern[str]) -> Any:
     """What is wrong with a field is said first, then what is seen only when looking closer, which few lines need."""
-    said = None if b"\\" in text else decoder.decode(text)
-    return said if said is not None and is_whole(text) else msgspec.convert(read_whole(text, where, half), decoder.type)
+    document = None if b"\\" in text else decoder.decode(text)
+    if document is not None and is_whole(text):
+        return document
+    return msgspec.convert(read_whole(text, where, half), decoder.type)
 
 
 def _fault(row: Mapping[str, Any]) -> tuple[str, str] | None:
@@ -175,7 +192,7 @@ def _fault(row: Mapping[str, Any]) -> tuple[str, str] | None:
     return None
 
 
-def _said(error: msgspec.ValidationError) -> tuple[str, str]:
+def _in_words(error: msgspec.ValidationError) -> tuple[str, str]:
     """The field, and what is needed there and what was given, in words."""
     text, _, place = str(error).partition(" - at `$")
     field = clean(place.rstrip("`").lstrip(".")).replace("[...]", " (an entry)").strip()[:_LONGEST_QUOTE]
@@ -188,29 +205,29 @@ def _said(error: msgspec.ValidationError) -> tuple[str, str]:
     value = re.fullmatch(r"Invalid enum value '?(.*?)'?", text, re.DOTALL)
     if value:
         return field, f"'{_short(value[1])}' is none of the values that it has"
-    words = re.sub(r"`([^`]*)`", lambda found: _kinds(found[1]), text)
+    words = re.sub(r"`([^`]*)`", lambda kinds: _kinds_in_words(kinds[1]), text)
     needed = re.fullmatch(r"Expected (.*?)(?:, got (.*))?", words)
     if needed:
         return field, f"{needed[1]} is needed" + f", {needed[2]} was given" * bool(needed[2])
     return field, words[:1].lower() + words[1:]
 
 
-def _kinds(said: str) -> str:
+def _kinds_in_words(kinds: str) -> str:
     """`int | null` in words."""
-    names = [_KINDS.get(kind, kind) for kind in said.split(" | ")]
+    names = [_TYPE_WORDS.get(kind, kind) for kind in kinds.split(" | ")]
     return " or ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
 
 
 def _short(text: str) -> str:
-    said = clean(text)
-    return said if len(said) <= _LONGEST_QUOTE else said[: _LONGEST_QUOTE - 3] + "..."
+    text = clean(text)
+    return text if len(text) <= _LONGEST_QUOTE else text[: _LONGEST_QUOTE - 3] + "..."
 
 
 def _refuse(error: Exception, where: str, none: str) -> Never:
     if isinstance(error, InputError):
         raise error
     if isinstance(error, msgspec.ValidationError):
-        raise _wrong(where, *_said(error)) from error
+        raise _wrong(where, *_in_words(error)) from error
     raise InputError(f"{where}: {none}; remove it, or the folder.") from error
 
 

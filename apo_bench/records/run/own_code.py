@@ -10,29 +10,36 @@ from typing import Any
 from apo_bench.records.relations import WRONG
 from apo_bench.records.short_names import FOREIGN_ARMS, RESIDUALS
 
+DATA_PREFIXES: Mapping[str, tuple[str, ...]] = {
+    "method": (),
+    "arm": FOREIGN_ARMS,
+    "noise": (RESIDUALS,),
+    "relations": tuple(f"{kind}:" for kind in WRONG),
+}
+"""Column -> how names with a colon begin that are data, and no code."""
 _MOST = 3
 """Names in the sentence."""
 
 
 def own_code(row: Mapping[str, Any]) -> tuple[str, ...]:
     """What of a row is code of somebody's own; files of noise and scenarios are data."""
-    found = [row[name] for name in ("method", "arm") if ":" in (row.get(name) or "")]
-    found = [name for name in found if not name.startswith(FOREIGN_ARMS)]
-    noise = row["noise"]
-    relations = row["relations"]
-    found += [noise] * (":" in noise and not noise.startswith(RESIDUALS))
-    found += [relations] * (":" in relations and relations.partition(":")[0] not in WRONG)
-    return tuple(dict.fromkeys(found))
+    names = [row[column] for column, data in DATA_PREFIXES.items() if is_own_code(row[column], data)]
+    return tuple(dict.fromkeys(names))
+
+
+def is_own_code(name: str, data: tuple[str, ...]) -> bool:
+    """Whether a name is `module:name`, and none that begins as one of the `DATA_PREFIXES`."""
+    return ":" in name and not name.startswith(data)
 
 
 def left_out(rows: Iterable[Mapping[str, Any]]) -> str:
     """The sentence on failed trials that are not run again for a picture; empty if there are none."""
-    met = [own for row in rows if row["success"] is False and (own := own_code(row))]
-    if not met:
+    of_rows = [own for row in rows if row["success"] is False and (own := own_code(row))]
+    if not of_rows:
         return ""
-    names = list(dict.fromkeys(name for own in met for name in own))
+    names = list(dict.fromkeys(name for own in of_rows for name in own))
     more = f" and {len(names) - _MOST} more" * (len(names) > _MOST)
-    many = "1 failed trial names" if len(met) == 1 else f"{len(met):,} failed trials name"
+    many = "1 failed trial names" if len(of_rows) == 1 else f"{len(of_rows):,} failed trials name"
     return (
         f"{many} code that does not come with the package ({', '.join(names[:_MOST])}{more}); a report runs it only "
         "with --trust-code"

@@ -6,7 +6,6 @@ from typing import Any
 
 from apo_bench.records.limits import CORRECTOR_LIMIT_S, USUAL_LIMITS, Limits
 from apo_bench.records.method import is_own
-from apo_bench.records.run.checked import as_usual
 from apo_bench.records.settings import LEVEL, RANGE, SETTINGS
 
 _SALT_FILE = "FILE"
@@ -26,37 +25,36 @@ def replay_command(row: Mapping[str, Any], files: Files | None = None, limits: L
 
 def without_seed(row: Mapping[str, Any], files: Files | None = None, limits: Limits = USUAL_LIMITS) -> str:
     """A replay command without its seed: what the trials of a cell have in common."""
-    given = str((files or {}).get(row["scenario"], row["scenario"]))
-    given = f"./{given}" if given.startswith("-") else given
-    return shlex.join(["apo-bench", "replay", given, *_options(as_usual(row), limits)])
+    scenario = str((files or {}).get(row["scenario"], row["scenario"]))
+    scenario = f"./{scenario}" if scenario.startswith("-") else scenario
+    return shlex.join(["apo-bench", "replay", scenario, *_options(row, limits)])
 
 
 def _options(row: Mapping[str, Any], limits: Limits) -> list[str]:
-    said: list[str] = []
+    words: list[str] = []
 
-    def say(option: str, value: object, default: object = None) -> None:
+    def add(option: str, value: object, default: object = None) -> None:
         if value != default:
-            said.extend((f"--{option}", number(value) if isinstance(value, float) else str(value)))
+            words.extend((f"--{option}", number(value) if isinstance(value, float) else str(value)))
 
     measured = row["eye"] == RANGE
     if measured or row["level"] == row["level_deg"]:
-        say(LEVEL.option, float(row["level"]), SETTINGS["level_mm"].default)
+        add(LEVEL.option, float(row["level"]), SETTINGS["level_mm"].default)
     else:
         for name in ("level_mm", "level_deg"):
             info = SETTINGS[name]
-            say(info.option, float(row[info.column]), info.default)
+            add(info.option, float(row[info.column]), info.default)
     for name, info in SETTINGS.items():
-        if name not in _APART and not (name == "noise" and measured):
-            value = row[info.column]
-            usual = None if name in _ALWAYS else info.default
-            if value != usual:
-                say(info.option, milli(value) if info.scale != 1.0 else value if info.is_text else float(value))
-    say(SETTINGS["salt"].option, _SALT_FILE if row.get("salt") else None)
+        value = row[info.column]
+        if name in _APART or (name == "noise" and measured) or (value == info.default and name not in _ALWAYS):
+            continue
+        add(info.option, milli(value) if info.scale != 1.0 else value if info.is_text else float(value))
+    add(SETTINGS["salt"].option, _SALT_FILE if row.get("salt") else None)
     if row.get("failure_stage") == "worker":
-        say("trial-limit", limits.trial_s)
+        add("trial-limit", limits.trial_s)
         if is_own(row["method"]):
-            say("corrector-limit", limits.corrector_s, CORRECTOR_LIMIT_S)
-    return said
+            add("corrector-limit", limits.corrector_s, CORRECTOR_LIMIT_S)
+    return words
 
 
 def number(x: float) -> str:

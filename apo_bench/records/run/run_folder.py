@@ -19,12 +19,11 @@ from apo_bench.errors import InputError
 from apo_bench.io.kept_file import is_there, put_back
 from apo_bench.io.reading import each_line
 from apo_bench.io.writing import check_target, to_write
-from apo_bench.records.key import Key, row_key
 from apo_bench.records.row import Row
 from apo_bench.records.run.checked import row_of, unwritable
 from apo_bench.records.run.run_file import check_same, write_run
-from apo_bench.records.salt import check_one
-from apo_bench.records.settings import ROW
+from apo_bench.records.salt import check_same_salt
+from apo_bench.records.setting_columns import Key, row_key
 
 CHUNK = 1 << 16
 
@@ -124,13 +123,8 @@ class RunFolder:
 
     def _read(self, run: Mapping[str, Any]) -> None:
         for row in each_row(self.folder):
-            if row["schema"] != ROW:
-                raise InputError(
-                    f"'{self.folder}' holds rows of schema '{row['schema']}', and this version writes '{ROW}'; "
-                    "choose another folder."
-                )
-            check_one(f"'{self.folder}'", run.get("salt"), row["salt"])
-            self.finished[row_key(row)] = row["spec_hash"] or ""
+            check_same_salt(f"'{self.folder}'", run.get("salt"), row["salt"])
+            self.finished[row_key(row)] = row["spec_hash"]
         if self.finished:
             check_same(self.folder, run)
 
