@@ -1,44 +1,47 @@
-"""What the command line makes of the words it is given."""
+"""What the command line makes of the words it is given: numbers, paths, files to write."""
 
 import os
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from apo_bench.errors import InputError
 from apo_bench.io.writing import check_target
 
 NO_RESULT = 1
 """The exit code of a command that ended without the result it was asked for."""
+Output = tuple[Path | None, str, tuple[str, ...]]
+"""A file to write if any, its option, and the endings that its name may have."""
+_Number = TypeVar("_Number", int, float)
 
 
 def numbers(text: str, option: str) -> tuple[float, ...]:
     """`0,0.5,1` as numbers; whether they are allowed is checked where they are used."""
-    found = words(text, option)
-    try:
-        return tuple(float(word) for word in found)
-    except ValueError as error:
-        raise InputError(
-            f"{option} {text} was given; numbers with commas between them are allowed: 0,0.5,1."
-        ) from error
+    return _converted(text, option, float, "numbers", "0,0.5,1")
 
 
 def whole_numbers(text: str, option: str) -> tuple[int, ...]:
     """`0,2,4` as whole numbers."""
-    found = words(text, option)
+    return _converted(text, option, int, "whole numbers", "0,2,4")
+
+
+def _converted(text: str, option: str, kind: type[_Number], called: str, example: str) -> tuple[_Number, ...]:
+    entries = words(text, option)
     try:
-        return tuple(int(word) for word in found)
+        return tuple(map(kind, entries))
     except ValueError as error:
         raise InputError(
-            f"{option} {text} was given; whole numbers with commas between them are allowed: 0,2,4."
+            f"{option} {text} was given; {called} with commas between them are allowed: {example}."
         ) from error
 
 
 def words(text: str, option: str) -> tuple[str, ...]:
     """`oracle,none` as its entries."""
-    found = tuple(word.strip() for word in text.split(","))
-    if not all(found):
+    entries = tuple(word.strip() for word in text.split(","))
+    if not all(entries):
         raise InputError(f"{option} '{text}' was given; at least one entry is needed, with single commas between them.")
-    return found
+    return entries
 
 
 def path_given(text: str) -> Path:
@@ -48,6 +51,16 @@ def path_given(text: str) -> Path:
     if not text.strip():
         raise typer.BadParameter("an empty path was given; name a file or a folder.")
     return Path(text)
+
+
+def check_outputs(outputs: Iterable[Output], inputs: Sequence[Path] = ()) -> None:
+    """Refuse, before any work is done, files that cannot be written, or that are read as well."""
+    for path, option, endings in outputs:
+        if path is None:
+            continue
+        check_writable(path, option, endings)
+        if any(path.exists() and source.exists() and path.samefile(source) for source in inputs):
+            raise InputError(f"{option} {path} is a file that is read; name another, so that it is kept.")
 
 
 def check_writable(path: Path, option: str, endings: tuple[str, ...]) -> None:
@@ -60,6 +73,17 @@ def check_writable(path: Path, option: str, endings: tuple[str, ...]) -> None:
     folder = path.parent
     if path.is_dir() or not folder.is_dir() or not os.access(path if path.exists() else folder, os.W_OK):
         raise InputError(f"{option} {path} cannot be written; name a file in a folder that exists and can be written.")
+
+
+@contextmanager
+def writing(target: str = "") -> Iterator[None]:
+    """Say that something cannot be written, such as `--out FILE`; the file that failed if it is not named."""
+    try:
+        yield
+    except OSError as error:
+        raise InputError(
+            f"{target or error.filename} cannot be written ({error.strerror}); choose another place."
+        ) from error
 
 
 def cores() -> int:

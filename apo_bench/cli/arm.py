@@ -6,28 +6,18 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from apo_bench.cli.arguments import check_writable
+from apo_bench.cli.arguments import check_outputs
 from apo_bench.cli.help_groups import Grouped
 
-arm = typer.Typer(cls=Grouped, rich_markup_mode=None, help="Arms: those that come along, and any other.")
+arm = typer.Typer(name="arm", cls=Grouped, rich_markup_mode=None, help="Arms: those that come along, and any other.")
 
 _SIZE = (960, 720)
-_VIEW = (np.array([-0.15, 0.0, 0.3]), 1.9, 140.0, -18.0)
-"""The whole arm and the table."""
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands to the command line."""
-    app.add_typer(arm, name="arm")
-
-
-@arm.callback()
-def _group() -> None:
-    """Arms: those that come along, and any other."""
+_WHOLE_TABLE = (np.array([-0.15, 0.0, 0.3]), 1.9, 140.0, -18.0)
+"""A view of the whole arm and the table."""
 
 
 @arm.command("list")
-def list_arms() -> None:
+def arm_list() -> None:
     """List the arms that come with the benchmark, and how others are named."""
     from apo_bench.show.arm_text import list_line
     from apo_bench.simulation.arms.finding import arm_names, find_arm
@@ -41,7 +31,7 @@ def list_arms() -> None:
 
 
 @arm.command("check")
-def check(
+def arm_check(
     name: Annotated[str, typer.Argument(metavar="ARM", help="A name, FILE.toml, menagerie:NAME or robosuite:NAME.")],
     scenario: Annotated[
         str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")
@@ -55,12 +45,11 @@ def check(
     from apo_bench.simulation.arm_checks.arm_check import check_arm
     from apo_bench.simulation.arms.finding import find_arm
 
-    if out is not None:
-        check_writable(out, "--out", (".png",))
+    check_outputs([(out, "--out", (".png",))])
     loaded = load_scenario(scenario)
-    found = find_arm(name)
+    robot = find_arm(name)
     typer.echo(f"{name} at the table of {loaded.name}:")
-    for line in check_lines(check_arm(found, loaded, layouts)):
+    for line in check_lines(check_arm(robot, loaded, layouts)):
         typer.echo(f"  {line}")
     if out is not None:
         import imageio.v3 as imageio
@@ -68,6 +57,6 @@ def check(
         from apo_bench.simulation.scene.render import camera_view, picture_with_arm
         from apo_bench.simulation.scene.scene import build_scene
 
-        scene = build_scene(loaded, arm=found, grasp="weld")
-        imageio.imwrite(out, picture_with_arm(scene, loaded.start, None, *_SIZE, camera_view(*_VIEW)))
+        scene = build_scene(loaded, arm=robot, grasp="weld")
+        imageio.imwrite(out, picture_with_arm(scene, loaded.start, None, *_SIZE, camera_view(*_WHOLE_TABLE)))
         typer.echo(f"Wrote {out}")

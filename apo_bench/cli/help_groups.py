@@ -40,7 +40,7 @@ class Grouped(TyperGroup):
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write a list for each heading that has a command here."""
-        sentences = {name: one.get_short_help_str(_WHOLE) for name, one in self.commands.items()}
+        sentences = {name: command.get_short_help_str(_WHOLE) for name, command in self.commands.items()}
         widest = max(map(len, sentences), default=0)
         groups = GROUPS if ctx.parent is None else {"Commands": tuple(sentences)}
         for heading, names in groups.items():
@@ -56,11 +56,11 @@ class GroupedOptions(TyperCommand):
         arguments = []
         options = {}
         for parameter in self.get_params(ctx):
-            said = parameter.get_help_record(ctx)
-            if said is not None and parameter.param_type_name == "argument":
-                arguments.append(said)
-            elif said is not None:
-                options[parameter.opts[0]] = said
+            record = parameter.get_help_record(ctx)
+            if record is not None and parameter.param_type_name == "argument":
+                arguments.append(record)
+            elif record is not None:
+                options[parameter.opts[0]] = record
         lists = {
             heading: [options.pop(name) for name in names if name in options] for heading, names in OPTIONS.items()
         }

@@ -1,33 +1,33 @@
 """The commands `apo-bench noise list | card | fit | learn | still`: noise models, cards, noise that is measured."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.arguments import NO_RESULT, check_writable
+from apo_bench.cli.arguments import NO_RESULT, check_outputs, writing
 from apo_bench.cli.help_groups import Grouped
+from apo_bench.cli.printing import print_json
+from apo_bench.cli.setting_options import AsJson
 from apo_bench.errors import InputError
 
 _HELP = "Noise models: list, cards, fits to measured poses, noise learned from observations."
 _NAME = "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name."
-noise = typer.Typer(cls=Grouped, rich_markup_mode=None, help=_HELP)
+noise = typer.Typer(name="noise", cls=Grouped, rich_markup_mode=None, help=_HELP)
 
-
-def register(app: typer.Typer) -> None:
-    """Add the commands to the command line."""
-    app.add_typer(noise, name="noise")
+_Picture = Annotated[Path | None, typer.Option(help="Draw seen and fitted into this file: .png.")]
+_Source = Annotated[str | None, typer.Option(help="What the noise file says it is of; default: the files.")]
 
 
 @noise.callback(invoke_without_command=True)
 def _without_command(context: typer.Context) -> None:
     """List the noise models, or read the card of one."""
     if context.invoked_subcommand is None:
-        list_models()
+        noise_list()
 
 
 @noise.command("list")
-def list_models() -> None:
+def noise_list() -> None:
     """List the noise models that have a name."""
     from apo_bench.show.noise_card import listed_models
 
@@ -38,8 +38,8 @@ def list_models() -> None:
     typer.echo("\nThe card of one: apo-bench noise card NAME")
 
 
-@noise.command()
-def card(
+@noise.command("card")
+def noise_card(
     name: Annotated[str, typer.Argument(help=_NAME)],
     level: Annotated[
         float, typer.Option(help="Of the histogram: mm and degrees, standard deviation; of measured noise, a factor.")
@@ -49,28 +49,25 @@ def card(
     """Print the card of a noise model: formula, frame, parameters, and a histogram of its errors."""
     from apo_bench.observation.noise import Level
     from apo_bench.records.settings import check
-    from apo_bench.show.noise_card import draw_errors, noise_card
+    from apo_bench.show import noise_card as cards
     from apo_bench.show.noise_picture import draw_histogram
 
     check("level_mm", level, called="level")
-    if out is not None:
-        check_writable(out, "--out", (".png",))
-    drawn = draw_errors(name, Level(level, level))
-    typer.echo(noise_card(name, Level(level, level), drawn), nl=False)
+    check_outputs([(out, "--out", (".png",))])
+    drawn = cards.draw_errors(name, Level(level, level))
+    typer.echo(cards.noise_card(name, Level(level, level), drawn), nl=False)
     if out is None:
         return
     if not len(drawn.errors):
         typer.echo(f"apo-bench: nothing was seen, so {out} was not written.", err=True)
         raise typer.Exit(NO_RESULT)
-    try:
+    with writing(f"--out {out}"):
         draw_histogram(drawn, out)
-    except OSError as error:
-        raise InputError(f"--out {out} cannot be written ({error.strerror}); choose another place.") from error
     typer.echo(f"\nWrote {out}")
 
 
-@noise.command()
-def fit(
+@noise.command("fit")
+def noise_fit(
     estimates: Annotated[Path, typer.Option(help="Poses of an estimator, a results file of the BOP format (.csv).")],
     truth: Annotated[Path, typer.Option(help="Where the parts were: .csv of that format, or a scene_gt.json.")],
     scene_id: Annotated[int | None, typer.Option(help="Only this scene; a scene_gt.json does not say its own.")] = None,
@@ -78,95 +75,69 @@ def fit(
     residuals: Annotated[
         Path | None, typer.Option(help="Write the residuals for --noise empirical:FILE: .csv.")
     ] = None,
-    picture: Annotated[Path | None, typer.Option(help="Draw seen and fitted into this file: .png.")] = None,
-    source: Annotated[str | None, typer.Option(help="What the noise file says it is of; default: the files.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
+    picture: _Picture = None,
+    source: _Source = None,
+    as_json: AsJson = False,
 ) -> None:
     """Measure a pose estimator: fit tails along and across the ray, outliers and misses, to its published results."""
-    import json
-
     from apo_bench.files.bop import read_results
     from apo_bench.files.bop_truth import read_truth
-    from apo_bench.observation.fitting import fit as fits
+    from apo_bench.observation.fitting import fit
     from apo_bench.observation.models.empirical import residuals_text
     from apo_bench.observation.models.residuals import match_residuals
-    from apo_bench.observation.noise_file import noise_text
-    from apo_bench.show.fit_picture import draw_fit
     from apo_bench.show.fit_text import fit_form, fit_lines, fit_notes
 
-    written = [(out, "--out", ".toml"), (residuals, "--residuals", ".csv"), (picture, "--picture", ".png")]
-    for path, option, ending in written:
-        if path is not None:
-            check_writable(path, option, (ending,))
-            for given in (estimates, truth):
-                if path.exists() and given.exists() and path.samefile(given):
-                    raise InputError(f"{option} {path} is a file that is read; name another, so that it is kept.")
+    outputs = [(out, "--out", (".toml",)), (residuals, "--residuals", (".csv",)), (picture, "--picture", (".png",))]
+    check_outputs(outputs, (estimates, truth))
     seen = read_results(estimates)
-    found = match_residuals(seen, read_truth(truth, seen, scene_id), scene_id)
-    measured = fits.fit_noise(found, _printable(source or f"{estimates.name} against {truth.name}"))
-    figures = fits.goodness_of_fit(found, measured)
+    matched = match_residuals(seen, read_truth(truth, seen, scene_id), scene_id)
+    measured = fit.fit_noise(matched, _printable(source or f"{estimates.name} against {truth.name}"))
+    goodness = fit.goodness_of_fit(matched, measured)
     if as_json:
-        typer.echo(json.dumps(fit_form(found, measured, figures), allow_nan=False))
+        print_json(fit_form(matched, measured, goodness))
     else:
-        typer.echo("\n".join(fit_lines(found, measured, figures)))
-    try:
-        if out is not None:
-            command = f"apo-bench noise fit --estimates {estimates.name} --truth {truth.name}"
-            notes = _printable(command), *fit_notes(found, measured, figures)
-            out.write_text(noise_text(measured, notes), encoding="utf-8")
-        if residuals is not None:
-            residuals.write_text(residuals_text(found), encoding="utf-8")
-        if picture is not None:
-            draw_fit(found, measured, picture)
-    except OSError as error:
-        raise InputError(f"{error.filename} cannot be written ({error.strerror}); choose another place.") from error
-    for path, _, _ in written:
+        typer.echo("\n".join(fit_lines(matched, measured, goodness)))
+    command = f"apo-bench noise fit --estimates {estimates.name} --truth {truth.name}"
+    notes = (_printable(command), *fit_notes(matched, measured, goodness))
+    _write_fit(matched, measured, (out, picture), notes)
+    if residuals is not None:
+        with writing():
+            residuals.write_text(residuals_text(matched), encoding="utf-8")
+    for path in (out, residuals, picture):
         if path is not None and not as_json:
             typer.echo(f"Wrote {path}")
 
 
-@noise.command()
-def still(
+@noise.command("still")
+def noise_still(
     log: Annotated[Path, typer.Argument(help="A tracker's log in which parts rest, or a folder of logs.")],
     form: Annotated[str, typer.Option("--format", help="csv, bop, tum, ros-csv or ros-json.")],
     camera: Annotated[Path, typer.Option(help="How the log is written, and where its camera stands if known: .toml.")],
     out: Annotated[Path | None, typer.Option(help="The noise file for --noise and --camera-noise: .toml.")] = None,
-    picture: Annotated[Path | None, typer.Option(help="Draw seen and fitted into this file: .png.")] = None,
+    picture: _Picture = None,
 ) -> None:
     """Measure a camera on parts that rest: how its frames scatter, how many are missing, how many are wrong."""
-    from apo_bench.observation.fitting import fit as fits
-    from apo_bench.observation.noise_file import noise_text
+    from apo_bench.observation.fitting import fit
     from apo_bench.recording.camera_file import read_camera
     from apo_bench.recording.formats import read_log
     from apo_bench.recording.still import still_residuals
-    from apo_bench.show.fit_picture import draw_fit
     from apo_bench.show.fit_text import fit_lines
 
-    for path, option, ending in ((out, "--out", ".toml"), (picture, "--picture", ".png")):
-        if path is not None:
-            check_writable(path, option, (ending,))
-            if path.exists() and camera.exists() and path.samefile(camera):
-                raise InputError(f"{option} {path} is a file that is read; name another, so that it is kept.")
+    check_outputs([(out, "--out", (".toml",)), (picture, "--picture", (".png",))], (camera,))
     stated = read_camera(camera)
-    found = still_residuals(read_log(log, form, stated.conventions))
-    measured = fits.fit_noise(found, _printable(f"parts at rest in {log.name}"))
-    typer.echo("\n".join(fit_lines(found, measured, fits.goodness_of_fit(found, measured))))
+    scatter = still_residuals(read_log(log, form, stated.conventions))
+    measured = fit.fit_noise(scatter, _printable(f"parts at rest in {log.name}"))
+    typer.echo("\n".join(fit_lines(scatter, measured, fit.goodness_of_fit(scatter, measured))))
     typer.echo("\nAn error that stays while a part rests is not in these numbers: no log of still parts can show it.")
-    try:
-        if out is not None:
-            notes = _printable(f"apo-bench noise still {log.name} --format {form}"), "without errors that stay"
-            out.write_text(noise_text(measured, notes, stated.T_world_camera), encoding="utf-8")
-        if picture is not None:
-            draw_fit(found, measured, picture)
-    except OSError as error:
-        raise InputError(f"{error.filename} cannot be written ({error.strerror}); choose another place.") from error
+    notes = (_printable(f"apo-bench noise still {log.name} --format {form}"), "without errors that stay")
+    _write_fit(scatter, measured, (out, picture), notes, stated.T_world_camera)
     for path in (out, picture):
         if path is not None:
             typer.echo(f"Wrote {path}")
 
 
-@noise.command()
-def learn(
+@noise.command("learn")
+def noise_learn(
     observations: Annotated[
         list[Path], typer.Argument(help="Observations, .json of `replay --save-observation`, or folders of them.")
     ],
@@ -174,46 +145,56 @@ def learn(
     constant: Annotated[
         bool, typer.Option("--constant", help="The camera also has an error that is the same in all observations.")
     ] = False,
-    source: Annotated[str | None, typer.Option(help="What the noise file says it is of; default: the files.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
+    source: _Source = None,
+    as_json: AsJson = False,
 ) -> None:
     """Learn the noise of a camera from observations alone: contacts tell it, without the truth."""
-    import json
-
     from apo_bench.files.json_reading import read_json_observation
     from apo_bench.observation.models.camera import Camera
     from apo_bench.observation.noise_file import noise_text
     from apo_bench.show.learned_text import learned_form, learned_lines
-    from apo_bench.trial.learned_noise import learn as learned
+    from apo_bench.trial.learned_noise import learn
 
     files = _observation_files(observations)
-    if out is not None:
-        check_writable(out, "--out", (".toml",))
+    check_outputs([(out, "--out", (".toml",))])
     named = _printable(source or f"{len(files)} observations of {', '.join(str(path) for path in observations)}")
-    found = learned([read_json_observation(path) for path in files], Camera(), named, constant=constant)
+    learned = learn([read_json_observation(path) for path in files], Camera(), named, constant=constant)
     if as_json:
-        typer.echo(json.dumps(learned_form(found), allow_nan=False))
+        print_json(learned_form(learned))
     else:
-        typer.echo("\n".join(learned_lines(found)))
+        typer.echo("\n".join(learned_lines(learned)))
     if out is None:
         return
-    try:
-        out.write_text(noise_text(found.measured), encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"--out {out} cannot be written ({error.strerror}); choose another place.") from error
+    with writing(f"--out {out}"):
+        out.write_text(noise_text(learned.measured), encoding="utf-8")
     if not as_json:
         typer.echo(f"Wrote {out}")
 
 
-def _observation_files(given: list[Path]) -> list[Path]:
+def _write_fit(
+    residuals: Any, measured: Any, files: tuple[Path | None, Path | None], notes: tuple[str, ...], *camera: Any
+) -> None:
+    """Write the noise file and the picture of a fit, where they are asked for."""
+    from apo_bench.observation.noise_file import noise_text
+    from apo_bench.show.fit_picture import draw_fit
+
+    out, picture = files
+    with writing():
+        if out is not None:
+            out.write_text(noise_text(measured, notes, *camera), encoding="utf-8")
+        if picture is not None:
+            draw_fit(residuals, measured, picture)
+
+
+def _observation_files(paths: list[Path]) -> list[Path]:
     """The files that were named, and those in the folders that were."""
-    found = list[Path]()
-    for path in given:
+    files = list[Path]()
+    for path in paths:
         inside = sorted(path.glob("*.json")) if path.is_dir() else [path]
         if not inside:
             raise InputError(f"the folder {path} holds no .json file; name a folder of observations.")
-        found += inside
-    return found
+        files += inside
+    return files
 
 
 def _printable(text: str) -> str:

@@ -2,36 +2,27 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from apo_bench.cli.arguments import path_given
+from apo_bench.cli.arguments import path_given, writing
 from apo_bench.cli.help_groups import Grouped
+from apo_bench.cli.printing import print_json
+from apo_bench.cli.setting_options import AsJson
 from apo_bench.errors import InputError
 
 if TYPE_CHECKING:
     from apo_bench.cad.importing import Imported
     from apo_bench.cad.raw import RawSolid
 
-part = typer.Typer(cls=Grouped, rich_markup_mode=None, help="Parts from CAD files.")
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands to the command line."""
-    app.add_typer(part, name="part")
-
-
-@part.callback()
-def _group() -> None:
-    """Parts from CAD files."""
+part = typer.Typer(name="part", cls=Grouped, rich_markup_mode=None, help="Parts from CAD files.")
 
 
 @part.command("import")
-def import_file(
+def part_import(
     file: Annotated[Path, typer.Argument(help="A CAD file: .step, .stp, .stl, .obj or .3mf.", parser=path_given)],
     out: Annotated[Path, typer.Option(help="The folder for the part files and their pictures; made if needed.")],
     unit: Annotated[
@@ -41,7 +32,7 @@ def import_file(
         list[str] | None, typer.Option(help="Another name for a face, such as hole1=bore; may be given again.")
     ] = None,
     density: Annotated[float, typer.Option(help="In kg/m^3.")] = 1000.0,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Make part files from a CAD file: find its faces, cut it into convex pieces, and say what was done."""
     from apo_bench.cad.importing import raw_solids, with_new_names
@@ -58,19 +49,17 @@ def import_file(
             f"--name was given, and {file} holds {len(raws)} different solids; import them from files of their own."
         )
     raws = [with_new_names(raw, names) for raw in raws]
-    try:
+    with writing(f"--out {out}"):
         out.mkdir(parents=True, exist_ok=True)
         _say(f"{file}: {unit_line(source)}", as_json)
-        done, left_out = _written(file, raws, out, density, as_json)
+        imported, left_out = _written(file, raws, out, density, as_json)
         left_out = [*source.left_out, *left_out]
-        places = named_places({each.path.stem: each.raw.places for each in done})
+        places = named_places({each.path.stem: each.raw.places for each in imported})
         poses = write_places(places, out, file.name) if len(places) > 1 else None
-    except OSError as error:
-        raise InputError(f"--out {out} cannot be written ({error.strerror}); choose another place.") from error
     if poses is not None:
-        _say(f"Wrote {poses}: {len(places)} places of {len(done)} parts", as_json)
+        _say(f"Wrote {poses}: {len(places)} places of {len(imported)} parts", as_json)
     if as_json:
-        typer.echo(json.dumps(report_form(source, file, done, poses), allow_nan=False))
+        print_json(report_form(source, file, imported, poses))
     if left_out:
         raise InputError(f"{file}: {len(left_out)} of its solids became no parts: {' '.join(left_out)}")
 
@@ -84,7 +73,7 @@ def _written(
     from apo_bench.cad.show.part_picture import draw_part
     from apo_bench.cad.show.part_text import import_lines
 
-    done: list[Imported] = []
+    imported: list[Imported] = []
     left_out: list[str] = []
     used: set[str] = set()
     for raw in raws:
@@ -98,12 +87,12 @@ def _written(
             left_out.append(f"{called}: {str(error).removeprefix(f'{file.name}: ')}")
             _say(f"{called}: NO PART", as_json)
             continue
-        done.append(each)
+        imported.append(each)
         _say("\n".join(import_lines(each)), as_json)
         picture = each.path.with_suffix(".png")
         draw_part(raw, frozenset(each.refused), called, picture)
         _say(f"Wrote {each.path} and {picture}", as_json)
-    return done, left_out
+    return imported, left_out
 
 
 def _say(text: str, as_json: bool) -> None:
@@ -111,12 +100,12 @@ def _say(text: str, as_json: bool) -> None:
         typer.echo(text)
 
 
-def _pairs(given: list[str]) -> Mapping[str, str]:
+def _pairs(renamings: list[str]) -> Mapping[str, str]:
     """`hole1=bore` as old and new names."""
-    found: dict[str, str] = {}
-    for each in given:
-        old, equals, new = each.partition("=")
-        if not (old and equals and new) or old in found:
-            raise InputError(f"--name {each} was given; FACE=NEW is allowed, each face once, such as hole1=bore.")
-        found[old] = new
-    return found
+    names: dict[str, str] = {}
+    for renaming in renamings:
+        old, equals, new = renaming.partition("=")
+        if not (old and equals and new) or old in names:
+            raise InputError(f"--name {renaming} was given; FACE=NEW is allowed, each face once, such as hole1=bore.")
+        names[old] = new
+    return names

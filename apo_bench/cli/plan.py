@@ -1,14 +1,17 @@
-"""One command: `apo-bench plan`, operations as macros with their motion parameters; only `--arm` needs a simulator."""
+"""Three commands that look into one plan: `apo-bench graph | plan | scene`.
 
-import json
+Only `plan --arm` and `scene` need a simulator.
+"""
+
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from apo_bench.assembly.goals import Plan
-from apo_bench.cli.arguments import check_writable
-from apo_bench.cli.setting_options import ScenarioArgument
+from apo_bench.cli.arguments import check_outputs, writing
+from apo_bench.cli.printing import print_json
+from apo_bench.cli.setting_options import AsJson, ScenarioArgument, StatedDeg, StatedMm, takes, trial_options
 from apo_bench.errors import InputError
 from apo_bench.files.deviations import assumed_deviations
 from apo_bench.io.output import redirect_output
@@ -16,12 +19,59 @@ from apo_bench.records.short_names import CORRECTOR
 from apo_bench.scenario.scenario import Scenario
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to the command line."""
-    app.command()(plan)
+def graph_command(
+    scenario: ScenarioArgument,
+    step: Annotated[int | None, typer.Option(help="After this operation, from 1; default: the last.")] = None,
+    observation: Annotated[Path | None, typer.Option(help="Show the residuals of this observation file.")] = None,
+    out: Annotated[Path | None, typer.Option(help="Draw it into this file: .svg or .png.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Print the relation graph: parts at their placements with their ODLs, contacts made and lost."""
+    from apo_bench.assembly.graph import observed_residuals, relation_graph
+    from apo_bench.files.observation import read_observation
+    from apo_bench.scenario.file import load_scenario
+    from apo_bench.show.graph.drawing import draw_graph
+    from apo_bench.show.graph.text import graph_form, graph_lines, graph_title
+
+    check_outputs([(out, "--out", (".svg", ".png"))])
+    loaded = load_scenario(scenario)
+    graph = relation_graph(loaded.assembly, step)
+    seen = None if observation is None else read_observation(observation, loaded)
+    residuals = None if seen is None else observed_residuals(seen, graph)
+    gap_m = loaded.gap_mm * 1e-3 if seen is None else seen.gap_m
+    if as_json:
+        print_json(graph_form(loaded.name, graph, residuals))
+    else:
+        typer.echo("\n".join(graph_lines(loaded.name, graph, residuals, gap_m)))
+    if out is not None:
+        title = graph_title(loaded.name, graph)
+        with writing(f"--out {out}"):
+            draw_graph(graph, out, title=title, residuals=residuals, gap_m=gap_m, colors=loaded.colors)
+        if not as_json:
+            typer.echo(f"\nWrote {out}")
 
 
-def plan(
+@takes(trial_options("clearance_mm", "grasp", "arm", "timestep_s"))
+def scene_command(
+    scenario: ScenarioArgument, out: Annotated[Path, typer.Option(help="The MJCF file to write.")], **options: Any
+) -> None:
+    """Write the scene of a scenario as one MJCF file that opens in MuJoCo's viewer."""
+    from apo_bench.records.setting_columns import in_python
+    from apo_bench.records.settings import check
+    from apo_bench.scenario.file import load_scenario
+    from apo_bench.simulation.scene.scene import scene_xml
+
+    settings = in_python({name: value for name, value in options.items() if value is not None})
+    for name, value in settings.items():
+        check(name, value)
+    loaded = load_scenario(scenario)
+    check_outputs([(out, "--out", (".xml",))])
+    xml = scene_xml(loaded, **settings)
+    out.write_text(xml, encoding="utf-8")
+    typer.echo(f"Wrote {out}; open it with: python -m mujoco.viewer --mjcf={out}")
+
+
+def plan_command(
     scenario: ScenarioArgument,
     observation: Annotated[
         Path | None, typer.Option(help="At the goals of this .json or .csv; default: the nominal ones.")
@@ -29,8 +79,8 @@ def plan(
     method: Annotated[
         str | None, typer.Option(help="Who corrects them: none, a corrector, or package.module:name; default: contact.")
     ] = None,
-    deviation_mm: Annotated[float | None, typer.Option(help="Its standard deviation where it states none, mm.")] = None,
-    deviation_deg: Annotated[float | None, typer.Option(help="The same in degrees.")] = None,
+    deviation_mm: StatedMm = None,
+    deviation_deg: StatedDeg = None,
     robot: Annotated[
         Path | None, typer.Option(help="Write tip poses, grasps and guarded motions for a robot into this file: .json.")
     ] = None,
@@ -41,7 +91,7 @@ def plan(
     arm: Annotated[
         str | None, typer.Option(help="Say whether this arm would carry it out; compiles its scene.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Say how every operation is done: contact states, macros, from where until where, what is guarded, the grasp."""
     from apo_bench.files.json_forms import write_form
@@ -50,11 +100,10 @@ def plan(
     from apo_bench.show.plan_text import plan_lines, plan_lines_form, plan_text
     from apo_bench.show.robot_form import robot_form
 
-    if robot is not None:
-        check_writable(robot, "--robot", (".json",))
+    check_outputs([(robot, "--robot", (".json",))])
     if frames is not None and robot is None:
         raise InputError(f"--frames {frames} was given without --robot, whose frames they would be; give both.")
-    stated = RobotFrames() if frames is None else read_robot_frames(frames)
+    robot_frames = RobotFrames() if frames is None else read_robot_frames(frames)
     if observation is None:
         if method is not None:
             raise InputError(f"--method {method} was given without --observation; give both, or neither.")
@@ -64,24 +113,24 @@ def plan(
             raise InputError("--robot was given without --observation, which says where things are; give both.")
         loaded = load_scenario(scenario)
         notes = list[str]()
-        asked = Plan(loaded.assembly, loaded.start, loaded.goals)
+        plan = Plan(loaded.assembly, loaded.start, loaded.goals)
         where = "at the nominal goals"
         axes = "directions and until in the frame of the assembly"
     else:
         method = CORRECTOR if method is None else method
         with redirect_output(as_json):
-            loaded, asked, notes = _planned(scenario, observation, method, (deviation_mm, deviation_deg))
+            loaded, plan, notes = _planned(scenario, observation, method, (deviation_mm, deviation_deg))
         where = f"at the goals of {observation}, {_by(method)}"
         axes = "directions in the frame of the assembly, until in the world"
     if arm is not None:
         from apo_bench.trial.plan_warning import arm_sentence
 
-        notes.append(arm_sentence(loaded, None if observation is None else asked, arm))
-    lines = plan_lines(asked, loaded)
+        notes.append(arm_sentence(loaded, None if observation is None else plan, arm))
+    lines = plan_lines(plan, loaded)
     if robot is not None:
-        write_form(robot_form(lines, asked, loaded, stated, notes), robot)
+        write_form(robot_form(lines, plan, loaded, robot_frames, notes), robot)
     if as_json:
-        typer.echo(json.dumps(plan_lines_form(lines, loaded, notes), allow_nan=False))
+        print_json(plan_lines_form(lines, loaded, notes))
         return
     typer.echo(f"{loaded.name} {where}; {axes}: mm and degrees\n")
     typer.echo("\n".join([*plan_text(lines), *([""] if notes else []), *notes]))
@@ -97,20 +146,19 @@ def _planned(
     from apo_bench.trial.plan_warning import plan_warning
     from apo_bench.trial.planning import apply_method
 
-    stated = zip(("deviation_mm", "deviation_deg"), deviations, strict=True)
     seen, loaded, assumed = read_observation_file(
-        observation, scenario, **{name: x for name, x in stated if x is not None}
+        observation, scenario, deviation_mm=deviations[0], deviation_deg=deviations[1]
     )
     if method == "oracle":
         raise InputError("--method oracle was given; it knows the truth, which an observation does not tell.")
-    found = apply_method(method, seen, None, where=loaded)
-    if found.plan is None:
-        why = found.failure.sentence if found.failure is not None else "no plan was made"
+    result = apply_method(method, seen, None, where=loaded)
+    if result.plan is None:
+        why = result.failure.sentence if result.failure is not None else "no plan was made"
         raise RuntimeError(f"{observation} gives no plan: {why.rstrip('.')}.")
-    wrong = plan_warning(loaded, found.plan, found.correction)
-    notes = [assumed_deviations(*deviations)] if assumed and found.correction is not None else []
-    moved = "" if found.fitting is None else found.fitting.sentence
-    return loaded, found.plan, [*notes, *filter(None, (moved, wrong))]
+    warning = plan_warning(loaded, result.plan, result.correction)
+    notes = [assumed_deviations(*deviations)] if assumed and result.correction is not None else []
+    moved = "" if result.fitting is None else result.fitting.sentence
+    return loaded, result.plan, [*notes, *filter(None, (moved, warning))]
 
 
 def _by(method: str) -> str:

@@ -1,6 +1,5 @@
 """The commands `apo-bench power rate | pairs | margin | shows`: how many trials it takes, and what so many show."""
 
-import json
 from collections.abc import Mapping
 from typing import Annotated, Any
 
@@ -8,6 +7,8 @@ import typer
 
 from apo_bench.cli.arguments import numbers
 from apo_bench.cli.help_groups import Grouped
+from apo_bench.cli.printing import print_json
+from apo_bench.cli.setting_options import AsJson
 from apo_bench.errors import InputError
 
 _HELP = "How many trials it takes: for a rate, for a difference, for no loss; and what so many can show."
@@ -17,7 +18,7 @@ _QUESTIONS = """How many trials does it take?
   apo-bench power margin --margin 0.03                  to show that a method is not worse by 3 points
   apo-bench power shows --trials 100                    what so many can show"""
 _SCHEMA = "apo-bench/power/1"
-power = typer.Typer(cls=Grouped, rich_markup_mode=None, help=_HELP)
+power = typer.Typer(name="power", cls=Grouped, rich_markup_mode=None, help=_HELP)
 
 _Power = Annotated[float, typer.Option(help="How often it shall be shown if it is so.")]
 _Win = Annotated[float | None, typer.Option(help="Share of the seeds at which the method alone is right.")]
@@ -27,12 +28,6 @@ _Agree = Annotated[
     float | None, typer.Option(help="With --rates: share of the seeds at which both end alike; default: by chance.")
 ]
 _Comparisons = Annotated[int, typer.Option(help="How many such tests the report makes; each is held to its share.")]
-_AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")]
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands to the command line."""
-    app.add_typer(power, name="power")
 
 
 @power.callback(invoke_without_command=True)
@@ -42,11 +37,11 @@ def _without_command(context: typer.Context) -> None:
         typer.echo(_QUESTIONS)
 
 
-@power.command()
-def rate(
+@power.command("rate")
+def power_rate(
     half_width: Annotated[float, typer.Option(help="Half the width that the 95 % interval may have, as 0.05.")],
     rate: Annotated[float, typer.Option(help="The success rate that is expected; 0.5 takes most.")] = 0.5,
-    as_json: _AsJson = False,
+    as_json: AsJson = False,
 ) -> None:
     """Trials for a success rate: until Wilson's 95 % interval is narrow enough."""
     from apo_bench.statistics.power import rate_trials, wilson_half_width
@@ -61,15 +56,15 @@ def rate(
     )
 
 
-@power.command()
-def pairs(
+@power.command("pairs")
+def power_pairs(
     win: _Win = None,
     lose: _Lose = None,
     rates: _Rates = None,
     agree: _Agree = None,
     power: _Power = 0.8,
     comparisons: _Comparisons = 1,
-    as_json: _AsJson = False,
+    as_json: AsJson = False,
 ) -> None:
     """Seeds, met by both methods, until McNemar's exact test shows which one is better."""
     from apo_bench.statistics.power import ERROR, paired_power, paired_trials
@@ -87,15 +82,15 @@ def pairs(
     )
 
 
-@power.command()
-def margin(
+@power.command("margin")
+def power_margin(
     margin: Annotated[float, typer.Option(help="By how much the method may not be worse, as 0.03.")],
     win: _Win = None,
     lose: _Lose = None,
     rates: _Rates = None,
     agree: _Agree = None,
     power: _Power = 0.8,
-    as_json: _AsJson = False,
+    as_json: AsJson = False,
 ) -> None:
     """Seeds, met by both methods, until Tango's 95 % interval shows that one is not worse by a margin."""
     from apo_bench.statistics.power import margin_power, margin_trials
@@ -114,12 +109,12 @@ def margin(
     )
 
 
-@power.command()
-def shows(
+@power.command("shows")
+def power_shows(
     trials: Annotated[int, typer.Option(help="Seeds per cell, the same for every method.")],
     power: _Power = 0.8,
     comparisons: _Comparisons = 1,
-    as_json: _AsJson = False,
+    as_json: AsJson = False,
 ) -> None:
     """What so many trials per cell can show at best."""
     from apo_bench.statistics.power import ERROR, evidence, least_discordant
@@ -161,10 +156,10 @@ def _shares(win: float | None, lose: float | None, rates: str | None, agree: flo
         raise InputError(
             "the shares of wins and losses are not clear; give --win and --lose, or --rates with or without --agree."
         )
-    found = numbers(rates, "--rates")
-    if len(found) != 2:
+    two = numbers(rates, "--rates")
+    if len(two) != 2:
         raise InputError(f"--rates {rates} was given; two numbers are allowed, as 0.95,0.85.")
-    return shares(found[0], found[1], agree)
+    return shares(*two, agree)
 
 
 def _many(n: int, what: str) -> str:
@@ -179,5 +174,8 @@ def _held(comparisons: int) -> str:
     return "" if comparisons == 1 else f", the first of {comparisons} by Holm,"
 
 
-def _say(found: Mapping[str, Any], words: str, as_json: bool) -> None:
-    typer.echo(json.dumps({"schema": _SCHEMA, **found}, allow_nan=False) if as_json else words)
+def _say(answer: Mapping[str, Any], words: str, as_json: bool) -> None:
+    if as_json:
+        print_json({"schema": _SCHEMA, **answer})
+    else:
+        typer.echo(words)

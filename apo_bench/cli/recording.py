@@ -5,33 +5,19 @@ from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.arguments import check_writable, numbers, path_given, whole_numbers
+from apo_bench.cli.arguments import check_outputs, numbers, path_given, whole_numbers, writing
 from apo_bench.cli.help_groups import Grouped
+from apo_bench.cli.printing import print_lines
 from apo_bench.errors import InputError
 
-recording = typer.Typer(cls=Grouped, rich_markup_mode=None, help="Logs of pose trackers.")
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands to the command line."""
-    app.add_typer(recording, name="recording")
-
-
-@recording.callback()
-def _group() -> None:
-    """Logs of pose trackers."""
-
-
-LogArgument = Annotated[Path, typer.Argument(help="The log, or a folder of one file an object.", parser=path_given)]
-FormatOption = Annotated[str, typer.Option("--format", help="csv, bop, tum, ros-csv or ros-json.")]
-CameraOption = Annotated[Path, typer.Option(help="How the log is written, and where its camera stands: .toml.")]
+recording = typer.Typer(name="recording", cls=Grouped, rich_markup_mode=None, help="Logs of pose trackers.")
 
 
 @recording.command("import")
-def import_log(
-    log: LogArgument,
-    form: FormatOption,
-    camera: CameraOption,
+def recording_import(
+    log: Annotated[Path, typer.Argument(help="The log, or a folder of one file an object.", parser=path_given)],
+    form: Annotated[str, typer.Option("--format", help="csv, bop, tum, ros-csv or ros-json.")],
+    camera: Annotated[Path, typer.Option(help="How the log is written, and where its camera stands: .toml.")],
     objects: Annotated[Path, typer.Option(help="Which id is which part, and where its frame lies: .toml.")],
     out: Annotated[Path, typer.Option(help="The observation file: .json, or .csv without starts and covariances.")],
     scenario: Annotated[str | None, typer.Option(help="Of which scenario it is; .json needs one.")] = None,
@@ -48,16 +34,8 @@ def import_log(
     from apo_bench.recording.objects_file import part_tracks, read_objects
     from apo_bench.recording.show.text import reading_lines
 
-    for path, option, endings in (
-        (out, "--out", (".json", ".csv")),
-        (picture, "--picture", (".png",)),
-        (paths, "--paths", (".csv",)),
-    ):
-        if path is not None:
-            check_writable(path, option, endings)
-            for given in (log, camera, objects):
-                if path.exists() and given.exists() and path.samefile(given):
-                    raise InputError(f"{option} {path} is a file that is read; name another, so that it is kept.")
+    outputs = [(out, "--out", (".json", ".csv")), (picture, "--picture", (".png",)), (paths, "--paths", (".csv",))]
+    check_outputs(outputs, (log, camera, objects))
     if scenario is None and (out.suffix.lower() == ".json" or ends or unseen or paths):
         raise InputError(
             "--out .json, --ends, --unseen and --paths need --scenario; give one, or --out FILE.csv alone."
@@ -66,7 +44,7 @@ def import_log(
     named = read_objects(objects)
     read = read_log(log, form, stated.conventions)
     tracks = part_tracks(read, named)
-    _print(reading_lines(read, named))
+    print_lines(reading_lines(read, named))
     if scenario is None:
         _import_bare(read, named, stated, tracks, out, picture)
     else:
@@ -105,9 +83,9 @@ def _import(
     rests = [one.rest for one in found.operations]
     X = found.camera.T_world_camera
     times = {part: track.t for part, track in tracks.items()}
-    _print(camera_lines(found.camera))
+    print_lines(camera_lines(found.camera))
     typer.echo("\n" + "\n".join(rest_lines(list(zip(mains, rests, strict=True)), X, times)) + "\n")
-    _print(imported_lines(found))
+    print_lines(imported_lines(found))
     if out.suffix.lower() == ".json":
         from apo_bench.files.json_forms import observation_form, write_form
 
@@ -136,7 +114,7 @@ def _import_bare(log: Any, objects: Any, camera: Any, tracks: Any, out: Path, pi
     rests = [put.rest for put in found.puts]
     X = found.camera.T_world_camera
     times = {part: track.t for part, track in tracks.items()}
-    _print(camera_lines(found.camera))
+    print_lines(camera_lines(found.camera))
     typer.echo("\n" + "\n".join([*rest_lines(list(zip(parts, rests, strict=True)), X, times), *put_lines(found)]))
     _write(
         out,
@@ -159,13 +137,6 @@ def _stated(ends: str | None, unseen: str | None, operations: int) -> Any:
     return Stated(numbers(ends, "--ends") if ends else (), tuple(k - 1 for k in hidden))
 
 
-def _print(lines: list[tuple[str, str]]) -> None:
-    width = max(len(name) for name, _ in lines)
-    typer.echo("\n".join(f"{name:{width}}  {text}" for name, text in lines))
-
-
 def _write(path: Path, text: str) -> None:
-    try:
+    with writing(f"--out {path}"):
         path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"--out {path} cannot be written ({error.strerror}); choose another place.") from error

@@ -11,24 +11,20 @@ from apo_bench.cli.help_groups import Grouped
 from apo_bench.cli.setting_options import ScenarioArgument
 from apo_bench.errors import InputError
 
-scenario = typer.Typer(cls=Grouped, rich_markup_mode=None, help="Scenarios: list, task cards, new ones, checks.")
-
-
-def register(app: typer.Typer) -> None:
-    """Add the commands to the command line."""
-    app.add_typer(scenario, name="scenario")
-    app.command()(scenarios)
+scenario = typer.Typer(
+    name="scenario", cls=Grouped, rich_markup_mode=None, help="Scenarios: list, task cards, new ones, checks."
+)
 
 
 @scenario.callback(invoke_without_command=True)
 def _without_command(context: typer.Context) -> None:
     """List the scenarios, or read the card of one."""
     if context.invoked_subcommand is None:
-        list_scenarios()
+        scenario_list()
 
 
 @scenario.command("list")
-def list_scenarios() -> None:
+def scenario_list() -> None:
     """List the scenarios that come with the package."""
     from apo_bench.cli.terminal import print_scenarios
     from apo_bench.scenario.file import load_scenario, scenario_names
@@ -36,8 +32,8 @@ def list_scenarios() -> None:
     print_scenarios([load_scenario(name) for name in scenario_names()])
 
 
-@scenario.command()
-def card(scenario: ScenarioArgument) -> None:
+@scenario.command("card")
+def print_card(scenario: ScenarioArgument) -> None:
     """Print the task card of a scenario; the file is checked."""
     from apo_bench.scenario.file import load_scenario
     from apo_bench.show.card import scenario_card
@@ -45,18 +41,18 @@ def card(scenario: ScenarioArgument) -> None:
     typer.echo(scenario_card(load_scenario(scenario)), nl=False)
 
 
-def scenarios(
+def scenarios_command(
     scenario: Annotated[str | None, typer.Argument(help="Print the task card of this one; a name or a file.")] = None,
 ) -> None:
     """List the scenarios that come with the package, or print the task card of one."""
     if scenario is None:
-        list_scenarios()
+        scenario_list()
     else:
-        card(scenario)
+        print_card(scenario)
 
 
-@scenario.command()
-def new(
+@scenario.command("new")
+def scenario_new(
     more: Annotated[list[str] | None, typer.Argument(metavar="[PART]...", help="Further parts, after --parts.")] = None,
     *,
     out: Annotated[Path, typer.Option(help="The scenario file to write, .toml.", parser=path_given)],
@@ -98,20 +94,20 @@ def new(
     if assembly is not None:
         if poses is not None or named:
             raise InputError("--assembly was given with --parts or --poses; give one or the other.")
-        poses, said = import_assembly(assembly, out.with_name(f"{out.stem}_parts"), unit)
-        typer.echo("\n".join([*said, f"Wrote {poses} and its parts"]))
+        poses, lines = import_assembly(assembly, out.with_name(f"{out.stem}_parts"), unit)
+        typer.echo("\n".join([*lines, f"Wrote {poses} and its parts"]))
     elif poses is None:
         raise InputError("neither --assembly nor --poses was given; say where the parts are in the end.")
-    made = draft(on_the_table(read_posed(poses, named), up), fixed or (), clearance)
+    drafted = draft(on_the_table(read_posed(poses, named), up), fixed or (), clearance)
     source = str((assembly or poses).name)
-    out.write_text(scenario_text(made, f"Assembly of {out.stem}", source, out.parent), encoding="utf-8")
-    typer.echo("\n".join(draft_lines(made)))
+    out.write_text(scenario_text(drafted, f"Assembly of {out.stem}", source, out.parent), encoding="utf-8")
+    typer.echo("\n".join(draft_lines(drafted)))
     load_scenario(out)
     typer.echo(f"Wrote {out}; look at it with: apo-bench scenario check {shlex.quote(str(out))}")
 
 
-@scenario.command()
-def check(
+@scenario.command("check")
+def scenario_check(
     file: Annotated[Path, typer.Argument(help="A scenario file.", parser=path_given)],
     seeds: Annotated[int, typer.Option(help="Trials in which the robot knows the truth.")] = 5,
     fidelity: Annotated[str, typer.Option(help="Of these trials: full, or contact.")] = "full",
@@ -119,14 +115,14 @@ def check(
     """Say whether human and robot can do a scenario, and which line of its file to change if not."""
     from apo_bench.drafting.checking import Finding, check_file
     from apo_bench.drafting.text import finding_line
-    from apo_bench.records.settings import check as check_setting
+    from apo_bench.records.settings import check
 
     if not 0 <= seeds <= 1000:
         raise InputError(f"--seeds {seeds} was given; 0 to 1000 are allowed.")
-    check_setting("fidelity", fidelity)
+    check("fidelity", fidelity)
 
-    def say(found: Finding) -> None:
-        typer.echo(finding_line(found))
+    def say(finding: Finding) -> None:
+        typer.echo(finding_line(finding))
 
-    if not all(found.ok for found in check_file(file, seeds, fidelity, say)):
+    if not all(finding.ok for finding in check_file(file, seeds, fidelity, say)):
         raise typer.Exit(NO_RESULT)

@@ -1,6 +1,8 @@
-"""Options of the command line for the settings of a trial, made from what is stated with each."""
+"""Options of the command line for the settings of a trial, made from what is stated with each; and how they complete.
 
-from __future__ import annotations
+When Tab is pressed, a shell is offered names out of short lists and folders, without anything being read. Where none
+begins like what was typed, it offers files, as scenarios, noises and arms may be.
+"""
 
 from collections.abc import Callable, Iterable
 from inspect import Parameter, signature
@@ -10,17 +12,53 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from apo_bench.cli.arguments import numbers, path_given, whole_numbers, words
-from apo_bench.cli.completion import beginning, completion_of, scenarios
+from apo_bench.records.relations import RECOGNISED
 from apo_bench.records.run.replay_command import milli, number
 from apo_bench.records.setting_info import SettingInfo
 from apo_bench.records.settings import LEVEL, SETTINGS
+from apo_bench.records.short_names import FOREIGN_ARMS, METHODS, RELATIONS
+from apo_bench.resources import folder
+
+Completion = Callable[[str], list[str]]
+"""What was typed of a word -> the words that it may become."""
+Command = TypeVar("Command", bound=Callable[..., None])
+
+
+def names_of(what: str) -> list[str]:
+    """Names that a shell is offered for a setting, or `scenario`: what comes with the package, and how others begin."""
+    if what == "scenario":
+        return _stems("scenarios", "*.toml")
+    if what == "noise":
+        from apo_bench.observation.noise import NOISES
+
+        return [*NOISES, *_stems("assets", "noise/*.toml")]
+    if what == "arm":
+        return [SETTINGS["arm"].default, *_stems("assets", "arms/*.toml"), *FOREIGN_ARMS]
+    if what == "relations":
+        return [SETTINGS["relations"].default, *RECOGNISED, *RELATIONS]
+    return [*METHODS, "search"] if what == "method" else [*SETTINGS[what].choices]
+
+
+def completion(what: str) -> Completion:
+    """Names that begin like what was typed, after its last comma."""
+
+    def complete(incomplete: str) -> list[str]:
+        before, comma, last = incomplete.rpartition(",")
+        chosen = before.split(",")
+        return [f"{before}{comma}{name}" for name in names_of(what) if name.startswith(last) and name not in chosen]
+
+    return complete
+
 
 ScenarioArgument = Annotated[
     str,
     typer.Argument(
-        help="A name out of `apo-bench scenarios`, or a scenario file.", autocompletion=beginning(scenarios)
+        help="A name out of `apo-bench scenarios`, or a scenario file.", autocompletion=completion("scenario")
     ),
 ]
+AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")]
+StatedMm = Annotated[float | None, typer.Option(help="Its standard deviation where it states none, mm.")]
+StatedDeg = Annotated[float | None, typer.Option(help="The same in degrees.")]
 CorrectorLimit = Annotated[
     float,
     typer.Option(metavar="SECONDS", help="A corrector given as package.module:name that takes longer has failed."),
@@ -33,17 +71,16 @@ CacheFolder = Annotated[
         help="Keep demonstrations in this folder, for the next time; results are the same.",
     ),
 ]
-Command = TypeVar("Command", bound=Callable[..., None])
 
 
 def takes(options: Iterable[Parameter]) -> Callable[[Command], Command]:
-    """Give a command more options, between its plain and its keyword-only arguments; it gets them as `**asked`."""
+    """Give a command more options, between its plain and its keyword-only arguments; it gets them as `**options`."""
 
     def wrap(command: Command) -> Command:
         own = signature(command, eval_str=True)
-        said = [p for p in own.parameters.values() if p.kind is not Parameter.VAR_KEYWORD]
-        first = [p for p in said if p.kind is not Parameter.KEYWORD_ONLY]
-        vars(command)["__signature__"] = own.replace(parameters=[*first, *options, *said[len(first) :]])
+        parameters = [p for p in own.parameters.values() if p.kind is not Parameter.VAR_KEYWORD]
+        plain = [p for p in parameters if p.kind is not Parameter.KEYWORD_ONLY]
+        vars(command)["__signature__"] = own.replace(parameters=[*plain, *options, *parameters[len(plain) :]])
         return command
 
     return wrap
@@ -80,31 +117,37 @@ def read_axis(info: SettingInfo, text: str) -> tuple[Any, ...]:
 
 def shown_default(info: SettingInfo) -> str:
     """The default of a setting, in the unit of its option."""
-    return info.usual or _shown(info, info.default)
+    return info.usual or _in_option_unit(info, info.default)
 
 
 def _of_trial(info: SettingInfo) -> Parameter:
-    said = f"{info.help}; default: {shown_default(info)}."
+    described = f"{info.help}; default: {shown_default(info)}."
     if info.name == "salt":
-        return _option(info.keyword, Path, said, parser=path_given, metavar="<path>")
+        return _option(info.keyword, Path, described, parser=path_given, metavar="<path>")
     kind = info.kind.__origin__ if hasattr(info.kind, "__origin__") else info.kind
-    return _option(info.keyword, kind, said, autocompletion=completion_of(info))
+    return _option(info.keyword, kind, described, autocompletion=_completion_of(info))
 
 
 def _axis(info: SettingInfo) -> Parameter:
-    usual = ",".join(_shown(info, value) for value in info.swept) or shown_default(info)
-    return _option(
-        axis_option(info),
-        str,
-        f"{info.help}; several with commas; default: {usual}.",
-        autocompletion=completion_of(info),
-    )
+    usual = ",".join(_in_option_unit(info, value) for value in info.swept) or shown_default(info)
+    described = f"{info.help}; several with commas; default: {usual}."
+    return _option(axis_option(info), str, described, autocompletion=_completion_of(info))
 
 
-def _option(name: str, kind: Any, said: str, **more: Any) -> Parameter:
-    annotation = Annotated[kind | None, typer.Option(help=said, **more)]
+def _completion_of(info: SettingInfo) -> Completion | None:
+    """How the value of a setting is completed; None where it is a number."""
+    named = info.choices or info.name in ("noise", "arm", "relations", "method")
+    return completion(info.name) if named else None
+
+
+def _option(name: str, kind: Any, described: str, **more: Any) -> Parameter:
+    annotation = Annotated[kind | None, typer.Option(help=described, **more)]
     return Parameter(name, Parameter.KEYWORD_ONLY, default=None, annotation=annotation)
 
 
-def _shown(info: SettingInfo, value: Any) -> str:
+def _in_option_unit(info: SettingInfo, value: Any) -> str:
     return str(value) if info.is_text else number(milli(value) if info.scale != 1.0 else value)
+
+
+def _stems(where: str, pattern: str) -> list[str]:
+    return sorted(path.stem for path in folder(where).glob(pattern))

@@ -1,4 +1,4 @@
-"""The command `apo-bench show`: a picture of what is believed."""
+"""Two commands to look at things: `apo-bench show | view`, a picture of what is believed, a window to step through."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from apo_bench.assembly.goals import Observation
-from apo_bench.cli.arguments import check_writable
-from apo_bench.cli.setting_options import ScenarioArgument, takes, trial_options
+from apo_bench.cli.arguments import check_writable, path_given
+from apo_bench.cli.setting_options import ScenarioArgument, StatedDeg, StatedMm, takes, trial_options
 from apo_bench.errors import InputError
 from apo_bench.files.deviations import assumed_deviations
 from apo_bench.records.short_names import CORRECTOR
@@ -18,14 +18,14 @@ from apo_bench.scenario.scenario import Scenario
 if TYPE_CHECKING:
     from apo_bench.show.believed_picture import BeliefPanel
 
-
-def register(app: typer.Typer) -> None:
-    """Add the command to the command line."""
-    app.command()(show)
+Port = Annotated[
+    int | None,
+    typer.Option(help="Show it in a browser, at this port of 127.0.0.1; default: a window, or 8080 without a display."),
+]
 
 
 @takes(trial_options("level", "careless", "seed", "noise", "eye"))
-def show(
+def show_command(
     scenario: ScenarioArgument,
     *,
     out: Annotated[Path, typer.Option(help="Draw it into this file: .png.")] = Path("believed.png"),
@@ -34,9 +34,9 @@ def show(
     step: Annotated[int | None, typer.Option(help="After this operation, from 1; default: the last.")] = None,
     method: Annotated[str, typer.Option(help="A corrector, or package.module:name.")] = CORRECTOR,
     observation: Annotated[Path | None, typer.Option(help="Show this observation file instead.")] = None,
-    deviation_mm: Annotated[float | None, typer.Option(help="Its standard deviation where it states none, mm.")] = None,
-    deviation_deg: Annotated[float | None, typer.Option(help="The same in degrees.")] = None,
-    **asked: Any,
+    deviation_mm: StatedMm = None,
+    deviation_deg: StatedDeg = None,
+    **options: Any,
 ) -> None:
     """Draw the believed state: parts where they were seen, and where the corrected motion parameters put them."""
     from apo_bench.scenario.file import load_scenario
@@ -46,49 +46,83 @@ def show(
     check_writable(out, "--out", (".png",))
     loaded = load_scenario(scenario)
     k = _step(len(loaded.assembly), step)
-    deviations = {"deviation_mm": deviation_mm, "deviation_deg": deviation_deg}
-    looked, assumed = looked_at(scenario, observation, asked, deviations)
-    _check_seen(looked, k)
-    panels = [] if corrected and not seen else [belief_panel("as seen", looked, looked.goals, k)]
+    observed, assumed = looked_at(scenario, observation, options, deviation_mm, deviation_deg)
+    _check_seen(observed, k)
+    panels = [] if corrected and not seen else [belief_panel("as seen", observed, observed.goals, k)]
     if corrected or not seen:
-        panels.append(_corrected(loaded, looked, method, k))
+        panels.append(_corrected(loaded, observed, method, k))
     draw_beliefs(loaded, k, panels, out)
-    said = belief_lines(panels)
+    lines = belief_lines(panels)
     if assumed and (corrected or not seen):
-        said.append(assumed_deviations(deviation_mm, deviation_deg))
-    typer.echo("\n".join([*said, f"Wrote {out}"]))
+        lines.append(assumed_deviations(deviation_mm, deviation_deg))
+    typer.echo("\n".join([*lines, f"Wrote {out}"]))
 
 
-def _corrected(scenario: Scenario, looked: Observation, method: str, step: int) -> BeliefPanel:
+def view_command(
+    target: Annotated[
+        str, typer.Argument(metavar="TARGET", help="A scenario, by its name or file, or the folder of a sweep.")
+    ],
+    trial: Annotated[
+        int | None,
+        typer.Option(help="Of a folder: the line of trials.jsonl; default: the first failure."),
+    ] = None,
+    port: Port = None,
+    salt_file: Annotated[
+        Path | None,
+        typer.Option(parser=path_given, metavar="<path>", help="Of a salted sweep, to run it again."),
+    ] = None,
+) -> None:
+    """Look at a scenario, or at a finished trial, which is run again, and step through it; `show` draws files."""
+    from apo_bench.cli.terminal import print_row
+    from apo_bench.scenario.file import load_scenario
+    from apo_bench.show.trial_again import trial_again
+    from apo_bench.show.viewing import choose_place, view
+    from apo_bench.simulation.scene.scene import build_scene
+    from apo_bench.trial.story import scenario_story
+
+    folder = Path(target)
+    if not folder.is_dir():
+        for value, option in ((trial, "--trial"), (salt_file, "--salt-file")):
+            if value is not None:
+                raise InputError(f"{option}, which is for the folder of a sweep, was given for {target}; leave it out.")
+        scenario = load_scenario(target)
+        place = choose_place(port)
+        story = scenario_story(build_scene(scenario))
+    else:
+        place = choose_place(port)
+        row, story = trial_again(folder, trial, salt_file)
+        print_row(row)
+    view(story, place, port, typer.echo)
+
+
+def _corrected(scenario: Scenario, observed: Observation, method: str, step: int) -> BeliefPanel:
     from apo_bench.correction.own_code.own import correct_named
+    from apo_bench.records.method import with_simulated
     from apo_bench.show.believed_picture import belief_panel
     from apo_bench.trial.fitting import fitting_plan
-    from apo_bench.trial.methods import with_simulated
     from apo_bench.trial.plan_warning import plan_warning
 
-    correction = correct_named(looked, with_simulated(method))
+    correction = correct_named(observed, with_simulated(method))
     if not correction.ok:
         raise RuntimeError(
             f"{method} did not correct what was seen: {correction.sentence.rstrip('.')}; --seen draws what was seen."
         )
-    planned = fitting_plan(correction, looked, scenario)
+    planned = fitting_plan(correction, observed, scenario)
     warning = plan_warning(scenario, planned.plan, correction)
-    said = "; ".join(filter(None, (planned.sentence, warning)))
-    return belief_panel(f"corrected by {method}", looked, planned.plan.goals, step, said)
+    notes = "; ".join(filter(None, (planned.sentence, warning)))
+    return belief_panel(f"corrected by {method}", observed, planned.plan.goals, step, notes)
 
 
-def _check_seen(looked: Observation, step: int) -> None:
+def _check_seen(observed: Observation, step: int) -> None:
     """Nothing is known after an operation that was not seen."""
-    missed = int(looked.seen.argmin()) + 1
-    if looked.seen.all() or missed > step:
+    missed = int(observed.seen.argmin()) + 1
+    if observed.seen.all() or missed > step:
         return
     before = f"--seen --step {missed - 1} shows what is known before it" if missed > 1 else "nothing is known before it"
     raise RuntimeError(f"operation {missed} was not seen, so nothing is known after it; {before}.")
 
 
 def _step(operations: int, step: int | None) -> int:
-    if step is None:
-        return operations
-    if not 1 <= step <= operations:
+    if step is not None and not 1 <= step <= operations:
         raise InputError(f"step {step} was given; the scenario has operations 1 to {operations}.")
-    return step
+    return operations if step is None else step

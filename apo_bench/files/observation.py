@@ -48,13 +48,19 @@ def read_observation_file(
     path: str | Path,
     scenario: Scenario | str | Path,
     *,
-    deviation_mm: float = DEVIATION_MM,
-    deviation_deg: float = DEVIATION_DEG,
+    deviation_mm: float | None = None,
+    deviation_deg: float | None = None,
 ) -> ObservationFile:
-    """An observation from a file, with its scenario, and whether a standard deviation had to be assumed."""
+    """An observation from a file, with its scenario, and whether a standard deviation had to be assumed.
+
+    Args:
+        deviation_mm, deviation_deg: As in `read_observation`; None stands for the default.
+    """
     from apo_bench.files import json_reading
     from apo_bench.scenario.file import load_scenario
 
+    deviation_mm = DEVIATION_MM if deviation_mm is None else deviation_mm
+    deviation_deg = DEVIATION_DEG if deviation_deg is None else deviation_deg
     check_deviations(deviation_mm, deviation_deg)
     if not isinstance(path, str | Path):
         raise InputError(f"{path!r} was given as an observation; give the path of a .csv or .json file.")

@@ -60,12 +60,6 @@ def give_up(error: OSError) -> str:
     return f"standard output could not be written ({error.strerror or error}); what was not printed is lost."
 
 
-def broken_pipe(error: SystemExit) -> OSError | None:
-    """What the command line library ends a process for without a word; None if it ends for another reason."""
-    found = error.__context__
-    return found if isinstance(found, OSError) else None
-
-
 def _lead_nowhere(number: int) -> None:
     nowhere = os.open(os.devnull, os.O_RDWR)
     if nowhere != number:

@@ -1,9 +1,10 @@
 """What a method is called: what the robot is told to do, and whether it feels for holes while it does that."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from apo_bench.errors import InputError, unknown
-from apo_bench.records.short_names import LOOKING, METHODS, UNCORRECTED
+from apo_bench.names import resolve
+from apo_bench.records.short_names import LOOKING, METHODS, SIMULATED, UNCORRECTED
 
 _SEARCH = "search"
 """What was seen, carried out by a robot that feels for holes; after a `+` the same for any other method."""
@@ -61,6 +62,12 @@ def knows_relations(method: str) -> bool:
 def may_look(method: str) -> bool:
     """Whether a method can ask to see operations again."""
     return parsed(method).plan in LOOKING
+
+
+def with_simulated(corrector: Any) -> Any:
+    """What to pass to `correct`: the function, where a name stands for a corrector that needs a simulator."""
+    known = isinstance(corrector, str) and corrector in SIMULATED
+    return resolve(corrector, SIMULATED, "corrector") if known else corrector
 
 
 def is_own(method: object) -> bool:

@@ -13,7 +13,7 @@ from apo_bench.errors import InputError
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.relations import make_relations
 from apo_bench.records.limits import CORRECTOR_LIMIT_S
-from apo_bench.records.method import parsed
+from apo_bench.records.method import parsed, with_simulated
 from apo_bench.records.relations import RECOGNISED
 from apo_bench.records.settings import level_pair
 from apo_bench.scenario.file import load_scenario
@@ -21,7 +21,6 @@ from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps.grid import SweepSettings
 from apo_bench.trial.fingerprint import content_hash, noise_content, own_content
-from apo_bench.trial.methods import with_simulated
 
 _PACKAGES = (
     *("apo_bench", "mujoco", "dm-control", "mink", "daqp", "gymnasium"),

@@ -10,11 +10,11 @@ from apo_bench.assembly.goals import Observation, Plan
 from apo_bench.assembly.reached import Outcome
 from apo_bench.correction.own_code.own import correct_named
 from apo_bench.geometry.arrays import Array
+from apo_bench.records.method import with_simulated
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.by_heart import goals_by_heart
 from apo_bench.trial.fitting import FittingPlan, fitting_plan
-from apo_bench.trial.methods import with_simulated
 from apo_bench.trial.stages import observation_failure
 
 

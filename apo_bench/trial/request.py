@@ -25,7 +25,7 @@ from apo_bench.trial.stages import (
 )
 from apo_bench.trial.trial import noise_of
 
-DRAWN = (
+_DRAWN = (
     LEVEL.name,
     "level_mm",
     "level_deg",
@@ -47,7 +47,7 @@ class Request:
     """One replay."""
 
     scenario: str
-    asked: Mapping[str, Any] = field(default_factory=dict)
+    options: Mapping[str, Any] = field(default_factory=dict)
     """Option as an argument (`level`, `clearance`, `salt_file`, ...) -> value; what is not there or None is as usual.
     """
     observation: Path | None = None
@@ -68,39 +68,41 @@ def requested_settings(request: Request, clearance_mm: float) -> TrialSettings:
     Raises:
         InputError: A setting that is not allowed, or two that contradict each other.
     """
-    asked = {name: value for name, value in request.asked.items() if value is not None}
+    options = {name: value for name, value in request.options.items() if value is not None}
     if request.observation:
-        _refuse_contradictions(request, asked)
+        _refuse_contradictions(request, options)
     for name in ("noise", "level_deg"):
-        if asked.get("eye") == RANGE and name in asked:
+        if options.get("eye") == RANGE and name in options:
             raise InputError(
                 f"{_option(name)} was given together with --eye range, which draws no pose noise; "
                 "--level is the noise of its rays in mm."
             )
     usual: dict[str, Any] = {"scenario": request.scenario, "clearance_mm": clearance_mm}
-    if "level" in asked:
-        usual |= dict.fromkeys(("level_mm", "level_deg"), asked.pop("level"))
-    if "salt_file" in asked:
-        asked["salt_file"] = read_salt(asked["salt_file"])
-    return TrialSettings(**(usual | in_python(asked)))
+    if "level" in options:
+        usual |= dict.fromkeys(("level_mm", "level_deg"), options.pop("level"))
+    if "salt_file" in options:
+        options["salt_file"] = read_salt(options["salt_file"])
+    return TrialSettings(**(usual | in_python(options)))
 
 
 def looked_at(
     scenario: str,
     observation: Path | None,
-    asked: Mapping[str, Any],
-    deviations: Mapping[str, float | None],
+    options: Mapping[str, Any],
+    deviation_mm: float | None,
+    deviation_deg: float | None,
 ) -> tuple[Observation, bool]:
     """What is seen of a trial, or stands in a file, and whether standard deviations had to be assumed.
 
     Args:
-        asked: What only a trial knows: level, seed, noise and so on, as in `Request`.
-        deviations: What only a file may need: `deviation_mm` and `deviation_deg`.
+        options: What only a trial knows: level, seed, noise and so on, as in `Request`.
+        deviation_mm, deviation_deg: What only a file may need.
 
     Raises:
         InputError: One of the two was given with the other, or something is not allowed.
     """
-    refused, reason = (deviations, "is for files") if observation is None else (asked, "draws a trial")
+    of_file = {"deviation_mm": deviation_mm, "deviation_deg": deviation_deg}
+    refused, reason = (of_file, "is for files") if observation is None else (options, "draws a trial")
     for name, value in refused.items():
         if value is not None:
             where = "without" if observation is None else "together with"
@@ -108,11 +110,12 @@ def looked_at(
                 f"{_option(name)}, which {reason}, was given {where} --observation; leave one of them out."
             )
     if observation is None:
-        return watched(Request(scenario, asked)), False
+        return watched(Request(scenario, options)), False
     from apo_bench.files.observation import read_observation_file
 
-    stated = {name: value for name, value in deviations.items() if value is not None}
-    seen, _, assumed = read_observation_file(observation, scenario, **stated)
+    seen, _, assumed = read_observation_file(
+        observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg
+    )
     return seen, assumed
 
 
@@ -137,11 +140,11 @@ def look(spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration) -
     return observe_demonstration(simulated, noise_of(spec, scene, simulated), spec.seed, spec.salt)
 
 
-def _refuse_contradictions(request: Request, asked: Mapping[str, Any]) -> None:
-    may_be = asked.get("relations") in ("given", *RECOGNISED)
-    given = [name for name in DRAWN if name in asked and not (name == "relations" and may_be)]
-    more = [name for name in ("save_observation", "cache") if getattr(request, name) is not None]
-    for name in (*given, *more):
+def _refuse_contradictions(request: Request, options: Mapping[str, Any]) -> None:
+    may_be = options.get("relations") in ("given", *RECOGNISED)
+    drawn = [name for name in _DRAWN if name in options and not (name == "relations" and may_be)]
+    files = [name for name in ("save_observation", "cache") if getattr(request, name) is not None]
+    for name in (*drawn, *files):
         raise InputError(
             f"{_option(name)} was given together with --observation, which draws nothing; leave one of them out."
         )

@@ -36,7 +36,7 @@ class Story:
     """What they are called, such as `as seen` -> (n, 4, 4), world frame, [m]."""
 
 
-def asked_for(scene: Scene) -> Story:
+def scenario_story(scene: Scene) -> Story:
     """What a scenario asks for, operation by operation."""
     layout = layout_at(scene.scenario, 0.0, 0.0, 0.0, clearance_mm=scene.clearance_mm)
     chapter = stages(scene, layout.start, layout.goals)

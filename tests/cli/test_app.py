@@ -141,9 +141,9 @@ def test_a_scene_is_one_file_that_mujoco_opens(capsys: pytest.CaptureFixture[str
 def test_the_method_that_is_not_named_is_the_same_everywhere() -> None:
     from inspect import signature
 
-    from apo_bench.cli.correction import correct as correct_command
+    from apo_bench.cli.correction import correct_command
     from apo_bench.cli.setting_options import trial_options
-    from apo_bench.cli.show import show
+    from apo_bench.cli.show import show_command
     from apo_bench.correction.correctors import correct
     from apo_bench.envs.corrected import Corrected
     from apo_bench.records.settings import TrialSettings
@@ -153,7 +153,7 @@ def test_the_method_that_is_not_named_is_the_same_everywhere() -> None:
     asked = signature(correct_command, eval_str=True).parameters["method"]
     assert asked.default is None
     assert f"default: {CORRECTOR}," in asked.annotation.__metadata__[0].help
-    commands = [signature(show).parameters["method"].default]
+    commands = [signature(show_command).parameters["method"].default]
     doors = [signature(door).parameters["corrector"].default for door in (Corrected, correct)]
     assert {*commands, *doors, TrialSettings("").method} == {CORRECTOR}
     assert CORRECTOR in SweepSettings(("stick_in_tower",)).methods

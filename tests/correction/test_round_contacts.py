@@ -24,8 +24,8 @@ from apo_bench.correction.play import fit_covariance
 from apo_bench.correction.region import contains_truth
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
+from apo_bench.records.method import with_simulated
 from apo_bench.show.explain_text import sentences
-from apo_bench.trial.methods import with_simulated
 from tests.correction.robust.test_robust import shown
 from tests.round_contacts import CONTACTS, IN_BORE, LYING, MM, PLATE_AT, scene, seen, tilted, touching
 from tests.shipped import BOXES

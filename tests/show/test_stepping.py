@@ -21,12 +21,12 @@ from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import initial_state
 from apo_bench.sweeps.grid import SweepSettings
 from apo_bench.sweeps.sweep import run_sweep
-from apo_bench.trial.story import AS_CORRECTED, AS_SEEN, AS_TRUE, Story, asked_for
+from apo_bench.trial.story import AS_CORRECTED, AS_SEEN, AS_TRUE, Story, scenario_story
 
 
 def with_goals(scene: Scene) -> Story:
     """What the tower asks for, as if it had been seen 1 cm aside."""
-    story = asked_for(scene)
+    story = scenario_story(scene)
     true = scene.scenario.goals
     aside = np.array(true)
     aside[:, 0, 3] += 0.01
@@ -34,7 +34,7 @@ def with_goals(scene: Scene) -> Story:
 
 
 def test_a_scenario_is_stepped_through_operation_by_operation(tower: Scene) -> None:
-    cursor = Cursor(asked_for(tower))
+    cursor = Cursor(scenario_story(tower))
     assembly = tower.scenario.assembly
     assert cursor.still().faces == ()
     seen = []
@@ -89,7 +89,7 @@ def test_shapes_are_as_large_as_what_they_stand_for(tower: Scene) -> None:
         points = np.concatenate([shape.vertices for shape in part_shapes(tower.work, part)])
         bounds = tower.scenario.assembly.solids[part].bounds
         np.testing.assert_allclose([points.min(axis=0), points.max(axis=0)], bounds, atol=5e-4)  # the clearance
-    chapter = asked_for(tower).chapters[0]
+    chapter = scenario_story(tower).chapters[0]
     data = initial_state(tower.work, chapter.start)
     show_moment(tower, data, chapter, chapter.moments[-1])
     poses = body_poses(tower, data)

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import json
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from apo_bench.cli.arguments import NO_RESULT, check_writable
-from apo_bench.cli.help_groups import GroupedOptions
+from apo_bench.cli.arguments import NO_RESULT, check_outputs
+from apo_bench.cli.printing import print_json
 from apo_bench.cli.setting_options import CacheFolder, CorrectorLimit, ScenarioArgument, takes, trial_options
-from apo_bench.cli.sweep_command import interrupted
-from apo_bench.cli.view import Port
+from apo_bench.cli.show import Port
+from apo_bench.cli.sweep import interrupted
 from apo_bench.errors import InputError
 from apo_bench.io.output import redirect_output
 from apo_bench.records.limits import CORRECTOR_LIMIT_S
@@ -22,13 +21,8 @@ if TYPE_CHECKING:
     from apo_bench.trial.story import Story
 
 
-def register(app: typer.Typer) -> None:
-    """Add the command to the command line."""
-    app.command(cls=GroupedOptions)(replay)
-
-
 @takes(trial_options())
-def replay(
+def replay_command(
     scenario: ScenarioArgument,
     *,
     observation: Annotated[Path | None, typer.Option(help="Replay this observation file instead.")] = None,
@@ -43,19 +37,14 @@ def replay(
     view: Annotated[bool, typer.Option("--view", help="Then look at it and step through it, as `view` does.")] = False,
     port: Port = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the row, one JSON object, and nothing else.")] = False,
-    **asked: Any,
+    **options: Any,
 ) -> None:
     """Run one trial: demonstrate, observe, plan by a method, replay, judge."""
     from apo_bench.cli.terminal import print_row
     from apo_bench.trial.request import Request
     from apo_bench.trial.run_request import run_request
 
-    for path, option, endings in (
-        (video, "--video", (".mp4", ".gif")),
-        (save_observation, "--save-observation", (".json",)),
-    ):
-        if path is not None:
-            check_writable(path, option, endings)
+    check_outputs([(video, "--video", (".mp4", ".gif")), (save_observation, "--save-observation", (".json",))])
     if view:
         from apo_bench.show.viewing import choose_place
 
@@ -66,7 +55,7 @@ def replay(
         raise InputError("--view was given together with --trial-limit; leave one of them out.")
     request = Request(
         scenario=scenario,
-        asked=asked,
+        options=options,
         observation=observation,
         save_observation=save_observation,
         video=video,
@@ -85,7 +74,7 @@ def replay(
     except KeyboardInterrupt as error:
         raise interrupted(error) from error
     if as_json:
-        typer.echo(json.dumps(row, allow_nan=False))
+        print_json(row)
     else:
         print_row(row)
     if video is not None and row["sim_seconds"] is None:
@@ -95,8 +84,8 @@ def replay(
     if view and not stories:
         typer.echo("apo-bench: nothing was replayed, so there is nothing to view.", err=True)
     elif view:
-        from apo_bench.show.viewing import view as look_at
+        from apo_bench.show import viewing
 
-        look_at(stories[0], place, port, partial(typer.echo, err=as_json))
+        viewing.view(stories[0], place, port, partial(typer.echo, err=as_json))
     if row["success"] is None:
         raise typer.Exit(NO_RESULT)

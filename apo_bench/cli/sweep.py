@@ -12,14 +12,12 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from apo_bench.cli.arguments import cores, path_given
-from apo_bench.cli.completion import beginning
-from apo_bench.cli.completion import scenarios as completed_scenarios
-from apo_bench.cli.help_groups import GroupedOptions
 from apo_bench.cli.setting_options import (
     CacheFolder,
     CorrectorLimit,
     axis_flag,
     axis_option,
+    completion,
     read_axis,
     sweep_options,
     takes,
@@ -46,22 +44,17 @@ class Interrupted(Exception):
 def interrupted(error: KeyboardInterrupt, more: str = "") -> Interrupted:
     """What a command says that a signal has ended, with its exit code: 128 and the number of the signal."""
     number = int(getattr(error, "number", signal.SIGINT))
-    said = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
-    return Interrupted(f"{said}{more}.", _KILLED + number)
-
-
-def register(app: typer.Typer) -> None:
-    """Add the command to the command line."""
-    app.command(cls=GroupedOptions)(sweep)
+    how = "interrupted" if number == signal.SIGINT else f"ended by {signal.Signals(number).name}"
+    return Interrupted(f"{how}{more}.", _KILLED + number)
 
 
 @takes(sweep_options())
-def sweep(
+def sweep_command(
     scenarios: Annotated[
         list[str],
         typer.Argument(
             help="Names, scenario files, or one sweep file.",
-            autocompletion=beginning(completed_scenarios),
+            autocompletion=completion("scenario"),
         ),
     ],
     out: Annotated[
@@ -91,20 +84,21 @@ def sweep(
     cache: CacheFolder = None,
     backend: Annotated[str, typer.Option(help="local, or ray for a cluster.")] = "local",
     address: Annotated[str | None, typer.Option(help="Of the Ray cluster, host:port.")] = None,
-    **asked: Any,
+    **options: Any,
 ) -> None:
     """Run every combination, or the grids of a file, and print success rates with Wilson 95 % intervals."""
     from apo_bench.cli.terminal import print_cells, print_prediction
     from apo_bench.statistics.rates import tally
     from apo_bench.sweeps.sweep import run_sweep
 
-    said = {**asked, "trials": trials, "seed": seed}
-    grids = _grids(scenarios, {name: value for name, value in said.items() if value is not None})
+    options |= {"trials": trials, "seed": seed}
+    grids = _grids(scenarios, {name: value for name, value in options.items() if value is not None})
     used = cores() if workers is None and backend == "local" else workers
     command = shlex.join(["apo-bench", *sys.argv[1:]])
     try:
         rows = run_sweep(
-            *(grids, out),
+            grids,
+            out,
             workers=used,
             limit_s=trial_limit,
             corrector_limit_s=corrector_limit,
@@ -123,24 +117,24 @@ def sweep(
     )
 
 
-def _grids(scenarios: list[str], said: Mapping[str, Any]) -> tuple[SweepSettings, ...]:
+def _grids(scenarios: list[str], options: Mapping[str, Any]) -> tuple[SweepSettings, ...]:
     """The grid of the options, or those of a sweep file with some settings replaced."""
     from apo_bench.sweeps.grid import AXES, SweepSettings
     from apo_bench.sweeps.sweep_file import is_sweep_file, read_sweep
 
     axes = {axis_option(info): info for info in AXES}
-    given = {axes[option]: text for option, text in said.items() if option in axes}
-    others = {name: value for name, value in said.items() if name not in axes}
+    texts = {axes[option]: text for option, text in options.items() if option in axes}
+    others = {name: value for name, value in options.items() if name not in axes}
     files = [name for name in scenarios if is_sweep_file(name)]
     if not files:
-        several: dict[str, Any] = {info.axis: read_axis(info, text) for info, text in given.items()}
+        several: dict[str, Any] = {info.axis: read_axis(info, text) for info, text in texts.items()}
         return (SweepSettings(tuple(scenarios), **several, **in_python(others)),)
     if len(scenarios) > 1:
         raise InputError(
             f"the sweep file {files[0]} was given together with {len(scenarios) - 1} more; name scenarios in the file, "
             "and run one file at a time."
         )
-    for info in given:
+    for info in texts:
         raise InputError(
             f"{axis_flag(info)} was given together with the sweep file {files[0]}; write {info.axis} into the file."
         )
