@@ -1,1 +1,27 @@
-"""The environments for Gymnasium."""
+"""The environments for Gymnasium, and for `dm_env`."""
+
+from typing import TYPE_CHECKING, Any
+
+from apo_bench.errors import InputError
+
+if TYPE_CHECKING:
+    import gymnasium
+
+
+def to_dm_env(env: "gymnasium.Env[Any, Any]", *, seed: int | None = None) -> Any:
+    """The environment as a `dm_env.Environment`.
+
+    Args:
+        env: As `gymnasium.make("APOReplay-v0")` made it.
+        seed: Of the first episode; the others follow from it, as with `env.reset(seed=seed)` and `env.reset()`.
+
+    Raises:
+        InputError: The package dm-env is not installed.
+    """
+    try:
+        from apo_bench.envs.dm_adapter import DmAdapter
+    except ImportError as error:
+        if error.name != "dm_env":
+            raise
+        raise InputError("to_dm_env needs the package dm-env; install it with: pip install dm-env") from error
+    return DmAdapter(env, seed)

@@ -1,0 +1,109 @@
+"""The environment through `dm_env`: the tests of that interface, the trials of Gymnasium, and dm_control's wrappers."""
+
+import sys
+import unittest
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium import spaces
+
+import apo_bench
+from apo_bench.envs import to_dm_env
+
+dm_env = pytest.importorskip("dm_env")
+from dm_env import specs, test_utils  # noqa: E402
+
+
+def short() -> gymnasium.Env[Any, Any]:
+    return gymnasium.make("APOReplay-v0", scenario="block_on_block", level=0.0, careless=0.0, grasp="weld")
+
+
+class TestInterface(test_utils.EnvironmentTestMixin, unittest.TestCase):
+    """Those of dm_env itself."""
+
+    def make_object_under_test(self) -> Any:
+        return to_dm_env(short(), seed=3)
+
+    def make_action_sequence(self) -> Any:
+        for _ in range(3):
+            yield np.zeros(self.environment.action_spec().shape)
+
+
+def test_a_seed_is_the_same_trial_as_in_gymnasium() -> None:
+    env = short()
+    observation, _ = env.reset(seed=5)
+    first = to_dm_env(short(), seed=5).reset()
+    assert first.first()
+    assert {key: value.tobytes() for key, value in first.observation.items()} == {
+        key: np.asarray(value).tobytes() for key, value in observation.items()
+    }
+
+
+def test_one_step_is_one_replay_and_the_next_one_resets() -> None:
+    env = to_dm_env(short(), seed=1)
+    env.reset()
+    last = env.step(np.zeros(env.action_spec().shape))
+    assert (last.last(), last.reward, last.discount) == (True, 1.0, 0.0)
+    assert env.info["is_success"] is True
+    again = env.step(np.zeros(env.action_spec().shape))
+    assert (again.first(), again.reward) == (True, None)
+    env.close()
+
+
+def test_specs_are_the_spaces() -> None:
+    env = short()
+    adapted = to_dm_env(env)
+    seen = adapted.observation_spec()
+    assert set(seen) == set(env.observation_space)
+    for name, spec in seen.items():
+        assert isinstance(spec, specs.BoundedArray)
+        assert spec.shape == env.observation_space[name].shape
+    np.testing.assert_array_equal(adapted.action_spec().maximum, env.action_space.high)
+
+
+def test_it_runs_in_wrappers_of_dm_control() -> None:
+    action_scale = pytest.importorskip("dm_control.suite.wrappers.action_scale")
+    env = action_scale.Wrapper(to_dm_env(short(), seed=2), minimum=-1.0, maximum=1.0)
+    assert env.action_spec().maximum.max() == 1.0
+    step = env.reset()
+    steps = 0
+    while not step.last():
+        step = env.step(np.zeros(env.action_spec().shape))
+        steps += 1
+    assert (steps, step.reward) == (1, 1.0)
+
+
+def test_truncation_is_no_failure() -> None:
+    """An episode that is cut off keeps its discount, so that a learner does not take it for an end."""
+    env = to_dm_env(gymnasium.wrappers.TimeLimit(_Endless(), max_episode_steps=2))
+    env.reset()
+    assert env.step(np.zeros(1)).mid()
+    last = env.step(np.zeros(1))
+    assert (last.last(), last.discount) == (True, 1.0)
+
+
+def test_spaces_that_are_not_known_are_named() -> None:
+    env = _Endless()
+    env.action_space = spaces.Text(3)
+    with pytest.raises(TypeError, match=r"action: Text was given; Dict, Box and MultiBinary are known\."):
+        to_dm_env(env).action_spec()
+
+
+def test_without_dm_env_it_says_what_to_install(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "dm_env", None)
+    monkeypatch.delitem(sys.modules, "apo_bench.envs.dm_adapter", raising=False)
+    with pytest.raises(apo_bench.InputError, match="pip install dm-env"):
+        to_dm_env(_Endless())
+
+
+class _Endless(gymnasium.Env[Any, Any]):
+    observation_space = spaces.Box(-1.0, 1.0, (1,))
+    action_space = spaces.Box(-1.0, 1.0, (1,))
+
+    def reset(self, *, seed: int | None = None, options: Any = None) -> Any:
+        return np.zeros(1, dtype=np.float32), {}
+
+    def step(self, action: Any) -> Any:
+        return np.zeros(1, dtype=np.float32), 0.0, False, False, {}
