@@ -18,9 +18,9 @@ import venv
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-EXTRAS = ("fast",)
+EXTRAS = ("fast", "dm")
 """Of the optional dependencies these are tried too."""
-BOUND = re.compile(r"([A-Za-z0-9._-]+)(?:\[[^]]*\])?>=([0-9][0-9.]*)(?:,<[0-9.]+)?")
+BOUND = re.compile(r"([A-Za-z0-9._-]+)(?:\[[^]]*\])?>=([0-9][0-9.]*)(?:,<[0-9.]+)?(?:; .*)?")
 IMPORT = """
 import importlib, pkgutil, sys, apo_bench
 assert apo_bench.__file__.startswith(sys.prefix), apo_bench.__file__

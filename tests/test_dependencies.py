@@ -10,13 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.lowest import lowest
+from benchmarks.lowest import EXTRAS, lowest
 
 ROOT = Path(__file__).parent.parent
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 BROUGHT = {"glfw": "mujoco", "OCP": "build123d", "PIL": "imageio"}
 """What a dependency needs itself whenever we do: its viewer and its renderer without EGL; its kernel;
 its pictures."""
+ALONGSIDE = {"dm_control"}
+"""Stated and not imported: for who works with it and `to_dm_env`, where it installs."""
 
 
 def imported() -> set[str]:
@@ -40,19 +42,21 @@ def stated(*lists: list[str]) -> set[str]:
 
 def test_what_is_imported_is_stated_and_what_is_stated_is_imported() -> None:
     extras = PROJECT["optional-dependencies"]
-    optional = stated(*(extras[name] for name in ("fast", "cad", "ray", "view")))
-    assert stated(PROJECT["dependencies"]) == imported() - optional - set(BROUGHT)
+    optional = stated(*(extras[name] for name in ("fast", "cad", "ray", "view", "dm")))
+    assert stated(PROJECT["dependencies"]) - ALONGSIDE == imported() - optional - set(BROUGHT)
     assert optional <= imported() | {BROUGHT[each] for each in set(BROUGHT) & imported()}
     assert {*BROUGHT.values()} <= stated(PROJECT["dependencies"]) | optional
 
 
 def test_every_dependency_says_from_which_version_on_it_works(tmp_path: Path) -> None:
     assert "scipy==1.16" in lowest(ROOT / "pyproject.toml")
-    assert len(lowest(ROOT / "pyproject.toml")) == len(PROJECT["dependencies"]) + len(
-        PROJECT["optional-dependencies"]["fast"]
+    assert len(lowest(ROOT / "pyproject.toml")) == len(PROJECT["dependencies"]) + sum(
+        len(PROJECT["optional-dependencies"][extra]) for extra in EXTRAS
     )
     path = tmp_path / "pyproject.toml"
-    path.write_text('[project]\ndependencies = ["a>=1.2,<3", "b[c]>=4", "d"]\noptional-dependencies = {fast = []}\n')
+    path.write_text(
+        '[project]\ndependencies = ["a>=1.2,<3", "b[c]>=4", "d"]\noptional-dependencies = {fast = [], dm = []}\n'
+    )
     with pytest.raises(ValueError, match="'d' states no version"):
         lowest(path)
     path.write_text(path.read_text().replace(', "d"', ""))
