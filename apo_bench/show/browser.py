@@ -13,8 +13,8 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.show.stepping import COLOR_NAMES, COLORS, FACES, Cursor
-from apo_bench.simulation.film.film import AZIMUTH_DEG, ELEVATION_DEG, framing
-from apo_bench.simulation.film.shapes import Shape, body_poses, part_shapes, shapes
+from apo_bench.simulation.film.film import FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG, framing
+from apo_bench.simulation.film.meshes import BodyMesh, body_meshes, body_poses, part_meshes
 from apo_bench.simulation.film.still import GHOST_OPACITY, HAND_COLOR, HAND_M, Ghost, label_place, show_moment
 from apo_bench.simulation.scene.world import initial_state
 from apo_bench.trial.story import Story
@@ -136,7 +136,7 @@ class Page:
         self._bodies = [server.scene.add_frame(f"/bodies/{i}", show_axes=False) for i in bodies]
         meshes = [
             (shape.part, _add(server, f"/bodies/{shape.body}/{i}", shape, shape.rgba[:3], shape.rgba[3]))
-            for i, shape in enumerate(shapes(world))
+            for i, shape in enumerate(body_meshes(world))
         ]
         self._arm = [mesh for part, mesh in meshes if part is None]
         self._hands = [
@@ -146,7 +146,7 @@ class Page:
         self._ghosts = {
             (name, part): [
                 _add(server, f"/goals/{name}/{part}/{i}", shape, COLORS[name], GHOST_OPACITY, _GHOST_SCALE)
-                for i, shape in enumerate(part_shapes(world, part))
+                for i, shape in enumerate(part_meshes(world, part))
             ]
             for name in story.goals
             for part in world.free
@@ -217,7 +217,7 @@ def _server(port: int) -> Any:
         ) from error
 
 
-def _add(server: Any, name: str, shape: Shape, color: tuple[float, ...], opacity: float, scale: float = 1.0) -> Any:
+def _add(server: Any, name: str, shape: BodyMesh, color: tuple[float, ...], opacity: float, scale: float = 1.0) -> Any:
     return server.scene.add_mesh_simple(
         name,
         shape.vertices.astype(np.float32),
@@ -231,6 +231,6 @@ def _add(server: Any, name: str, shape: Shape, color: tuple[float, ...], opacity
 
 def _forwards() -> Array:
     """Where the camera looks, unit vector, (3,)."""
-    azimuth, elevation = np.radians([AZIMUTH_DEG, ELEVATION_DEG])
+    azimuth, elevation = np.radians([FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG])
     flat = np.cos(elevation)
     return np.array([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)])

@@ -10,7 +10,7 @@ from apo_bench.assembly.topology import PartFace
 from apo_bench.geometry import pose
 from apo_bench.simulation.film.film import operation_words
 from apo_bench.simulation.film.still import Color, Ghost, Still, part_poses
-from apo_bench.simulation.film.track import Chapter, Moment
+from apo_bench.simulation.film.track import Chapter, FilmMoment
 from apo_bench.trial.story import AS_CORRECTED, AS_SEEN, AS_TRUE, Story
 
 Faces = Literal["none", "this operation", "all"]
@@ -39,7 +39,7 @@ class Cursor:
         return self.story.chapters[self.chapter]
 
     @property
-    def at(self) -> Moment:
+    def at(self) -> FilmMoment:
         return self.shown.moments[self.moment]
 
     def still(self) -> Still:

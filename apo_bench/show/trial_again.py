@@ -14,7 +14,7 @@ from apo_bench.records.run.run_file import read_run
 from apo_bench.records.salt import read_salt
 from apo_bench.records.setting_columns import settings_of
 from apo_bench.report.run_facts import scenario_files
-from apo_bench.simulation.film.track import Track
+from apo_bench.simulation.film.track import FilmTrack
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.scene import scene_of
 from apo_bench.trial.stages import observe_demonstration, simulate_demonstration
@@ -49,7 +49,7 @@ def trial_again(folder: Path, number: int | None, salt_file: Path | None = None)
         why = "its salt was not given; name its file by --salt-file" if secret else "other code or assets made it"
         raise RuntimeError(f"trial {number} of {folder} cannot be run again: {why}.")
     simulated = simulate_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
-    track = Track()
+    track = FilmTrack()
     again = run_trial(spec, scene, simulated=simulated, content=content, watch=track.hooks)
     if again["sim_seconds"] is None:
         raise RuntimeError(f"in trial {number} nothing was replayed: {again['sentence']}.")

@@ -1,7 +1,5 @@
 """One list of hooks: what is called while hands demonstrate or a robot replays. Whoever is called changes nothing."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, final

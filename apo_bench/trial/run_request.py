@@ -18,7 +18,7 @@ from apo_bench.scenario.scenario import Scenario
 from apo_bench.scenario.starts import in_the_air
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.film.film import write_film
-from apo_bench.simulation.film.track import Track
+from apo_bench.simulation.film.track import FilmTrack
 from apo_bench.simulation.scene.graphics import renderer
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.failed_row import lost, trial_row
@@ -79,7 +79,7 @@ def work_on(request: Request, spec: TrialSettings, say: Say, show: Show | None =
 def _run_by(method: Any, request: Request, spec: TrialSettings, say: Say, show: Show | None) -> None:
     scene = scene_of(spec)
     simulated = None
-    track = Track() if request.video or show else None
+    track = FilmTrack() if request.video or show else None
     watch = None if track is None else track.hooks
     if request.video:
         renderer(scene.work.model, 16, 12).close()  # is there anything to draw with? asked before the trial is run

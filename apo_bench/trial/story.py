@@ -13,8 +13,8 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.records.row import Row
 from apo_bench.records.settings import RANGE, TrialSettings
 from apo_bench.scenario.layout import layout_at
-from apo_bench.simulation.film.still import stages
-from apo_bench.simulation.film.track import Chapter, Track
+from apo_bench.simulation.film.still import scenario_chapter
+from apo_bench.simulation.film.track import Chapter, FilmTrack
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.stages import SimulatedDemonstration, watch_again
 
@@ -39,7 +39,7 @@ class Story:
 def scenario_story(scene: Scene) -> Story:
     """What a scenario asks for, operation by operation."""
     layout = layout_at(scene.scenario, 0.0, 0.0, 0.0, clearance_mm=scene.clearance_mm)
-    chapter = stages(scene, layout.start, layout.goals)
+    chapter = scenario_chapter(scene, layout.start, layout.goals)
     return Story(scene, (chapter,), placements(scene.scenario.assembly, layout.start, layout.goals)[-1])
 
 
@@ -47,7 +47,7 @@ def told(
     spec: TrialSettings,
     scene: Scene,
     seen: Observation,
-    track: Track,
+    track: FilmTrack,
     row: Row,
     simulated: SimulatedDemonstration | None = None,
 ) -> Story:
@@ -92,7 +92,7 @@ def ending(row: Row) -> str:
 
 
 def _demonstration(spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration) -> Chapter:
-    track = Track()
+    track = FilmTrack()
     watch_again(scene, simulated, spec.careless, spec.seed, spec.salt, track.hooks)
     how = f"seen with errors of {spec.level_mm:g} mm and {spec.level_deg:g} deg"
     return Chapter(

@@ -14,9 +14,9 @@ import pytest
 from apo_bench.cli.app import main
 from apo_bench.show.stepping import FACES, Cursor
 from apo_bench.show.trial_again import trial_again
-from apo_bench.simulation.film.shapes import body_poses, part_shapes, shapes
+from apo_bench.simulation.film.meshes import body_meshes, body_poses, part_meshes
 from apo_bench.simulation.film.still import draw_over, part_poses, show_moment
-from apo_bench.simulation.film.window import KEYS, step_in_window
+from apo_bench.simulation.film.window import WINDOW_KEYS, step_in_window
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import initial_state
 from apo_bench.sweeps.grid import SweepSettings
@@ -86,14 +86,14 @@ def test_goals_are_laid_over_the_parts_and_said_in_millimetres(tower: Scene) -> 
 
 def test_shapes_are_as_large_as_what_they_stand_for(tower: Scene) -> None:
     for part in tower.work.free:
-        points = np.concatenate([shape.vertices for shape in part_shapes(tower.work, part)])
+        points = np.concatenate([shape.vertices for shape in part_meshes(tower.work, part)])
         bounds = tower.scenario.assembly.solids[part].bounds
         np.testing.assert_allclose([points.min(axis=0), points.max(axis=0)], bounds, atol=5e-4)  # the clearance
     chapter = scenario_story(tower).chapters[0]
     data = initial_state(tower.work, chapter.start)
     show_moment(tower, data, chapter, chapter.moments[-1])
     poses = body_poses(tower, data)
-    found = shapes(tower.work)
+    found = body_meshes(tower.work)
     assert len(poses) == tower.work.model.nbody
     assert {shape.part for shape in found} == {None, *tower.scenario.assembly.solids}
     for shape in found:
@@ -134,9 +134,7 @@ class Window:
 
 def test_keys_of_the_window_move_what_is_shown(tower: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     windows: list[Window] = []
-    codes = [
-        next(code for code, meaning in KEYS.items() if meaning == wanted) for wanted in ("next operation", "goals")
-    ]
+    codes = [next(code for code, key in WINDOW_KEYS.items() if key == wanted) for wanted in ("next operation", "goals")]
 
     def launch(model: Any, data: Any, key_callback: Any, **_: Any) -> Window:
         windows.append(Window(model, key_callback, [0, *codes]))

@@ -1,7 +1,5 @@
 """MJCF files of arms that somebody else wrote: one sentence for what they may not say, and no waiting."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 
@@ -173,7 +171,7 @@ def test_what_takes_too_much_or_ends_its_process_is_one_sentence(
     monkeypatch.setattr(apart, name, value)
     if name == "_LIMIT_BYTES":
         start = "import sys; sys.path[:] = sys.argv[1:]; from apo_bench.simulation.arms import apart; "
-        monkeypatch.setattr(apart, "_START", start + "apart._LIMIT_BYTES = 100_000_000; apart.serve()")
+        monkeypatch.setattr(apart, "_START", start + "apart._LIMIT_BYTES = 100_000_000; apart.run_child()")
     path = with_gripper(tmp_path, (ARMS / "ur5e_primitive.xml").read_text())
     with pytest.raises(InputError, match=words):
         read_arm(path)

@@ -1,7 +1,5 @@
 """Arms that are described by a file: kinematics, drives and grippers are what the file and the model say."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The human demonstrates, the robot replays, physics decides."""
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

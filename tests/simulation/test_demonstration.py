@@ -1,7 +1,5 @@
 """Demonstrations end right, show what a careful human does to some micrometres, and hide what is mended at the end."""
 
-from __future__ import annotations
-
 from contextlib import nullcontext
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What the arm feels of parts that cannot move, while what rests sleeps."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 import pytest
@@ -77,4 +75,4 @@ def test_a_part_that_fell_asleep_is_felt_no_longer(tower: Scene) -> None:
         sensors[:] = 1.0
         place(tower.work, robot.data, "castle1", tower.scenario.start["castle1"])
         robot.wait(0.1)
-        assert robot.load() == 0.0
+        assert robot.forces.load() == 0.0

@@ -18,7 +18,8 @@ from apo_bench.simulation.execution.controller import LOOK_S, PATIENCE_S, _until
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
 from apo_bench.simulation.robot import near, robot
-from apo_bench.simulation.robot.fast_forward import fast_forward
+from apo_bench.simulation.robot.forces import ForceSensors
+from apo_bench.simulation.robot.in_hand import fast_forward
 from apo_bench.simulation.robot.paths import Trajectory, minimum_jerk, shifted, smooth
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.scene import build_scene
@@ -101,7 +102,9 @@ def test_nothing_touches_on_what_is_left_out(monkeypatch, name):
     def looked_at(self, line, guard=None):
         n = max(1, round(line.seconds / self.step_s))
         s = np.concatenate([[0.0], line.progress(np.arange(1, n + 1) / n)])
-        spans = near.near_spans(its, self.data, self._moving(self.opening()), self._held, line, s)
+        held = self.forces.held
+        moving = near.moving_with_tip(its, self.data, self.tip(), self.opening(), held)
+        spans = near.near_spans(its, self.data, moving, held, line, s)
         edges = [0, *(edge for span in spans for edge in span), n]
         begin = float(self.data.time)
         left_out[:] = [
@@ -122,14 +125,14 @@ def test_nothing_touches_on_what_is_left_out(monkeypatch, name):
                     met.append((float(data.time), pair))
 
     hand = {}
-    hold = Robot.hold
+    hold = ForceSensors.hold
 
     def holding(self, *parts):
         hand["held"] = parts
         hold(self, *parts)
 
     monkeypatch.setattr(Robot, "follow", looked_at)
-    monkeypatch.setattr(Robot, "hold", holding)
+    monkeypatch.setattr(ForceSensors, "hold", holding)
     monkeypatch.setattr(robot, "TICK_S", 0.005)
     layout = shown(name).layout
     done = replay(Plan(its.scenario.assembly, layout.start, layout.goals), its, feel)
@@ -222,7 +225,7 @@ def test_no_turn_that_comes_near_anything_is_left_out():
                 )
                 for part in others
             ]
-            is_near = np.max(depths) > -near.NEAR_M[0]
+            is_near = np.max(depths) > -near.NEAR_HELD_M[0]
             came += is_near
             left_out += not any(begin <= i <= end for begin, end in spans)
             assert not is_near or any(begin <= i <= end for begin, end in spans)

@@ -1,7 +1,5 @@
 """What happened in a replay, kept moment by moment and written around the pictures of a film."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.assembly.goals import Plan
@@ -10,17 +8,17 @@ from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.film.captions import ABOVE_PX, BELOW_PX, Caption, captioned
 from apo_bench.simulation.film.film import frames, operation_words, sampled
-from apo_bench.simulation.film.track import Chapter, Moment, Track
+from apo_bench.simulation.film.track import Chapter, FilmMoment, FilmTrack
 from apo_bench.simulation.hooks import BY_HAND, Doing
 from apo_bench.simulation.human.demonstration import demonstrate
 from apo_bench.simulation.scene.scene import build_scene
 
 
-def moments(*forces: float) -> list[Moment]:
+def moments(*forces: float) -> list[FilmMoment]:
     """Moments of operations 1, 1, .., 2, 20 ms apart."""
     operations = [0] * (len(forces) - 1) + [1]
     made = zip(operations, forces, strict=True)
-    return [Moment(0.02 * i, np.zeros(1), Doing(k, "carry", f), np.zeros((0, 3))) for i, (k, f) in enumerate(made)]
+    return [FilmMoment(0.02 * i, np.zeros(1), Doing(k, "carry", f), np.zeros((0, 3))) for i, (k, f) in enumerate(made)]
 
 
 def test_a_force_between_two_pictures_is_said_with_the_next() -> None:
@@ -32,8 +30,8 @@ def test_a_trial_is_told_operation_by_operation_and_shown() -> None:
     scene = build_scene(load_scenario("block_on_block"))
     layout = draw_layout(scene.scenario, np.random.default_rng(0), scene.clearance_mm)
     assembly = scene.scenario.assembly
-    track = Track()
-    hands = Track()
+    track = FilmTrack()
+    hands = FilmTrack()
     plan = Plan(assembly, layout.start, layout.goals)
     assert replay(plan, scene, track.hooks, fidelity="contact").outcome.code == "ok"
     assert track.plan is plan

@@ -1,7 +1,5 @@
 """What a described arm makes of a plan is worked out before it moves, and enters what is foretold of it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """No graphics driver is loaded before the first picture; where none works, one sentence says so."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

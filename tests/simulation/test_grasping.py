@@ -1,7 +1,5 @@
 """Grasps are chosen from planned poses: nothing is struck, and where one grasp cannot do it two can."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,12 +1,10 @@
 """How far a part has moved in the hand."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from apo_bench.geometry import pose
-from apo_bench.simulation.robot.hold_watch import HoldWatch
+from apo_bench.simulation.robot.in_hand import HoldWatch
 
 GRASPED = pose.at((0.01, 0.02, 0.03), (0.0, 90.0, 20.0))
 """A part in the frame of the tip."""

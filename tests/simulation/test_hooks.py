@@ -1,7 +1,5 @@
 """What is called while hands demonstrate or a robot replays, and in which order."""
 
-from __future__ import annotations
-
 from itertools import groupby
 from typing import Any
 

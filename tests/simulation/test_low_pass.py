@@ -1,7 +1,5 @@
 """The force that is reported is that of a sensor, not of a step of the simulation."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -10,7 +8,7 @@ import pytest
 from apo_bench.assembly.goals import Plan
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.execution.controller import replay
-from apo_bench.simulation.robot.low_pass import WRIST_S, LowPass
+from apo_bench.simulation.robot.forces import WRIST_S, ForceSensors, LowPass
 from apo_bench.simulation.robot.paths import shifted, smooth
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.scene import Scene, build_scene
@@ -39,14 +37,14 @@ def test_the_peak_of_a_replay_hardly_depends_on_the_step(tower: Scene, monkeypat
     layout = draw_layout(tower.scenario, np.random.default_rng([2, 0]), tower.clearance_mm)
     plan = Plan(tower.scenario.assembly, layout.start, layout.goals)
     single = [0.0]
-    net_force = Robot._net_force
+    net = ForceSensors.net
 
-    def look(robot: Robot) -> list[float]:
-        force = net_force(robot)
+    def look(sensors: ForceSensors) -> list[float]:
+        force = net(sensors)
         single[0] = max(single[0], math.hypot(*force))
         return force
 
-    monkeypatch.setattr(Robot, "_net_force", look)
+    monkeypatch.setattr(ForceSensors, "net", look)
     peaks = []
     singles = []
     for scene in (tower, build_scene(tower.scenario, timestep_s=0.0005)):
@@ -63,10 +61,10 @@ def test_what_is_held_is_felt_at_every_step_and_the_empty_hand_feels_nothing(tow
     robot = Robot(tower, tower.scenario.start)
     robot.wait(0.2)
     robot.follow(smooth(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), 0.02), 0.2))
-    assert robot.peak_force_n == 0.0
-    robot.hold("stick")
+    assert robot.forces.peak_n == 0.0
+    robot.forces.hold("stick")
     weight = 9.81 * float(tower.work.model.body_subtreemass[tower.work.body["stick"]])
     robot.wait(0.02)
-    assert robot.peak_force_n == pytest.approx(weight * (1 - 0.95**20), rel=0.02)
+    assert robot.forces.peak_n == pytest.approx(weight * (1 - 0.95**20), rel=0.02)
     robot.follow(smooth(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), 0.02), 0.2))
-    assert robot.peak_force_n == pytest.approx(weight, rel=0.02)
+    assert robot.forces.peak_n == pytest.approx(weight, rel=0.02)

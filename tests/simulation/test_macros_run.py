@@ -1,7 +1,5 @@
 """The robot carries out macros that no shipped example has, and feels its way to contacts that are planned wrong."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pictures without a display, several renderers beside each other."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

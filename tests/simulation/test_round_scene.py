@@ -1,7 +1,5 @@
 """Scenes of convex pieces: their geoms are where the part has them, and what is round rests."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import mujoco
@@ -169,8 +167,8 @@ def test_a_human_puts_a_peg_into_a_bore_and_the_robot_repeats_it(scene: Scene, m
     steady = Robot.steady
 
     def look(robot: Robot, on: bool) -> None:
-        tip = scene.kinematics.forward(robot.data.qpos[robot._qpos])
-        held.append(pose.inverse(tip) @ part_pose(scene.work, robot.data, robot._held[0]))
+        tip = robot.tip()
+        held.append(pose.inverse(tip) @ part_pose(scene.work, robot.data, robot.forces.held[0]))
         steady(robot, on)
 
     monkeypatch.setattr(Robot, "steady", look)

@@ -1,7 +1,5 @@
 """The compiled scene is what the part files and the scenario say."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 import pytest

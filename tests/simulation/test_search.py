@@ -12,7 +12,8 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.execution.spiral import PITCH_M, RADIUS_M, Easing, Spiral
-from apo_bench.simulation.robot.robot import Guard, Robot
+from apo_bench.simulation.robot.forces import Guard
+from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.stages import replay_and_judge, simulate_demonstration
 from apo_bench.trial.trial import run_trial

@@ -1,7 +1,5 @@
 """What is carried freely stays where it is in the hand, and nothing else is held there."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import mujoco
@@ -15,8 +13,8 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.robot import robot as module
+from apo_bench.simulation.robot.in_hand import SLIPS_M, Carried, steadied
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.robot.steadying import SLIPS_M, Carried, steadied
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.scene.world import World, initial_state, part_pose, place, touch_others
 from tests.round_scenes import peg_in_hole
@@ -124,6 +122,6 @@ def test_a_group_is_put_back_as_one_and_what_touches_is_left_alone() -> None:
 def test_the_ideal_gripper_needs_no_help(tower: Scene) -> None:
     scene = build_scene(tower.scenario, grasp="weld")
     robot = Robot(scene, scene.scenario.start)
-    robot.hold("stick")
+    robot.forces.hold("stick")
     robot.steady(True)
     assert robot._carried is None

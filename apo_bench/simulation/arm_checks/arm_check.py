@@ -1,7 +1,5 @@
 """What an arm can do at the table, in numbers: reach, errors of its tip, stiffness, gripper, room along a plan."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import final
 
@@ -27,7 +25,8 @@ _TABLE_M = 0.03
 _TURNS = (-1.2, 0.0, 1.2)
 """Height of the tip, [m], and turns about the vertical from home, [rad], at which the table is to be reached."""
 _PUSH_N = 5.0
-"""Stiffness is looked at by this push."""
+_PUSH_S = 0.5
+"""Stiffness is looked at by this push, which lasts so long."""
 _LAYOUTS = 20
 _MOST_GIVING_M = 0.002
 _LEAST_MARGIN_DEG = 5.0
@@ -167,12 +166,22 @@ def _errors(scene: Scene) -> tuple[tuple[TipError, ...], float, tuple[float, flo
             line = smooth(robot.T, end, speed) if speed == SPEEDS[-1] else steady(robot.T, end, speed)
             errors.append(error_on(line, robot.trace(line), speed))
             robot.wait(STAND_S)
-        rest = float(np.linalg.norm(robot.pushed(np.zeros(3)) - robot.T[:3, 3]))
-        before = robot.pushed(np.zeros(3))
-        x, y, z = (1e3 * abs(float((robot.pushed(_PUSH_N * a) - before) @ a)) / _PUSH_N for a in np.eye(3))
+        rest = float(np.linalg.norm(_pushed(robot, np.zeros(3)) - robot.T[:3, 3]))
+        before = _pushed(robot, np.zeros(3))
+        x, y, z = (1e3 * abs(float((_pushed(robot, _PUSH_N * a) - before) @ a)) / _PUSH_N for a in np.eye(3))
     except Halt:
         return (), np.nan, (np.nan, np.nan, np.nan)
     return tuple(errors), 1e3 * rest, (x, y, z)
+
+
+def _pushed(robot: Robot, force: Array) -> Array:
+    """Where the tip is, (3,), world, [m], after a force [N] has pushed on it for a while."""
+    body = robot.model.body(f"arm/{robot.arm.mount}").id
+    robot.data.xfrc_applied[body, :3] = force
+    robot.data.xfrc_applied[body, 3:] = np.cross(robot.tip()[:3, 3] - robot.data.xipos[body], force)
+    robot.wait(_PUSH_S)
+    robot.data.xfrc_applied[body] = 0.0
+    return robot.tip()[:3, 3]
 
 
 def _force(arm: Arm, scene: Scene) -> float:

@@ -1,7 +1,5 @@
 """What an arm makes of a plan before it moves: reach, room to the limits of joints, room of the gripper, tip error."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import Any, Literal, NamedTuple, cast
 

@@ -1,7 +1,5 @@
 """How far the tip of an arm is off its line at a speed, found by trying."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import final
 

@@ -1,18 +1,16 @@
 """All that the MJCF file of an arm or gripper may say: which elements, with which attributes, in which range."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from types import MappingProxyType
 
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
-LARGEST_BYTES = 5_000_000
+LARGEST_MJCF_BYTES = 5_000_000
 LARGEST_MESH_BYTES = 20_000_000
 MOST_MESH_BYTES = 100_000_000
 """Of an MJCF file, of a mesh, of all meshes that something touches by."""
 MOST_FILES = 50
-DEEPEST = 64
+MOST_NESTED = 64
 MOST_ELEMENTS = 20_000
 LONGEST_VALUE = 1_000_000
 """Files that are included; levels of nesting; elements in all; letters of an attribute."""
@@ -112,7 +110,7 @@ WRAPPED: Mapping[tuple[str, str], frozenset[str]] = MappingProxyType(
     }
 )
 """Where an element of that name is another one."""
-LEFT_OUT = frozenset(
+IGNORED_ELEMENTS = frozenset(
     [
         "sensor",
         "keyframe",
@@ -132,7 +130,7 @@ LEFT_OUT = frozenset(
     ]
 )
 """A scene has its own, or needs none."""
-OPTIONS = frozenset(
+IGNORED_OPTIONS = frozenset(
     [
         "timestep",
         "gravity",
@@ -159,7 +157,7 @@ OPTIONS = frozenset(
     ]
 )
 """Of <option> and of <flag>: how something is simulated, which a scene and the measuring of a gripper say alike."""
-FLAGS = frozenset(
+IGNORED_FLAGS = frozenset(
     [
         "midphase",
         "multiccd",
@@ -177,7 +175,7 @@ FLAGS = frozenset(
         "sensor",
     ]
 )
-REMEDIES: Mapping[str, str] = MappingProxyType(
+ARM_REMEDIES: Mapping[str, str] = MappingProxyType(
     {
         "freejoint": "an arm stands fast",
         "mocap": "an arm stands fast",

@@ -1,7 +1,5 @@
 """Arms of strangers are put together in a process of their own, with little memory and time."""
 
-from __future__ import annotations
-
 import os
 import pickle
 import resource
@@ -14,7 +12,7 @@ from apo_bench.errors import InputError
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.description import ArmDescription
 
-_START = "import sys; sys.path[:] = sys.argv[1:]; from apo_bench.simulation.arms.apart import serve; serve()"
+_START = "import sys; sys.path[:] = sys.argv[1:]; from apo_bench.simulation.arms.apart import run_child; run_child()"
 _LIMIT_S = 60
 _WALL_S = 180
 _LIMIT_BYTES = 4_000_000_000
@@ -48,7 +46,7 @@ def build_apart(said: ArmDescription) -> Arm:
     return arm
 
 
-def serve() -> None:
+def run_child() -> None:
     """Read a description from the standard input, and write what came of it to the standard output, pickled."""
     import mujoco
 

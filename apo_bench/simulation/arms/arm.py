@@ -1,7 +1,5 @@
 """The arm as data."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import final
@@ -15,7 +13,7 @@ from apo_bench.simulation.arms.hand import Hand
 @final
 @copyable
 @dataclass(frozen=True, eq=False)
-class Limits:
+class ArmLimits:
     """What an arm can do; None: nothing is said."""
 
     payload_kg: float | None = None
@@ -65,7 +63,7 @@ class Arm:
     """The whole as MJCF text, where the arm was described by a file; None: `mjcf` is that file."""
     hand: Hand | None = None
     """What the gripper does, where that was measured."""
-    limits: Limits = Limits()
+    limits: ArmLimits = ArmLimits()
     """What it can do."""
     files: tuple[Path, ...] = ()
     """All files that it was made of; none: `mjcf` alone."""

@@ -1,7 +1,5 @@
 """From the description of an arm to an `Arm`: its model put together, its joints driven, its gripper measured."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Sequence
 from dataclasses import replace
@@ -16,7 +14,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.resources import folder
 from apo_bench.simulation.arms.apart import build_apart
-from apo_bench.simulation.arms.arm import Arm, Limits
+from apo_bench.simulation.arms.arm import Arm, ArmLimits
 from apo_bench.simulation.arms.chain import find_flange, find_joints
 from apo_bench.simulation.arms.description import ArmDescription, read_description
 from apo_bench.simulation.arms.home import find_home
@@ -207,8 +205,8 @@ def _text(spec: Any, found: Measured) -> str:
     return str(spec.to_xml())
 
 
-def _limits(said: ArmDescription, joints: Sequence[str], drives: Any) -> Limits:
-    return Limits(
+def _limits(said: ArmDescription, joints: Sequence[str], drives: Any) -> ArmLimits:
+    return ArmLimits(
         payload_kg=said.payload_kg,
         speed_rad_s=None if said.speed_rad_s is None else said.joint_speeds(len(joints)),
         torque_nm=np.array([drives[name].torque for name in joints]),

@@ -1,7 +1,5 @@
 """The chain of hinges from the base of an arm to its flange."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import mujoco

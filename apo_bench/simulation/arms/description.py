@@ -1,7 +1,5 @@
 """The file that describes an arm, as TOML: what cannot be seen in its MJCF, and nothing else."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Arms by name: those that come with the benchmark, those of a file, of a collection, of a module."""
 
-from __future__ import annotations
-
 from apo_bench.errors import InputError, unknown
 from apo_bench.names import resolve
 from apo_bench.records.short_names import FOREIGN_ARMS

@@ -1,7 +1,5 @@
 """Arms of other collections, found where they are installed: MuJoCo Menagerie and robosuite. Nothing is downloaded."""
 
-from __future__ import annotations
-
 import importlib.util
 import os
 from collections.abc import Iterator

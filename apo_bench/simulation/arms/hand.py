@@ -1,7 +1,5 @@
 """A gripper as it was measured: what its fingers do at each command."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import final

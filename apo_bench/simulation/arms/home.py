@@ -1,7 +1,5 @@
 """Where an arm waits, if nobody says: of the ways to hold the tip over the table the one that has most room."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.errors import InputError

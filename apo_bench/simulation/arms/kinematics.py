@@ -1,7 +1,5 @@
 """Forward and inverse kinematics of an arm by mink, on a model of the arm alone."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import mink

@@ -1,7 +1,5 @@
 """MJCF files of arms and grippers, read by MuJoCo and stripped of what a scene has of its own."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -4,8 +4,6 @@ Nothing but the drive is simulated: no gravity, the arm stands still. Fingers ar
 direction in which two groups of them move towards each other. Of each group, what reaches farthest are the pads.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
@@ -18,9 +16,9 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.arms.description import GripperDescription
 from apo_bench.simulation.arms.hand import Hand
-from apo_bench.simulation.arms.pads import pads_of, reach_of
+from apo_bench.simulation.arms.pads import geom_reach, pads_of
 from apo_bench.simulation.arms.pressing import PROBE_WIDE, force_of
-from apo_bench.simulation.arms.rig import Rig, ends_of, frame_of, poses_after, rig_of
+from apo_bench.simulation.arms.rig import Rig, command_ends, frame_of, poses_after, rig_of
 
 _LEVELS = 17
 _LEAST_M = 0.004
@@ -56,7 +54,7 @@ def measure(
         InputError: There is nothing that moves, or nothing that closes; what to state is said.
     """
     rig = rig_of(model, path, joints, home, flange, said)
-    ends = ends_of(rig, said)
+    ends = command_ends(rig, said)
     states = {end: poses_after(rig, np.array(end)) for end in ends}
     spread = {end: float(np.linalg.norm(c - c.mean(axis=0), axis=1).sum()) for end, c in states.items()}
     if said.open is not None and said.closed is not None:
@@ -97,7 +95,7 @@ def _table(
         rig.settle(command)
         width, middle = _between(model, data, sides)
         rows.append((width / 2, command, np.array(data.qpos[model.jnt_qposadr[rig.joints]])))
-        reach.append(max(reach_of(model, data, g, ahead) for g in pads))
+        reach.append(max(geom_reach(model, data, g, ahead) for g in pads))
         middles.append(middle)
         turns.append(np.array(data.geom_xmat[pads[0]].reshape(3, 3)))
     kept = _ascending([row[0] for row in rows])

@@ -1,7 +1,5 @@
 """Which surfaces of a gripper hold: of the two groups that move towards each other, what reaches farthest."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
@@ -55,15 +53,15 @@ def pads_of(
         raise InputError(f"{rig.path}: the fingers do not reach ahead of the flange; check 'mount' in 'gripper'.")
     ahead = _snapped(ahead / np.linalg.norm(ahead), frame_of(rig, flange)[:3, :3], np.cos(np.radians(10.0)))
     if said.pads is None:
-        most = max(reach_of(model, data, g, ahead) for g in first + second)
-        first = [g for g in first if reach_of(model, data, g, ahead) > most - _TIP_M]
-        second = [g for g in second if reach_of(model, data, g, ahead) > most - _TIP_M]
+        most = max(geom_reach(model, data, g, ahead) for g in first + second)
+        first = [g for g in first if geom_reach(model, data, g, ahead) > most - _TIP_M]
+        second = [g for g in second if geom_reach(model, data, g, ahead) > most - _TIP_M]
     if not first or not second:
         raise InputError(f"{rig.path}: one finger is longer than the other; name both 'pads' in 'gripper'.")
     return (first, second), across, ahead
 
 
-def reach_of(model: Any, data: Any, geom: int, ahead: Array) -> float:
+def geom_reach(model: Any, data: Any, geom: int, ahead: Array) -> float:
     """How far the box around a geom reaches along a direction, world, [m]."""
     along = data.geom_xmat[geom].reshape(3, 3).T @ ahead
     centre = model.geom_aabb[geom, :3]

@@ -1,7 +1,5 @@
 """How hard the pads of a gripper push on a part between them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import mujoco

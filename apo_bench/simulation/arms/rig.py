@@ -1,7 +1,5 @@
 """A compiled arm in which only the gripper moves: no gravity, the arm stands still."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import product
 from pathlib import Path
@@ -106,7 +104,7 @@ def _actuators(model: Any, data: Any, path: Path, own: Sequence[int], said: Grip
     return found
 
 
-def ends_of(rig: Rig, said: GripperDescription) -> list[tuple[float, ...]]:
+def command_ends(rig: Rig, said: GripperDescription) -> list[tuple[float, ...]]:
     """Every combination of the ends of the commands."""
     for given in (said.open, said.closed):
         if given is not None and len(given) != len(rig.actuators):

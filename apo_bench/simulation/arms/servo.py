@@ -5,8 +5,6 @@ frequency, damped critically, limited by the torque of the joint. Gravity is com
 fed forward by the robot (`Robot._lead`).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """From a description that states its gripper to an `Arm`: the model is used as it is."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +7,7 @@ import mujoco
 
 from apo_bench.errors import InputError, unknown
 from apo_bench.geometry import pose
-from apo_bench.simulation.arms.arm import Arm, Limits
+from apo_bench.simulation.arms.arm import Arm, ArmLimits
 from apo_bench.simulation.arms.chain import find_flange, find_joints
 from apo_bench.simulation.arms.description import ArmDescription, SlideGripper
 from apo_bench.simulation.arms.loading import check_surroundings, compiled, files_of, load_model
@@ -46,10 +44,10 @@ def stated_arm(said: ArmDescription, slides: SlideGripper) -> Arm:
         home=said.home,
         opening_m=slides.opening_m,
         model=read_model_tree(said.mjcf, "arm").text,
-        limits=Limits(
+        limits=ArmLimits(
             payload_kg=said.payload_kg,
             speed_rad_s=None if said.speed_rad_s is None else said.joint_speeds(len(joints)),
-            fingers_m_s=said.gripper.speed_m_s or Limits.fingers_m_s,
+            fingers_m_s=said.gripper.speed_m_s or ArmLimits.fingers_m_s,
         ),
         files=tuple(dict.fromkeys((said.file, *files_of(said.mjcf)))),
     )

@@ -1,7 +1,5 @@
 """How hard a gripper pushes where its file says so, or where its model hardly pushes at all: its own drive, scaled."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any

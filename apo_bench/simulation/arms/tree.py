@@ -3,8 +3,6 @@
 Every file is opened as one that somebody else wrote. MuJoCo reads no other MJCF file than this tree.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from pathlib import Path, PurePosixPath
 from typing import NamedTuple, NoReturn, final
@@ -14,21 +12,21 @@ from xml.parsers import expat
 from apo_bench.errors import InputError, one_line
 from apo_bench.io.reading import opened, read_bytes
 from apo_bench.simulation.arms.allowed import (
+    ARM_REMEDIES,
     ATTRIBUTES,
-    DEEPEST,
-    FLAGS,
+    IGNORED_ELEMENTS,
+    IGNORED_FLAGS,
+    IGNORED_OPTIONS,
     INSIDE,
-    LARGEST_BYTES,
     LARGEST_MESH_BYTES,
-    LEFT_OUT,
+    LARGEST_MJCF_BYTES,
     LONGEST_VALUE,
     MESHES,
     MOST_ELEMENTS,
     MOST_FILES,
     MOST_MESH_BYTES,
+    MOST_NESTED,
     MOST_OF,
-    OPTIONS,
-    REMEDIES,
     WRAPPED,
     wrong_value,
 )
@@ -77,12 +75,12 @@ class _Reading:
 
     def tree(self, path: Path, deep: int) -> Element:
         """A file, with what it includes in the places of that."""
-        if len(self.files) >= MOST_FILES or deep > DEEPEST:
+        if len(self.files) >= MOST_FILES or deep > MOST_NESTED:
             raise InputError(f"{self.main}: more than {MOST_FILES} files are included; write them into fewer.")
         if any(path.exists() and path.samefile(each) for each in self.files):
             raise InputError(f"{path}: the file is included twice; include it once.")
         self.files.append(path)
-        raw = read_bytes(path, f"MJCF file of the {self.kind}", LARGEST_BYTES)
+        raw = read_bytes(path, f"MJCF file of the {self.kind}", LARGEST_MJCF_BYTES)
         reader = _Parser(path, self)
         try:
             reader.parser.Parse(raw, True)
@@ -136,8 +134,8 @@ class _Parser:
         if counts[""] > MOST_ELEMENTS or counts[tag] > MOST_OF.get(tag, MOST_ELEMENTS):
             most = MOST_OF.get(tag, MOST_ELEMENTS)
             raise InputError(f"{where}: there are more than {most:,} <{tag[:60]}>, the most that an arm may have.")
-        if self._deep > DEEPEST:
-            raise InputError(f"{where}: elements stand in each other {DEEPEST} deep; that is the most.")
+        if self._deep > MOST_NESTED:
+            raise InputError(f"{where}: elements stand in each other {MOST_NESTED} deep; that is the most.")
         for key, text in attributes.items():
             if len(text) > LONGEST_VALUE:
                 raise InputError(f"{where}: {key[:60]}= has more than {LONGEST_VALUE:,} letters, which is the most.")
@@ -170,7 +168,7 @@ def _check_element(path: Path, element: Element, outer: Element | None) -> None:
     for child in element:
         if child.tag == "option":
             _check_option(path, child)
-        elif child.tag not in LEFT_OUT:
+        elif child.tag not in IGNORED_ELEMENTS:
             if child.tag not in INSIDE.get(tag, ()):
                 _refuse(path, f"<{child.tag[:60]}> stands in <{tag}>, which an arm may not say", child.tag)
             _check_element(path, child, element)
@@ -181,7 +179,7 @@ def _check_element(path: Path, element: Element, outer: Element | None) -> None:
 def _check_option(path: Path, option: Element) -> None:
     """A scene says how it is simulated; what would be another physics is not passed over."""
     flags = {key for child in option for key in child.attrib}
-    for key in (*sorted(set(option.attrib) - OPTIONS), *sorted(flags - FLAGS)):
+    for key in (*sorted(set(option.attrib) - IGNORED_OPTIONS), *sorted(flags - IGNORED_FLAGS)):
         _refuse(path, f"<option> has {key[:60]}, which an arm may not say: the scene says how it is simulated")
     for key in ("density", "viscosity", "wind"):
         if any(word.strip("0.+-") for word in option.get(key, "").split()):
@@ -241,5 +239,5 @@ def _called(element: Element) -> str:
 
 
 def _refuse(path: Path, sentence: str, name: str = "") -> NoReturn:
-    remedy = REMEDIES.get(name, "remove it, or mend the file")
+    remedy = ARM_REMEDIES.get(name, "remove it, or mend the file")
     raise InputError(f"{path}: {sentence}; {remedy}.")

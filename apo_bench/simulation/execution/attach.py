@@ -1,16 +1,15 @@
 """The macros of the plan in force: guarded where contacts close, by position along those that stay closed."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.macros import UP
-from apo_bench.simulation.execution.fingers import change
+from apo_bench.simulation.execution.fingers import change_grip
 from apo_bench.simulation.execution.search import after_search, press_in
 from apo_bench.simulation.execution.transfer import ASIDE_M, Grip, Transfer, first_contact_pose
+from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.robot.paths import Trajectory, paced, shifted, smooth, steady
-from apo_bench.simulation.robot.robot import Guard, Robot
+from apo_bench.simulation.robot.robot import Robot
 
 _PLACE = 0.06
 _TOUCH = 0.01
@@ -65,7 +64,7 @@ def _insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple
         left, found = press_in(robot, t, grip, line, guard, ARRIVED_M)
         if left > ARRIVED_M:
             return left + t.into.left, grip
-        change(robot, t, grip, second, after_search(found, shifted(there, UP, -rise) @ second.T_part_tip))
+        change_grip(robot, t, grip, second, after_search(found, shifted(there, UP, -rise) @ second.T_part_tip))
         grip = second
         rise = t.clearance
         robot.follow(smooth(robot.T, shifted(robot.T, UP, rise), 0.01))
@@ -130,7 +129,7 @@ def pull_out(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> Grip
         return grip
     robot.follow(smooth(robot.T, shifted(robot.T, t.out.way, -t.out.left), _PULL))
     part = shifted(t.T_world_start, t.out.way, -t.out.left)
-    change(robot, t, grip, second, part @ second.T_part_tip)
+    change_grip(robot, t, grip, second, part @ second.T_part_tip)
     robot.follow(smooth(robot.T, shifted(robot.T, UP, t.floats), 0.01))
     robot.follow(smooth(robot.T, shifted(robot.T, t.out.way, t.out.left - t.out.travel), _PULL))
     return second

@@ -1,12 +1,10 @@
 """One part, with what it carries, from one place to another: pick, lift, carry, attach, release, depart."""
 
-from __future__ import annotations
-
 from apo_bench.insertion.macros import UP
 from apo_bench.simulation.execution.attach import ARRIVED_M, attach, leave, pull_out
 from apo_bench.simulation.execution.fingers import centre, check_hold, depart, grasp, release
 from apo_bench.simulation.execution.transfer import Grip, Transfer, first_contact_pose
-from apo_bench.simulation.robot.paths import at_height, shifted, smooth
+from apo_bench.simulation.robot.paths import shifted, smooth, with_height
 from apo_bench.simulation.robot.robot import Halt, Robot
 
 _LIFT = (0.4, 0.25)
@@ -59,7 +57,7 @@ def _lift(robot: Robot, t: Transfer) -> None:
         robot.follow(smooth(robot.T, shifted(robot.T, UP, 0.004), 0.02))
     leave(robot, t)
     robot.steady(not t.drawn)
-    robot.follow(smooth(robot.T, at_height(robot.T, max(t.safe, robot.T[2, 3])), _LIFT[bool(t.carried)]))
+    robot.follow(smooth(robot.T, with_height(robot.T, max(t.safe, robot.T[2, 3])), _LIFT[bool(t.carried)]))
     robot.steady(False)
 
 
@@ -69,11 +67,11 @@ def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
     if t.into.level:
         before = shifted(before, UP, t.floats)
     robot.steady(True)
-    robot.go(at_height(before, max(t.safe, before[2, 3])), _CARRY[bool(t.carried)])
+    robot.go(with_height(before, max(t.safe, before[2, 3])), _CARRY[bool(t.carried)])
     robot.follow(smooth(robot.T, before, _LOWER[bool(t.carried)]))
     robot.steady(False)
     robot.stand()
     robot.hold_watch = robot.hold_watch.carry(robot.in_hand())
     check_hold(robot, grip)
-    if t.carried and robot.scene.grasp == "friction" and robot.load() < _LOST_LOAD * t.weight_n:
+    if t.carried and robot.scene.grasp == "friction" and robot.forces.load() < _LOST_LOAD * t.weight_n:
         raise Halt("carry", "lost_grasp", " or ".join(t.carried))

@@ -1,7 +1,5 @@
 """The robot repeats a plan: open loop in the poses, closed loop only in force. The same controller for every method."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any
@@ -16,7 +14,7 @@ from apo_bench.simulation.execution.carry_out import bring, take
 from apo_bench.simulation.execution.prepare import Move, moves, unreachable
 from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
 from apo_bench.simulation.hooks import Hooks, hooks_of
-from apo_bench.simulation.robot.hold_watch import HoldWatch
+from apo_bench.simulation.robot.in_hand import HoldWatch
 from apo_bench.simulation.robot.robot import Halt, Robot
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.scene.scene import Scene
@@ -80,7 +78,7 @@ def replay(
     result = ReplayResult(
         reached=Reached(after=tuple(after), final=final),
         outcome=outcome,
-        peak_force_n=robot.peak_force_n,
+        peak_force_n=robot.forces.peak_n,
         sim_seconds=float(robot.data.time),
         timeline=tuple(timeline),
         in_hand=robot.hold_watch.finished,

@@ -1,10 +1,9 @@
 """The fingers: take a part, let go of it, take it elsewhere, centre it."""
 
-from __future__ import annotations
-
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.execution.transfer import Grip, Transfer, hover_pose
-from apo_bench.simulation.robot.paths import at_height, shifted, smooth
+from apo_bench.simulation.robot.in_hand import weld
+from apo_bench.simulation.robot.paths import shifted, smooth, with_height
 from apo_bench.simulation.robot.robot import Halt, Robot
 
 _FREE = 2.0
@@ -21,16 +20,16 @@ the way to the middle."""
 
 def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
     """Come down to the part with open fingers, and close them."""
-    above = at_height(at, hover_pose(at))
-    robot.follow(smooth(robot.T, at_height(robot.T, max(robot.T[2, 3], above[2, 3], t.over)), _NEAR))
-    robot.go(at_height(above, robot.T[2, 3]), _FREE, turn_speed=4.5)
-    robot.handle(t.part)
+    above = with_height(at, hover_pose(at))
+    robot.follow(smooth(robot.T, with_height(robot.T, max(robot.T[2, 3], above[2, 3], t.over)), _NEAR))
+    robot.go(with_height(above, robot.T[2, 3]), _FREE, turn_speed=4.5)
+    robot.forces.handle(t.part)
     robot.fingers(min(grip.half_width + OPEN_TO_PICK_M, robot.arm.opening_m))
     robot.follow(smooth(robot.T, at, _NEAR))
     robot.stand()
-    robot.hold(t.part, *t.carried)
+    robot.forces.hold(t.part, *t.carried)
     if robot.scene.grasp == "weld":
-        robot.weld(t.part, True)
+        weld(robot.scene, robot.data, t.part, True)
     else:
         robot.fingers(grip.half_width - robot.arm.squeeze_m)
     robot.hold_watch = robot.hold_watch.grasp(robot.in_hand())
@@ -41,19 +40,19 @@ def release(robot: Robot, t: Transfer, grip: Grip) -> None:
     robot.stage = "release"
     robot.hold_watch = robot.hold_watch.release(robot.in_hand())
     if robot.scene.grasp == "weld":
-        robot.weld(t.part, False)
+        weld(robot.scene, robot.data, t.part, False)
     robot.fingers(min(grip.half_width + OPEN_TO_RELEASE_M, robot.arm.opening_m))
-    robot.hold()
+    robot.forces.hold()
 
 
 def depart(robot: Robot, t: Transfer) -> None:
     robot.stage = "depart"
     robot.follow(smooth(robot.T, shifted(robot.T, -robot.T[:3, 2], _DEPART_M), _NEAR))
-    robot.handle(None)
-    robot.follow(smooth(robot.T, at_height(robot.T, max(t.safe, robot.T[2, 3])), _FREE))
+    robot.forces.handle(None)
+    robot.follow(smooth(robot.T, with_height(robot.T, max(t.safe, robot.T[2, 3])), _FREE))
 
 
-def change(robot: Robot, t: Transfer, grip: Grip, second: Grip, at: Array) -> None:
+def change_grip(robot: Robot, t: Transfer, grip: Grip, second: Grip, at: Array) -> None:
     """Let go, and take the part at another place."""
     stage = robot.stage
     robot.stand()

@@ -1,7 +1,5 @@
 """Where to hold a part, chosen from the planned poses so that the gripper strikes nothing."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import groupby
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """The macros of the plan as motions in the world, for a part that is believed to be somewhere."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.geometry.arrays import Array

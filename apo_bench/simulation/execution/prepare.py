@@ -1,7 +1,5 @@
 """From a plan to transfers: grasps, ways, guards. Uses what is known before the robot moves, and nothing else."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import NamedTuple
 

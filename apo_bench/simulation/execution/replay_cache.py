@@ -3,8 +3,6 @@
 MuJoCo goes on from a state exactly, so a result does not depend on what is kept.
 """
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass

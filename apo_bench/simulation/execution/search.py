@@ -3,16 +3,15 @@
 The robot knows what it commands and the force on the part in its hand; it never reads where a part is.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.execution.spiral import RADIUS_M, Easing, Spiral
 from apo_bench.simulation.execution.transfer import Grip, Transfer
+from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth
-from apo_bench.simulation.robot.robot import Guard, Robot
+from apo_bench.simulation.robot.robot import Robot
 
 _YAWS_DEG = (1.0, -1.0, 2.0, -2.0)
 _YAWED_RADIUS_M = 0.001

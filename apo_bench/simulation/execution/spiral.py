@@ -3,16 +3,13 @@
 Each is called once a physics step with the force on the part in the hand, and says where the tip goes next.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.simulation.robot.low_pass import LowPass
-from apo_bench.simulation.robot.robot import Guard
+from apo_bench.simulation.robot.forces import Guard, LowPass
 
 RADIUS_M = 0.002
 PITCH_M = 0.00035

@@ -1,7 +1,5 @@
 """What the controller needs to know to move one part, with what it carries, from one place to another."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import NamedTuple, final
 
@@ -10,7 +8,7 @@ import numpy as np
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.macros import MacroName
 from apo_bench.insertion.surroundings import WALL_MARGIN_M
-from apo_bench.simulation.robot.paths import at_height, shifted
+from apo_bench.simulation.robot.paths import shifted, with_height
 
 _AHEAD_M = 0.01
 """A motion from above is guarded from so far above where it turns slow."""
@@ -30,7 +28,7 @@ class Grip(NamedTuple):
     half_width: float
     """Half the part's width between the fingers, [m]."""
 
-    def with_tip_at(self, T: Array) -> Grip:
+    def with_tip_at(self, T: Array) -> "Grip":
         """The grip of a tip that comes to be at T, (4, 4), in the frame of where the robot believes it."""
         return Grip(self.T_part_tip @ T, self.half_width)
 
@@ -131,7 +129,7 @@ class Transfer:
         """How far up a part must be to be free all round: seen at rest it lay on the floor of its slot, [m]."""
         return 0.5 * self.clearance
 
-    def with_tip_at(self, T: Array) -> Transfer:
+    def with_tip_at(self, T: Array) -> "Transfer":
         """The transfer with a tip that comes to be at T, (4, 4), in the frame of where the robot believes it."""
         if np.array_equal(T, np.eye(4)):
             return self
@@ -153,8 +151,8 @@ def key_poses(t: Transfer) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
     goal = t.T_world_goal @ last
     free = shifted(t.T_world_start @ carrying, t.out.way, -t.out.travel)
     before = shifted(t.T_world_goal @ carrying, t.into.way, -t.into.travel)
-    above, over = (at_height(T, max(t.safe, T[2, 3])) for T in (free, before))
-    return (at_height(pick, hover_pose(pick)), pick, *([free] if t.out.level else []), above), (over, before, goal)
+    above, over = (with_height(T, max(t.safe, T[2, 3])) for T in (free, before))
+    return (with_height(pick, hover_pose(pick)), pick, *([free] if t.out.level else []), above), (over, before, goal)
 
 
 def hover_pose(grasp: Array) -> float:

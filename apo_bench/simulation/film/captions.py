@@ -1,7 +1,5 @@
 """Words beside a picture: a title above it, below it what is done, and how it ended."""
 
-from __future__ import annotations
-
 import textwrap
 from functools import cache
 from pathlib import Path
@@ -46,7 +44,7 @@ def ending_lines(sentence: str) -> tuple[str, ...]:
     return tuple(textwrap.wrap(sentence, _LETTERS, max_lines=2, placeholder=" .."))
 
 
-def one_line(words: str) -> str:
+def shortened(words: str) -> str:
     """As many words as a line holds."""
     return textwrap.shorten(words, _LETTERS, placeholder=" ..")
 

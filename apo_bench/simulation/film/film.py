@@ -1,7 +1,5 @@
 """A trial as a film: demonstration, then replay, with captions; near the parts, and the whole table beside it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
@@ -15,8 +13,8 @@ from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import world_bounds
-from apo_bench.simulation.film.captions import Caption, captioned, ending_lines, one_line
-from apo_bench.simulation.film.track import Chapter, Moment
+from apo_bench.simulation.film.captions import Caption, captioned, ending_lines, shortened
+from apo_bench.simulation.film.track import Chapter, FilmMoment
 from apo_bench.simulation.hooks import BY_HAND
 from apo_bench.simulation.scene.graphics import renderer
 from apo_bench.simulation.scene.render import camera_view, save_film
@@ -30,8 +28,8 @@ _FPS = 20.0
 _GIF_FPS = 8.0
 _ENDING_S = 2.5
 """So long the end of a chapter stands still, with what came of it."""
-AZIMUTH_DEG = 128.0
-ELEVATION_DEG = -24.0
+FILM_AZIMUTH_DEG = 128.0
+FILM_ELEVATION_DEG = -24.0
 _NEAREST_M = 0.12
 _FARTHER = 1.1
 _ROOM_M = 0.04
@@ -75,7 +73,7 @@ def _chapter(
         large = stack.enter_context(renderer(model, _WIDTH, _HEIGHT))
         small = stack.enter_context(renderer(model, *_INSET))
 
-        def drawn(moment: Moment, caption: Caption) -> NDArray[np.uint8]:
+        def drawn(moment: FilmMoment, caption: Caption) -> NDArray[np.uint8]:
             put(chapter.world, data, moment)
             pictures = []
             for draws, camera in ((large, near), (small, wide)):
@@ -93,7 +91,7 @@ def _chapter(
         )
 
 
-def sampled(moments: Sequence[Moment], every_s: float) -> Iterator[tuple[Moment, float, float]]:
+def sampled(moments: Sequence[FilmMoment], every_s: float) -> Iterator[tuple[FilmMoment, float, float]]:
     """Moments about so far apart in time, the last among them; each with the greatest force since the one before it and
     since its operation began, [N]: a guard stops a motion within a tick, which few pictures would meet."""
     at = -np.inf
@@ -112,7 +110,7 @@ def sampled(moments: Sequence[Moment], every_s: float) -> Iterator[tuple[Moment,
             force = 0.0
 
 
-def put(world: World, data: Any, moment: Moment) -> None:
+def put(world: World, data: Any, moment: FilmMoment) -> None:
     """Bring a state of a world to a moment."""
     data.qpos[:] = moment.qpos
     if len(moment.hands):
@@ -122,7 +120,7 @@ def put(world: World, data: Any, moment: Moment) -> None:
     mujoco.mj_camlight(world.model, data)
 
 
-def operation_words(assembly: Assembly, moment: Moment) -> str:
+def operation_words(assembly: Assembly, moment: FilmMoment) -> str:
     """`operation 2 of 3, castle2: pick`."""
     k = moment.doing.operation
     if k is None:
@@ -131,13 +129,13 @@ def operation_words(assembly: Assembly, moment: Moment) -> str:
     return f"{what}: {moment.doing.macro}"
 
 
-def _lines(assembly: Assembly, moment: Moment) -> tuple[str, ...]:
+def _lines(assembly: Assembly, moment: FilmMoment) -> tuple[str, ...]:
     k = moment.doing.operation
     said = operation_words(assembly, moment)
     if k is None:
         return (said,)
     contacts = "; ".join(map(str, assembly.operations[k].contacts))
-    return (said, one_line(contacts))
+    return (said, shortened(contacts))
 
 
 def _moved(operation: Operation) -> str:
@@ -155,4 +153,4 @@ def framing(assembly: Assembly, states: Sequence[Poses]) -> tuple[Array, float]:
 
 
 def _looks_at(assembly: Assembly, states: Sequence[Poses]) -> Any:
-    return camera_view(*framing(assembly, states), AZIMUTH_DEG, ELEVATION_DEG)
+    return camera_view(*framing(assembly, states), FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG)

@@ -1,7 +1,5 @@
 """What is shown at one moment of a trial: parts, arm and hands in one world, and what is laid over them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
@@ -13,7 +11,7 @@ from apo_bench.assembly.topology import PartFace
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Face
-from apo_bench.simulation.film.track import NO_HANDS, Chapter, Moment
+from apo_bench.simulation.film.track import NO_HANDS, Chapter, FilmMoment
 from apo_bench.simulation.hooks import Doing
 from apo_bench.simulation.scene.render import arm_home
 from apo_bench.simulation.scene.scene import Scene
@@ -40,35 +38,35 @@ class Still(NamedTuple):
     """One moment with what is laid over it."""
 
     chapter: Chapter
-    moment: Moment
+    moment: FilmMoment
     words: tuple[str, ...]
     faces: tuple[PartFace, ...]
     """Whose names are written on them."""
     ghosts: tuple[Ghost, ...]
 
 
-def stages(scene: Scene, start: Poses, goals: Array) -> Chapter:
+def scenario_chapter(scene: Scene, start: Poses, goals: Array) -> Chapter:
     """What a scenario asks for: the parts before the first operation and after each, a second apart."""
     world = scene.work
     data = initial_state(world, start)
-    made = list[Moment]()
+    made = list[FilmMoment]()
     arm_home(scene, data)
     for k, poses in enumerate((start, *placements(scene.scenario.assembly, start, goals)), start=-1):
         for part in world.free:
             place(world, data, part, poses[part])
         doing = Doing(None if k < 0 else k, IN_PLACE, 0.0)
-        made.append(Moment(k + 1.0, np.array(data.qpos), doing, NO_HANDS))
+        made.append(FilmMoment(k + 1.0, np.array(data.qpos), doing, NO_HANDS))
     return Chapter(f"{scene.scenario.name}: as the scenario asks", world, start, tuple(made), "", None)
 
 
-def part_poses(chapter: Chapter, moment: Moment) -> Poses:
+def part_poses(chapter: Chapter, moment: FilmMoment) -> Poses:
     """Where every part is, world frame, [m]."""
     world = chapter.world
     free = {part: pose.unpack(moment.qpos[a : a + 7]) for part, a in world.qpos.items()}
     return {**{part: chapter.start[part] for part in world.fixed}, **free}
 
 
-def show_moment(scene: Scene, data: Any, chapter: Chapter, moment: Moment) -> None:
+def show_moment(scene: Scene, data: Any, chapter: Chapter, moment: FilmMoment) -> None:
     """Bring a state of the world of the robot to a moment; while a human demonstrates, the arm is at home."""
     if chapter.world is scene.work:
         data.qpos[:] = moment.qpos

@@ -1,7 +1,5 @@
 """What was seen of a demonstration or a replay, kept moment by moment: a state and what was done in it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple, final
 
@@ -15,7 +13,7 @@ from apo_bench.simulation.scene.world import World
 NO_HANDS = frozen(np.zeros((0, 3)), None, 3)
 
 
-class Moment(NamedTuple):
+class FilmMoment(NamedTuple):
     """A state of a world, and what is done in it."""
 
     time_s: float
@@ -34,7 +32,7 @@ class Chapter:
     world: World
     start: Poses
     """Before the first moment; what is fixed stays there."""
-    moments: tuple[Moment, ...]
+    moments: tuple[FilmMoment, ...]
     ending: str
     """What came of it, in a sentence."""
     good: bool | None
@@ -43,12 +41,12 @@ class Chapter:
 
 @final
 @dataclass(eq=False)
-class Track:
+class FilmTrack:
     """Keeps a demonstration or a replay: pass its `hooks` as `watch`."""
 
     plan: Plan | None = None
     """What is replayed; None of a demonstration."""
-    moments: list[Moment] = field(default_factory=list)
+    moments: list[FilmMoment] = field(default_factory=list)
 
     @property
     def hooks(self) -> Hooks:
@@ -58,4 +56,4 @@ class Track:
         self.plan = plan
 
     def _keep(self, data: Any, doing: Doing) -> None:
-        self.moments.append(Moment(float(data.time), np.array(data.qpos), doing, np.array(data.mocap_pos)))
+        self.moments.append(FilmMoment(float(data.time), np.array(data.qpos), doing, np.array(data.mocap_pos)))

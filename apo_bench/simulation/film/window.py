@@ -1,7 +1,5 @@
 """MuJoCo's window, in which a trial is stepped through with keys."""
 
-from __future__ import annotations
-
 import sys
 import time
 from collections.abc import Callable
@@ -11,13 +9,13 @@ import mujoco
 
 from apo_bench.assembly.goals import Poses
 from apo_bench.errors import InputError
-from apo_bench.simulation.film.film import AZIMUTH_DEG, ELEVATION_DEG, framing
+from apo_bench.simulation.film.film import FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG, framing
 from apo_bench.simulation.film.still import Still, draw_over, show_moment
 from apo_bench.simulation.scene.graphics import need_window
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import initial_state
 
-KEYS = {
+WINDOW_KEYS = {
     32: "play",
     262: "next",
     263: "previous",
@@ -65,7 +63,7 @@ def step_in_window(
     Args:
         assembled: What the camera looks at.
         now: What is to be shown.
-        press: Told what a key means, one of `KEYS`.
+        press: Told what a key means, one of `WINDOW_KEYS`.
         pass_time: Told how many seconds have passed.
     """
     import mujoco.viewer
@@ -74,15 +72,15 @@ def step_in_window(
     pressed: list[str] = []
 
     def on_key(code: int) -> None:
-        pressed.extend(filter(None, (KEYS.get(code),)))
+        pressed.extend(filter(None, (WINDOW_KEYS.get(code),)))
 
     with mujoco.viewer.launch_passive(
         scene.work.model, data, key_callback=on_key, show_left_ui=False, show_right_ui=False
     ) as window:
         with window.lock():
             window.cam.lookat[:], window.cam.distance = framing(scene.scenario.assembly, [assembled])
-            window.cam.azimuth = AZIMUTH_DEG
-            window.cam.elevation = ELEVATION_DEG
+            window.cam.azimuth = FILM_AZIMUTH_DEG
+            window.cam.elevation = FILM_ELEVATION_DEG
         before = time.monotonic()
         while window.is_running():
             while pressed:

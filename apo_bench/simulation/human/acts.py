@@ -1,7 +1,5 @@
 """From a scenario to what two hands are to do in one operation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import final
 

@@ -1,7 +1,5 @@
 """The human's demonstration, simulated: what the hands did, read off when each part rested."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -18,7 +16,7 @@ from apo_bench.scenario.scenario import Carelessness
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.human.acts import act
 from apo_bench.simulation.human.hands import Hands
-from apo_bench.simulation.human.perform import REST_S, perform
+from apo_bench.simulation.human.perform import STAND_STILL_S, perform
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import has_failed, sleeping, snapshot
 
@@ -58,7 +56,7 @@ def demonstrate(
             after.append(snapshot(scene.shown, hands.data, layout.start))
             goals.append(after[-1].poses[operation.main])
             hands.end(k)
-        hands.wait(REST_S)
+        hands.wait(STAND_STILL_S)
     final = snapshot(scene.shown, hands.data, layout.start)
     why = "the simulation became unstable" if has_failed(hands.data) else _wrong(scene, layout, after, final)
     return Demonstration(

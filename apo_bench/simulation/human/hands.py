@@ -1,7 +1,5 @@
 """Human hands: mocap bodies that hold parts by soft welds and move them along straight lines."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from copy import copy
 from functools import partial
@@ -15,7 +13,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, Ints
 from apo_bench.geometry.solid import all_boxes
 from apo_bench.simulation.hooks import BY_HAND, Doing, Hooks, hooks_of
-from apo_bench.simulation.robot.fast_forward import TINY_S, take_along
+from apo_bench.simulation.robot.in_hand import TINY_S, take_along
 from apo_bench.simulation.robot.near import Moving, near_spans
 from apo_bench.simulation.robot.paths import Trajectory
 from apo_bench.simulation.scene.composing import HANDS

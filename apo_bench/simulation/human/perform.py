@@ -1,7 +1,5 @@
 """What two hands do in one operation: take, carry over the others, bring to its place, let go."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.geometry import pose
@@ -9,7 +7,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.macros import UP
 from apo_bench.simulation.human.acts import Act
 from apo_bench.simulation.human.hands import Hands
-from apo_bench.simulation.robot.paths import Trajectory, at_height, minimum_jerk, shifted, smooth
+from apo_bench.simulation.robot.paths import Trajectory, minimum_jerk, shifted, smooth, with_height
 
 _SPEED = 0.9
 """Peak speed of a hand that carries a part through the air, [m/s]."""
@@ -25,7 +23,7 @@ _DROP_M = 0.0002
 """A part is let go this much above its support, as nobody presses it into the table."""
 _LIFT_M = 0.0003
 """How far a part is lifted while it is adjusted, so that it does not drag the one below."""
-REST_S = 0.3
+STAND_STILL_S = 0.3
 _SETTLE_S = 0.15
 """A group trails behind a quick hand by a millimetre; so long it takes to catch up."""
 
@@ -39,7 +37,7 @@ def perform(hands: Hands, act: Act, clearance_m: float) -> None:
     if act.out.any():
         T = _free(hands, T, act.out, clearance_m)
     safe = max(_SAFE_M, act.over, before[2, 3])
-    for end in (at_height(T, max(safe, T[2, 3])), at_height(before, safe), before):
+    for end in (with_height(T, max(safe, T[2, 3])), with_height(before, safe), before):
         hands.move((0, smooth(T, end, _SPEED, turn_speed=4.0)))
         T = end
     for part in (part for part in act.late if part in act.carries):
@@ -50,7 +48,7 @@ def perform(hands: Hands, act: Act, clearance_m: float) -> None:
         hands.move((0, smooth(beside, goal, _SHIFT)))
         hands.wait(0.05)
     hands.let_go(0, act.part, *act.carries)
-    hands.wait(REST_S)
+    hands.wait(STAND_STILL_S)
 
 
 def _free(hands: Hands, T: Array, out: Array, clearance_m: float) -> Array:
@@ -111,7 +109,7 @@ def _adjust(
     here = hands.grab(1, part)
     if held:
         hands.let_go(0, part)
-    there = at_height(true, here[2, 3])
+    there = with_height(true, here[2, 3])
     hands.move((1, smooth(here, shifted(here, UP, lift), _NUDGE)))
     hands.move((1, smooth(shifted(here, UP, lift), shifted(there, UP, lift), _SHIFT)), *meanwhile)
     hands.move((1, smooth(shifted(there, UP, lift), there, _NUDGE)))

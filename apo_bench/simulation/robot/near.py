@@ -1,10 +1,8 @@
 """Which part of a motion is rich in contact: where the hand, or what it holds, is near anything else.
 
 What only `--fidelity contact` asks. It looks at the state of the simulation, as the physics does; the controller never
-does. Boxes that a separating axis keeps apart by less than `NEAR_M` are near, which is never too few.
+does. Boxes that a separating axis keeps apart by less than `NEAR_HELD_M` are near, which is never too few.
 """
-
-from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
@@ -12,14 +10,17 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, Ints
 from apo_bench.geometry.intrusion import intrusion_depths, upright_bounds
 from apo_bench.geometry.solid import Piece
+from apo_bench.simulation.frames import body_frame
+from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.robot.paths import Trajectory
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import World, part_pose
 
-NEAR_M = (0.00005, 0.00015)
+NEAR_HELD_M = (0.00005, 0.00015)
 """A part in a hand drifts by less than the first on its way; parts of a group, which shift, by less than the second."""
 _LOOKS = 100
 _APART_M = (0.0002, 0.001)
@@ -60,6 +61,13 @@ class Moving(NamedTuple):
     T_tip: Array
 
 
+def moving_with_tip(scene: Scene, data: Any, T_tip: Array, opening: float, held: Iterable[str]) -> list[Moving]:
+    """The gripper at an opening [m], and the parts that it holds, as they move with the tip."""
+    inverse = pose.inverse(T_tip)
+    parts = [Moving(scene.pieces[part], inverse @ part_pose(scene.work, data, part)) for part in held]
+    return [Moving(gripper_boxes(scene.kinematics, scene.arm, round(opening, 4)), np.eye(4)), *parts]
+
+
 def near_spans(
     scene: Scene,
     data: Any,
@@ -69,7 +77,7 @@ def near_spans(
     s: Array,
     world: World | None = None,
     run_up_s: float = _RUN_UP_S,
-    near_m: tuple[float, float] = NEAR_M,
+    near_m: tuple[float, float] = NEAR_HELD_M,
 ) -> list[_Span]:
     """The stretches of a line along which something comes near, each with its run-up.
 
@@ -93,9 +101,9 @@ def near_spans(
     return _spans(near, looks, n, run_up_s, float(scene.physics.timestep_s))
 
 
-def clear(scene: Scene, data: Any, moving: Iterable[Moving], held: tuple[str, ...], T: Array) -> bool:
-    """Whether nothing is near while the tip stands at T."""
-    return not near_spans(scene, data, moving, held, Trajectory(T, T, 0.0, np.asarray), np.zeros(1))
+def clear(scene: Scene, data: Any, moving: Iterable[Moving], T: Array) -> bool:
+    """Whether nothing is near the empty hand while the tip stands at T."""
+    return not near_spans(scene, data, moving, (), Trajectory(T, T, 0.0, np.asarray), np.zeros(1))
 
 
 def _near(moving: Iterable[Moving], obstacles: Sequence[Obstacle], line: Trajectory, s: Array, margin: float) -> _Flags:
@@ -172,10 +180,4 @@ def _still(world: World, data: Any, parts: Iterable[str]) -> bool:
 
 
 def _pose(world: World, data: Any, part: str) -> Array:
-    if part in world.dof:
-        return part_pose(world, data, part)
-    body = world.body[part]
-    T = np.eye(4)
-    T[:3, :3] = data.xmat[body].reshape(3, 3)
-    T[:3, 3] = data.xpos[body]
-    return T
+    return part_pose(world, data, part) if part in world.dof else body_frame(data, world.body[part])

@@ -1,7 +1,5 @@
 """Straight lines in space and time: where the tip is when."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -151,7 +149,7 @@ def shifted(T: Array, along: Array, by: float) -> Array:
     return out
 
 
-def at_height(T: Array, height: float) -> Array:
+def with_height(T: Array, height: float) -> Array:
     """The pose lifted or lowered to a height in the world, [m]."""
     out = np.array(T)
     out[2, 3] = height

@@ -1,7 +1,5 @@
 """Joint angles along a line: inverse kinematics at knots, a cubic spline through them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -3,8 +3,6 @@
 Whoever plans, foretells or corrects knows the robot as it should be. Guards still act on the forces that are felt.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import final
 

@@ -5,8 +5,6 @@ the process: Mesa's brings an LLVM that other packages (Triton, so PyTorch with 
 has imported MuJoCo before, it is left as it is.
 """
 
-from __future__ import annotations
-
 import importlib
 import os
 import sys

@@ -1,7 +1,5 @@
 """What the gripper cannot hold, named before anything moves."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Arrows drawn into a picture: where a part may be shifted, and about what it may be turned."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Pictures: of a state, of what is believed, and films of a replay. Nothing here is needed to simulate."""
 
-from __future__ import annotations
-
 import weakref
 from collections.abc import Callable, Iterable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Compose the room, the parts and the arm into MuJoCo models, once per scenario, clearance and grasp."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, final

@@ -6,8 +6,6 @@ joined to few pieces, and the walls stand back behind the flat faces by less tha
 Nothing else changes: the pieces make up the same part.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 

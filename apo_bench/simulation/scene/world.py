@@ -1,7 +1,5 @@
 """A compiled model and where its parts are in it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager

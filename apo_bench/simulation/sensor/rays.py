@@ -1,7 +1,5 @@
 """What rays strike in a simulated scene, without any graphics."""
 
-from __future__ import annotations
-
 from typing import NamedTuple, final
 
 import mujoco

@@ -1,7 +1,5 @@
 """The TV camera: grey pictures of low resolution, and whether the scene is quiet after something changed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import final

@@ -1,7 +1,5 @@
 """Watch a demonstration while it runs: the TV camera says when it is quiet, and then the range finder fires."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, final
 

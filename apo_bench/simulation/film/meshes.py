@@ -1,7 +1,5 @@
 """What a world looks like, as triangles for viewers that know no MuJoCo: one shape for each body and colour."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from typing import Any, NamedTuple
 
@@ -21,7 +19,7 @@ _SHOWN_GROUPS = 3
 """MuJoCo shows the geoms of groups 0 to 2."""
 
 
-class Shape(NamedTuple):
+class BodyMesh(NamedTuple):
     """A surface that moves with a body."""
 
     body: int
@@ -34,7 +32,7 @@ class Shape(NamedTuple):
     rgba: tuple[float, float, float, float]
 
 
-def shapes(world: World) -> tuple[Shape, ...]:
+def body_meshes(world: World) -> tuple[BodyMesh, ...]:
     """Everything that is drawn of a world, planes excepted."""
     model = world.model
     found = defaultdict[Any, list[tuple[Array, NDArray[np.int64]]]](list)
@@ -48,7 +46,7 @@ def shapes(world: World) -> tuple[Shape, ...]:
         owner = int(world.geom_part[geom])
         key = (int(model.geom_bodyid[geom]), None if owner < 0 else parts[owner], rgba)
         found[key].append((mesh[0] @ T[:3, :3].T + T[:3, 3], mesh[1]))
-    return tuple(Shape(body, part, *_joined(each), rgba) for (body, part, rgba), each in found.items())
+    return tuple(BodyMesh(body, part, *_joined(each), rgba) for (body, part, rgba), each in found.items())
 
 
 def body_poses(scene: Scene, data: Any) -> Array:
@@ -56,15 +54,15 @@ def body_poses(scene: Scene, data: Any) -> Array:
     return np.hstack([data.xpos, data.xquat])
 
 
-def part_shapes(world: World, part: str) -> tuple[Shape, ...]:
-    """The shapes of one part, in the frame of the part."""
+def part_meshes(world: World, part: str) -> tuple[BodyMesh, ...]:
+    """The meshes of one part, in the frame of the part."""
     model = world.model
     root = world.body[part]
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     inverse = pose.inverse(pose.unpack([*data.xpos[root], *data.xquat[root]]))
     made = []
-    for shape in shapes(world):
+    for shape in body_meshes(world):
         if shape.part == part:
             T = inverse @ pose.unpack([*data.xpos[shape.body], *data.xquat[shape.body]])
             made.append(shape._replace(body=root, vertices=shape.vertices @ T[:3, :3].T + T[:3, 3]))

@@ -1,0 +1,36 @@
+"""Poses as MuJoCo has them: rotation matrices of nine numbers, quaternions with w first."""
+
+from typing import Any
+
+import mujoco
+import numpy as np
+from numpy.typing import ArrayLike
+
+from apo_bench.geometry.arrays import Array
+
+
+def frame(R: ArrayLike, position: ArrayLike) -> Array:
+    """The pose of a rotation, (3, 3) or (9,), and a position, (3,); as (4, 4)."""
+    T = np.eye(4)
+    T[:3, :3] = np.reshape(R, (3, 3))
+    T[:3, 3] = position
+    return T
+
+
+def rotation(quaternion: Any) -> Array:
+    """The rotation matrix, (9,), of a quaternion, w first."""
+    R = np.zeros(9)
+    mujoco.mju_quat2Mat(R, quaternion)
+    return R
+
+
+def quaternion(T: Array) -> Array:
+    """How a pose, (4, 4), is turned, as a quaternion, w first."""
+    q = np.zeros(4)
+    mujoco.mju_mat2Quat(q, np.ascontiguousarray(T[:3, :3]).ravel())
+    return q
+
+
+def body_frame(data: Any, body: int) -> Array:
+    """Where a body is in the world, (4, 4)."""
+    return frame(data.xmat[body], data.xpos[body])
