@@ -24,7 +24,8 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.nominal import nominal_operations
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.simulation.execution.prepare import moves, unreachable
+from apo_bench.simulation.execution.key_angles import key_angles
+from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.trial import run_trial
 
@@ -172,7 +173,7 @@ def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
         y = site.center_m[1] + j * site.spread_m[1]
         layout = layout_at(scenario, x, y, yaw, None, scene.clearance_mm)
         for move in moves(Plan(scenario.assembly, layout.start, layout.goals), scene, False):
-            code = unreachable(scene, move.transfer)
+            code = key_angles(move.transfer, scene).code
             part = move.transfer.part
             if code and code + part not in asked:
                 asked.add(code + part)

@@ -157,13 +157,15 @@ def test_a_line_takes_as_long_as_the_joints_need() -> None:
     end[:3, 3] += (0.1, 0.2, -0.1)
     line = smooth(kinematics.forward(q), end, 5.0)
     most = np.full(6, 0.5)
-    slower = within_speed(kinematics, line, q, most)
+    slower, knots = within_speed(kinematics, line, q, most)
     t = np.linspace(0.0, 1.0, 201)
     path = along(kinematics, slower, slower.progress(t), q)
     assert path is not None
     fastest = np.abs(np.gradient(path, slower.seconds / 200, axis=0)).max()
     assert fastest == pytest.approx(0.5, rel=0.02)
-    assert within_speed(kinematics, line, q, np.full(6, 50.0)) is line
+    assert within_speed(kinematics, line, q, np.full(6, 50.0))[0] is line
+    shared = along(kinematics, slower, slower.progress(t), q, knots)
+    assert np.array_equal(shared, path), "what was solved for the speed is what would be solved again"
 
 
 @pytest.mark.parametrize("name", ["ur5e_primitive", "panda_primitive"])

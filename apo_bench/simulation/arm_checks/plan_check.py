@@ -1,6 +1,6 @@
 """What an arm makes of a plan before it moves: reach, room to the limits of joints, room of the gripper, tip error."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, Literal, NamedTuple, cast
 
 import mujoco
@@ -8,14 +8,15 @@ import numpy as np
 
 from apo_bench.assembly.goals import Plan, Poses
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, remembered
+from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.intrusion import intrusion_depths
 from apo_bench.geometry.solid import Solid
 from apo_bench.prediction.arm import ArmMove
-from apo_bench.simulation.arm_checks.tip_error import TipError, motion_error
+from apo_bench.simulation.arm_checks.tip_error import motion_error
 from apo_bench.simulation.execution.fingers import OPEN_TO_PICK_M, OPEN_TO_RELEASE_M
-from apo_bench.simulation.execution.prepare import Move, key_angles, moves
-from apo_bench.simulation.execution.transfer import Grip
+from apo_bench.simulation.execution.key_angles import key_angles
+from apo_bench.simulation.execution.prepare import Move, moves
+from apo_bench.simulation.execution.transfer import Grip, after_transfer
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.scene.scene import Scene
 
@@ -39,18 +40,25 @@ def arm_moves(plan: Plan, scene: Scene, searches: bool = False) -> tuple[ArmMove
     Args:
         searches: As in `moves`.
     """
-    found = list[ArmMove]()
+    predicted = list[ArmMove]()
     believed = plan.start
     for move in moves(plan, scene, searches):
-        made = _arm_move(plan, scene, move, believed)
-        found.append(made)
-        T = move.transfer.T_world_goal @ pose.inverse(believed[move.transfer.part])
-        carried = plan.assembly.operations[move.step.operation].moves
-        believed = {**believed, **{part: T @ believed[part] for part in carried}}
-    return tuple(found)
+        operation = plan.assembly.operations[move.step.operation]
+        after = after_transfer(operation, move.transfer.T_world_goal, believed)
+        held = [(plan.assembly.solids[part], after[part]) for part in operation.moves]
+        predicted.append(_arm_move(scene, move, held, believed, after))
+        believed = after
+    return tuple(predicted)
 
 
-def _arm_move(plan: Plan, scene: Scene, move: Move, believed: Poses) -> ArmMove:
+def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], believed: Poses, after: Poses) -> ArmMove:
+    """One transfer.
+
+    Args:
+        held: What moves, each with its pose at the end.
+        believed: Where all parts are before it.
+        after: Where all parts are after it.
+    """
     step = move.step
     t = move.transfer
     code, path, ended = key_angles(t, scene)
@@ -58,9 +66,6 @@ def _arm_move(plan: Plan, scene: Scene, move: Move, believed: Poses) -> ArmMove:
         return ArmMove(step.operation, step.undo, cast(_Refused, code), _at_limit(scene, ended))
     if scene.arm.hand is None:
         return ArmMove(step.operation, step.undo)
-    T = t.T_world_goal @ pose.inverse(believed[t.part])
-    held = plan.assembly.operations[step.operation].moves
-    after = {**believed, **{part: T @ believed[part] for part in held}}
     tip = scene.kinematics.forward(path[-1])[:3, 3]
     struck = max(
         _struck(scene, t.part, t.grips[0], OPEN_TO_PICK_M, believed),
@@ -72,8 +77,8 @@ def _arm_move(plan: Plan, scene: Scene, move: Move, believed: Poses) -> ArmMove:
         undo=step.undo,
         struck=struck.part,
         struck_mm=1e3 * struck.depth,
-        sag=_sag(scene, path[-1], _centroid(plan, move, after), t.weight_n),
-        beside_mm=_beside_mm(scene, tip, [(plan.assembly.solids[part], after[part]) for part in held]),
+        sag=_sag(scene, path[-1], _centroid(held), t.weight_n),
+        beside_mm=_beside_mm(scene, tip, held),
         margin_deg=float(np.degrees(np.min([np.minimum(q - low, high - q) for q in path]))),
     )
 
@@ -99,11 +104,10 @@ def _struck(scene: Scene, part: str, grip: Grip, beyond: float, poses: Poses) ->
     return deepest
 
 
-def _centroid(plan: Plan, move: Move, poses: Poses) -> Array:
-    """Centre of mass of what is held, (3,), world, [m]; parts are homogeneous."""
-    solids = [(part, plan.assembly.solids[part]) for part in plan.assembly.operations[move.step.operation].moves]
-    at = np.array([pose.apply(poses[part], solid.centroid[None])[0] for part, solid in solids])
-    volumes = np.array([solid.volume for _, solid in solids])
+def _centroid(parts: Iterable[tuple[Solid, Array]]) -> Array:
+    """Centre of mass of parts at poses, (3,), world, [m]; they are homogeneous."""
+    at = np.array([pose.apply(T, solid.centroid[None])[0] for solid, T in parts])
+    volumes = np.array([solid.volume for solid, _ in parts])
     return np.asarray(volumes @ at / volumes.sum())
 
 
@@ -112,16 +116,14 @@ def _sag(scene: Scene, q: Array, centroid: Array, weight_n: float) -> Array:
     kinematics = scene.kinematics
     model = scene.work.model
     tip = kinematics.forward(q)[:3, 3]
+    # Joint torques of a wrench at the tip are J^T w; each servo gives way by torque over stiffness, and J takes that to
+    # a twist of the tip, which turns about the tip: there exp(twist) back.
     J = _jacobian(kinematics.model, kinematics.configuration.data, kinematics.site, scene.arm.joints)
     stiffness = np.array([model.actuator(f"arm/{name}").gainprm[0] for name in scene.arm.joints])
     force = np.array([0.0, 0.0, -weight_n])
     wrench = np.concatenate([force, np.cross(centroid - tip, force)])
     twist = J @ ((J.T @ wrench) / stiffness)
-    there = np.eye(4)
-    back = np.eye(4)
-    there[:3, 3] = tip
-    back[:3, 3] = -tip
-    return np.asarray(there @ pose.exp(twist) @ back)
+    return np.asarray(pose.at(tip) @ pose.exp(twist) @ pose.at(-tip))
 
 
 def _jacobian(model: Any, data: Any, site: int, joints: tuple[str, ...]) -> Array:
@@ -134,15 +136,9 @@ def _jacobian(model: Any, data: Any, site: int, joints: tuple[str, ...]) -> Arra
 
 def _beside_mm(scene: Scene, tip: Array, parts: Iterable[tuple[Solid, Array]]) -> float:
     """How far what is held goes beside its line at the speed of an insertion: the tip, and its turn at their ends."""
-    found = _tip_error(scene)
-    if found is None:
+    error = motion_error(scene)
+    if error is None:
         return 0.0
-    corners = [pose.apply(T, corner) for solid, T in parts for corner in (np.array(solid.bounds),)]
+    corners = [pose.apply(T, solid.bounds) for solid, T in parts]
     lever = max(float(np.linalg.norm(each - tip, axis=1).max()) for each in corners)
-    return found.across_mm + 1e3 * np.radians(found.turn_deg) * lever
-
-
-@remembered
-def _tip_error(scene: Scene) -> TipError | None:
-    """Found by trying; nothing where the tip has no way."""
-    return motion_error(scene)
+    return error.across_mm + 1e3 * np.radians(error.turn_deg) * lever

@@ -5,7 +5,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, remembered
 from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth, steady
 from apo_bench.simulation.robot.robot import Halt, Robot
 from apo_bench.simulation.scene.scene import Scene
@@ -33,29 +33,34 @@ class TipError:
     turn_deg: float
 
 
-def motion_error(scene: Scene, speed: float = SPEEDS[1]) -> TipError | None:
-    """The error of the tip of an empty hand in free air at one speed, [m/s]; None where it has no way there."""
+@remembered
+def motion_error(scene: Scene) -> TipError | None:
+    """The error of the tip of an empty hand in free air at the speed of an insertion; None where it has no way there.
+
+    It is found by trying, once for a scene.
+    """
     robot = Robot(scene, scene.scenario.start)
     up = np.array(robot.T)
     up[2, 3] = HIGH_M
     try:
         robot.trace(smooth(robot.T, up, SPEEDS[-1]))
         robot.wait(STAND_S)
-        line = steady(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), WAY_M), speed)
-        return error_on(line, robot.trace(line), speed)
+        line = steady(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), WAY_M), SPEEDS[1])
+        return error_on(line, robot.trace(line), SPEEDS[1])
     except Halt:
         return None
 
 
-def error_on(line: Trajectory, found: Array, speed: float) -> TipError:
-    """Beside the line, along it behind the command, and turned."""
+def error_on(line: Trajectory, tips: Array, speed: float) -> TipError:
+    """Of where the tip was at each step, (n, 4, 4): beside the line, along it behind the command, and turned."""
     way = line.end[:3, 3] - line.start[:3, 3]
     way = way / np.linalg.norm(way)
-    n = len(found)
-    asked = line.poses(line.progress(np.arange(1, n + 1) / n))
-    off = found[:, :3, 3] - asked[:, :3, 3]
+    n = len(tips)
+    commanded = line.poses(line.progress(np.arange(1, n + 1) / n))
+    off = tips[:, :3, 3] - commanded[:, :3, 3]
     along = off @ way
     beside = np.linalg.norm(off - along[:, None] * way, axis=1)
-    turned = np.einsum("nij,nij->n", found[:, :3, :3], asked[:, :3, :3])
+    # The trace of R_commanded^T R is 1 + 2 cos(angle between them).
+    turned = np.einsum("nij,nij->n", tips[:, :3, :3], commanded[:, :3, :3])
     angle = np.degrees(np.arccos(np.clip((turned - 1.0) / 2.0, -1.0, 1.0)))
     return TipError(speed, 1e3 * float(beside.max()), 1e3 * float(np.abs(along).max()), float(angle.max()))

@@ -11,8 +11,9 @@ from apo_bench.assembly.reached import Outcome, Reached, ReplayResult, Snapshot
 from apo_bench.prediction.stability import first_unstable
 from apo_bench.records.outcomes import sentence
 from apo_bench.simulation.execution.carry_out import bring, take
-from apo_bench.simulation.execution.prepare import Move, moves, unreachable
-from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
+from apo_bench.simulation.execution.key_angles import key_angles
+from apo_bench.simulation.execution.prepare import Move, moves
+from apo_bench.simulation.execution.replay_cache import Progress, ReplayCache, cache_keys
 from apo_bench.simulation.hooks import Hooks, hooks_of
 from apo_bench.simulation.robot.in_hand import HoldWatch
 from apo_bench.simulation.robot.robot import Halt, Robot
@@ -25,6 +26,8 @@ _SETTLE_S = 0.5
 _REST_M_S = 5e-5
 _REST_RAD_S = 1e-3
 """Slower than this, all parts rest and the next operation may begin; a stick that rocks in its slot takes a while."""
+_AT_FIRST_S = 0.05
+"""Before the first operation the arm stands so long."""
 LOOK_S = 0.04
 PATIENCE_S = 1.5
 _SHORTEST_STEP_S = 1.0
@@ -62,33 +65,33 @@ def replay(
     todo = () if too_long else _todo(plan, scene, searches, error)
     refused = _late(plan, "plan", plan.schedule[0]) if too_long else _refusal(plan, scene, todo)
     cache = ReplayCache() if cache is None or watch is not None else cache
-    way = cache_keys(scene, start, fidelity, todo, error)
-    ended = None if refused or not way or most_s < math.inf else cache.ended(way[-1])
-    if ended is not None:
-        return ended
+    keys = cache_keys(scene, start, fidelity, todo, error)
+    same = None if refused or not keys or most_s < math.inf else cache.ended(keys[-1])
+    if same is not None:
+        return same
     hooks = hooks_of(watch)
     if hooks.before_replay is not None:
         hooks.before_replay(plan)
     robot = Robot(scene, start, hooks, fidelity, error)
-    after = list[Snapshot | None]([None] * len(plan.assembly))
-    timeline = list[tuple[Step, float]]()
+    progress = Progress([None] * len(plan.assembly), [])
     with sleeping(scene.work, scene.grasp == "friction"):
-        outcome = refused or _carry_out(plan, robot, todo, after, timeline, cache, way, most_s)
+        outcome = refused or _carry_out(plan, robot, todo, progress, cache, keys, most_s)
         final = _settled(robot, plan) if outcome.code != "unstable_simulation" else None
     result = ReplayResult(
-        reached=Reached(after=tuple(after), final=final),
+        reached=Reached(after=tuple(progress.after), final=final),
         outcome=outcome,
         peak_force_n=robot.forces.peak_n,
         sim_seconds=float(robot.data.time),
-        timeline=tuple(timeline),
+        timeline=tuple(progress.timeline),
         in_hand=robot.hold_watch.finished,
     )
-    if way and not refused and outcome.code != "time_limit":
-        cache.end(way[-1], result)
+    if keys and not refused and outcome.code != "time_limit":
+        cache.end(keys[-1], result)
     return result
 
 
 def _todo(plan: Plan, scene: Scene, searches: bool, error: RobotError | None) -> tuple[Move, ...]:
+    """The transfers of a plan, as a robot carries them out whose base and tool are not where it believes them."""
     if error is None:
         return moves(plan, scene, searches)
     planned = moves(error.plan(plan), scene, searches)
@@ -101,10 +104,9 @@ def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None
         k = first_unstable(plan.assembly.first(upto), plan.start, goals[:upto])
         if k is not None:
             return _outcome(plan, "plan", "unstable_goal", k)
-    for move in todo:
-        code = unreachable(scene, move.transfer)
-        if code:
-            return _outcome(plan, "plan", code, move.step.operation)
+    for step, transfer in todo:
+        if code := key_angles(transfer, scene).code:
+            return _outcome(plan, "plan", code, step.operation)
     return None
 
 
@@ -112,52 +114,47 @@ def _carry_out(
     plan: Plan,
     robot: Robot,
     todo: tuple[Move, ...],
-    after: list[Snapshot | None],
-    timeline: list[tuple[Step, float]],
+    progress: Progress,
     cache: ReplayCache,
-    way: list[bytes],
+    keys: list[bytes],
     most_s: float,
 ) -> Outcome:
-    done, kept = cache.resume(way, robot)
-    if kept is None:
+    """One step of the schedule after the other, from the furthest state that the cache has."""
+    kept_states, grip = cache.resume(keys, robot, progress)
+    if not kept_states:
         try:
-            robot.wait(0.05)
+            robot.wait(_AT_FIRST_S)
         except Halt as halt:
             return _outcome(plan, "pick", halt.code, plan.schedule[0].operation, halt.part)
-    else:
-        after[:] = kept.after
-        timeline[:] = kept.timeline
-    for i, (step, t) in list(enumerate(todo))[done // 2 :]:
+    for i, (step, transfer) in list(enumerate(todo))[kept_states // 2 :]:
         if robot.data.time > most_s:
             return _late(plan, "pick", step)
         robot.step = step
         if robot.hooks.before_step is not None:
             robot.hooks.before_step(step)
         try:
-            if kept is None or done <= 2 * i:
-                grip = take(robot, t)
+            if kept_states <= 2 * i:
+                grip = take(robot, transfer)
                 robot.slip(step.operation)
-                cache.keep(way[2 * i], robot, grip, after, timeline)
-            else:
-                grip = kept.grip
-            bring(robot, t, grip)
-            _watched(robot, step)
+                cache.keep(keys[2 * i], robot, grip, progress)
+            bring(robot, transfer, grip)
+            _note_hold(robot, step)
             _until_rest(robot)
         except Halt as halt:
             if halt.code != "unstable_simulation":
-                _watched(robot, step)
+                _note_hold(robot, step)
             if halt.code == "force_stop" and not step.undo:
-                after[step.operation] = snapshot(robot.scene.work, robot.data, plan.start)
+                progress.after[step.operation] = snapshot(robot.scene.work, robot.data, plan.start)
             return _outcome(plan, halt.stage, halt.code, step.operation, halt.part)
-        after[step.operation] = None if step.undo else snapshot(robot.scene.work, robot.data, plan.start)
-        timeline.append((step, float(robot.data.time)))
-        cache.keep(way[2 * i + 1], robot, 0, after, timeline)
+        progress.after[step.operation] = None if step.undo else snapshot(robot.scene.work, robot.data, plan.start)
+        progress.timeline.append((step, float(robot.data.time)))
+        cache.keep(keys[2 * i + 1], robot, 0, progress)
         if robot.hooks.after_step is not None:
             robot.hooks.after_step(step)
     return Outcome("done", "ok", None, sentence("ok"))
 
 
-def _watched(robot: Robot, step: Step) -> None:
+def _note_hold(robot: Robot, step: Step) -> None:
     """Write down how the part moved in the hand; of an operation that is undone nothing."""
     watch = robot.hold_watch
     if watch.grasped is not None:

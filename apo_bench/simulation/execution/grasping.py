@@ -14,6 +14,7 @@ from apo_bench.geometry.solid import Piece, Solid, all_boxes, extent
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.robot.near import Obstacle, obstacle
+from apo_bench.simulation.robot.paths import shifted
 from apo_bench.simulation.scene.scene import Scene
 
 _STAND_OFF_M = 0.012
@@ -64,7 +65,7 @@ def obstacles(solids: Mapping[str, Solid], poses: Poses, without: Sequence[str])
 
 def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[RestingPart]) -> Grasp:
     """The first grasp at which the open gripper is clear at every place; the preferred one if there is none."""
-    if _clear(scene, part, [preferred], places, _MARGINS_M[-1]):
+    if any(_clear(scene, part, [preferred], places, _MARGINS_M[-1])):
         return preferred
     return _first_clear(scene, part, _candidates(scene, part, places[0].T), places) or preferred
 
@@ -77,8 +78,9 @@ def clear_across(scene: Scene, part: str, across: Array, place: RestingPart) -> 
     up = _upwards(place.T)
     level = across - (across @ up) * up
     level /= np.linalg.norm(level)
+    stays = Stroke(place.T, up, 0.0, place.around)
     able = [grasp for grasp in _candidates(scene, part, place.T) if abs(grasp.across @ level) > 0.99]
-    able = [grasp for grasp in able if _clear_closed(scene, part, grasp, place, _MARGINS_M[-1])]
+    able = [grasp for grasp in able if _closed_depth(scene, part, grasp, stays, np.zeros(1), _MARGINS_M[-1])[0] <= 0.0]
     return _first_clear(scene, part, able, [place])
 
 
@@ -92,22 +94,21 @@ def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[Rest
     """
     ends = (*places, RestingPart(stroke.T, stroke.around))
     least = _MARGINS_M[-1]
-    if _clear(scene, part, [preferred], ends, least) and not _nearest(scene, part, preferred, stroke, least):
+    if any(_clear(scene, part, [preferred], ends, least)) and not _nearest(scene, part, preferred, stroke, least):
         return Grips(preferred)
     everything = _candidates(scene, part, places[0].T)
     for margin in _MARGINS_M:
-        clear = _clear(scene, part, everything, ends, margin)
-        whole = next((grasp for grasp in clear if not _nearest(scene, part, grasp, stroke, margin)), None)
-        if whole is not None:
-            return Grips(whole)
+        for grasp in _clear(scene, part, everything, ends, margin):
+            if not _nearest(scene, part, grasp, stroke, margin):
+                return Grips(grasp)
     for margin in _MARGINS_M:
         able = [
             (_nearest(scene, part, grasp, stroke, margin), grasp)
             for grasp in _clear(scene, part, everything, places, margin)
         ]
-        found = _pair(scene, part, stroke, sorted(able, key=lambda pair: -pair[0]), margin)
-        if found is not None:
-            return found
+        pair = _pair(scene, part, stroke, sorted(able, key=lambda pair: -pair[0]), margin)
+        if pair is not None:
+            return pair
     return Grips(preferred)
 
 
@@ -148,10 +149,10 @@ def _upwards(T: Array) -> Array:
 def _pair(scene: Scene, part: str, stroke: Stroke, able: Sequence[tuple[float, Grasp]], margin: float) -> Grips | None:
     """Begin with a grasp as near to the middle as can be, and end with one that is clear from there on."""
     goal = RestingPart(stroke.T, stroke.around)
-    last = _clear(scene, part, _candidates(scene, part, stroke.T), [goal], margin)
+    last = list(_clear(scene, part, _candidates(scene, part, stroke.T), [goal], margin))
     for left, first in able:
-        change = RestingPart(_back(stroke, left), stroke.around)
-        if 0.0 < left < _MOST_LEFT_M and _clear(scene, part, [first], [change], margin):
+        change = RestingPart(shifted(stroke.T, stroke.way, -left), stroke.around)
+        if 0.0 < left < _MOST_LEFT_M and any(_clear(scene, part, [first], [change], margin)):
             near = Stroke(stroke.T, stroke.way, left, stroke.around)
             for second in _clear(scene, part, last, [change], margin):
                 if _nearest(scene, part, second, near, margin) == 0.0:
@@ -167,8 +168,7 @@ def _candidates(scene: Scene, part: str, T: Array) -> list[Grasp]:
         around = _around_box(scene, solid, T)
         if around and all(holds_whole(solid.pieces, grasp.point, grasp.across, up) for grasp in around):
             return around
-    found = holds(solid, up, scene.arm.opening_m)
-    return [Grasp(*hold) for hold in found]
+    return [Grasp(*hold) for hold in holds(solid, up, scene.arm.opening_m)]
 
 
 def _around_box(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
@@ -179,33 +179,28 @@ def _around_box(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
     up = int(np.abs(T[2, :3]).argmax())
     rise = np.sign(T[2, up]) * (_HEIGHT - 0.5) * size[up] * np.eye(3)[up]
     level = sorted((axis for axis in range(3) if axis != up), key=lambda axis: size[axis])
-    found = []
+    grasps = []
     for axis, along in (level, level[::-1]):
         reach = max(0.0, size[along] / 2 - _END_M)
         offsets = np.arange(-reach, reach + 1e-9, _GRID_M) if reach > _GRID_M else np.zeros(1)
         if size[axis] / 2 + _STAND_OFF_M / 2 <= scene.arm.opening_m:
             for offset in sorted(offsets, key=abs):
-                found.append(Grasp(middle + rise + offset * np.eye(3)[along], np.eye(3)[axis]))
-    return found
+                grasps.append(Grasp(middle + rise + offset * np.eye(3)[along], np.eye(3)[axis]))
+    return grasps
 
 
 def _first_clear(scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[RestingPart]) -> Grasp | None:
     """The first of those around which there is most room at every place, or None."""
-    found = (_clear_ones(scene, part, grasps, places, margin) for margin in _MARGINS_M)
-    return next((grasp for clear in found for grasp in clear), None)
+    return next((grasp for margin in _MARGINS_M for grasp in _clear(scene, part, grasps, places, margin)), None)
 
 
 def _clear(
     scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[RestingPart], margin: float
-) -> list[Grasp]:
-    """The grasps at which the open gripper, about to close or having let go, strikes nothing at any place."""
-    return list(_clear_ones(scene, part, grasps, places, margin))
-
-
-def _clear_ones(
-    scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[RestingPart], margin: float
 ) -> Iterator[Grasp]:
-    """Those grasps one after the other, worked out as they are asked for."""
+    """The grasps at which the open gripper, about to close or having let go, strikes nothing at any place.
+
+    They are worked out as they are asked for, those of one direction and width together.
+    """
     pieces = scene.scenario.assembly.solids[part].pieces
     T = places[0].T
 
@@ -225,23 +220,19 @@ def _clear_ones(
         yield from (grasp for grasp, hit in zip(same, struck, strict=True) if not hit)
 
 
-def _clear_closed(scene: Scene, part: str, grasp: Grasp, place: RestingPart, margin: float) -> bool:
-    """Whether the gripper strikes nothing once it has closed on the part."""
-    width = _known_width(scene.scenario.assembly.solids[part].pieces, grasp, place.T)
-    tip = place.T @ tip_frame(grasp, place.T)
-    return bool(_depth(scene, width, tip[:3, :3], tip[None, :3, 3], place.around, margin)[0] <= 0.0)
-
-
 def _nearest(scene: Scene, part: str, grasp: Grasp, stroke: Stroke, margin: float) -> float:
     """How near to its end the closed gripper comes along a stroke before it strikes something, [m]; 0 if it arrives."""
-    width = _known_width(scene.scenario.assembly.solids[part].pieces, grasp, stroke.T)
     lefts = np.linspace(stroke.travel, 0.0, max(2, round(stroke.travel / _GRID_M) + 1))
+    struck = _closed_depth(scene, part, grasp, stroke, lefts, margin) > 0.0
+    return float(lefts[max(0, int(np.argmax(struck)) - 1)]) if struck.any() else 0.0
+
+
+def _closed_depth(scene: Scene, part: str, grasp: Grasp, stroke: Stroke, lefts: Array, margin: float) -> Array:
+    """How deep the gripper, closed on the part, is in what stands around, so far before the end of a stroke, (k,)."""
+    width = _known_width(scene.scenario.assembly.solids[part].pieces, grasp, stroke.T)
     tip = stroke.T @ tip_frame(grasp, stroke.T)
     at = tip[:3, 3] - lefts[:, None] * stroke.way
-    struck = _depth(scene, width, tip[:3, :3], at, stroke.around, margin) > 0.0
-    if not struck.any():
-        return 0.0
-    return float(lefts[max(0, int(np.argmax(struck)) - 1)])
+    return _depth(scene, width, tip[:3, :3], at, stroke.around, margin)
 
 
 def _depth(scene: Scene, opening: float, R: Array, at: Array, around: Sequence[Obstacle], margin: float) -> Array:
@@ -258,10 +249,3 @@ def _depth(scene: Scene, opening: float, R: Array, at: Array, around: Sequence[O
         if (low < each.high).all() and (high > each.low).all():
             depth = np.maximum(depth, intrusion_depths(boxes, R, at, each.pieces, each.T))
     return depth
-
-
-def _back(stroke: Stroke, left: float) -> Array:
-    """The part `left` before the end of a stroke."""
-    T = np.array(stroke.T)
-    T[:3, 3] -= left * stroke.way
-    return T

@@ -6,13 +6,14 @@ MuJoCo goes on from a state exactly, so a result does not depend on what is kept
 import hashlib
 from collections.abc import Sequence
 from dataclasses import fields, is_dataclass
-from typing import Any, NamedTuple, TypeVar, final
+from typing import Any, NamedTuple, final
 
 import mujoco
 import numpy as np
 
 from apo_bench.assembly.goals import Poses, Step
 from apo_bench.assembly.reached import ReplayResult, Snapshot
+from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.execution.transfer import Transfer
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.world import awaken
@@ -22,20 +23,25 @@ _MOST = 4096
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)
 
 
-_Kept = TypeVar("_Kept")
+class Progress(NamedTuple):
+    """What a replay has reached so far."""
+
+    after: list[Snapshot | None]
+    """For each operation, the state when it was done; None while it is not, or when it is undone."""
+    timeline: list[tuple[Step, float]]
+    """Steps that are done, each with the simulated time of its end, [s]."""
 
 
 class SavedState(NamedTuple):
     """All that decides how a replay goes on."""
 
-    state: Any
-    felt: Any
-    welds: Any
+    state: Array
+    sensors: Array
+    welds: Array
     robot: tuple[Any, ...]
     grip: int
     """Which of the grips of the move is in use."""
-    after: tuple[Snapshot | None, ...]
-    timeline: tuple[tuple[Step, float], ...]
+    progress: Progress
 
 
 @final
@@ -43,70 +49,70 @@ class ReplayCache:
     """What the replays of one scene have in common, kept for the trials of one seed; they run in one process."""
 
     def __init__(self) -> None:
-        self._kept: dict[bytes, SavedState] = {}
-        self._ended: dict[bytes, ReplayResult] = {}
+        self._states: dict[bytes, SavedState] = {}
+        self._results: dict[bytes, ReplayResult] = {}
 
-    def ended(self, mark: bytes) -> ReplayResult | None:
+    def ended(self, key: bytes) -> ReplayResult | None:
         """The result of a replay that was the same from its beginning to its end."""
-        return self._ended.get(mark)
+        return self._results.get(key)
 
-    def end(self, mark: bytes, result: ReplayResult) -> None:
-        _keep(self._ended, mark, result)
+    def end(self, key: bytes, result: ReplayResult) -> None:
+        """Keep the result of a replay under all that has led to it."""
+        self._results[key] = result
+        _drop_oldest(self._results)
 
-    def keep(
-        self,
-        mark: bytes,
-        robot: Robot,
-        grip: int,
-        after: Sequence[Snapshot | None],
-        timeline: Sequence[tuple[Step, float]],
-    ) -> None:
+    def keep(self, key: bytes, robot: Robot, grip: int, progress: Progress) -> None:
         """Keep the present state under what has led to it; nothing sleeps in it."""
         awaken(robot.scene.work, robot.data)
-        if mark not in self._kept:
+        if key not in self._states:
             model = robot.model
             data = robot.data
             state = np.zeros(mujoco.mj_stateSize(model, _STATE))
             mujoco.mj_getState(model, data, state, _STATE)
-            felt = data.sensordata.copy()
+            reached = Progress([*progress.after], [*progress.timeline])
             welds = model.eq_data.copy()
-            saved = SavedState(state, felt, welds, robot.memory(), grip, tuple(after), tuple(timeline))
-            _keep(self._kept, mark, saved)
+            self._states[key] = SavedState(state, data.sensordata.copy(), welds, robot.memory(), grip, reached)
+            _drop_oldest(self._states)
 
-    def resume(self, marks: Sequence[bytes], robot: Robot) -> tuple[int, SavedState | None]:
-        """Take up the furthest state that was kept; returns how many of the marks lie behind it, and what was kept."""
-        for i in range(len(marks), 0, -1):
-            kept = self._kept.get(marks[i - 1])
-            if kept is not None:
-                robot.model.eq_data[:] = kept.welds
-                mujoco.mj_setState(robot.model, robot.data, kept.state, _STATE)
-                robot.data.sensordata[:] = kept.felt
+    def resume(self, keys: Sequence[bytes], robot: Robot, progress: Progress) -> tuple[int, int]:
+        """Take up the furthest state that was kept.
+
+        Returns:
+            How many of the keys lead to it, 0 if nothing was kept; and the grip that is in use there.
+        """
+        for i in range(len(keys), 0, -1):
+            saved = self._states.get(keys[i - 1])
+            if saved is not None:
+                robot.model.eq_data[:] = saved.welds
+                mujoco.mj_setState(robot.model, robot.data, saved.state, _STATE)
+                robot.data.sensordata[:] = saved.sensors
                 awaken(robot.scene.work, robot.data)
-                robot.remember(kept.robot)
-                return i, kept
-        return 0, None
+                robot.remember(saved.robot)
+                progress.after[:] = saved.progress.after
+                progress.timeline[:] = saved.progress.timeline
+                return i, saved.grip
+        return 0, 0
 
 
-def _keep(found: dict[bytes, _Kept], mark: bytes, what: _Kept) -> None:
-    found[mark] = what
-    if len(found) > _MOST:
-        del found[next(iter(found))]
+def _drop_oldest(kept: dict[bytes, Any]) -> None:
+    if len(kept) > _MOST:
+        del kept[next(iter(kept))]
 
 
 def cache_keys(
     scene: Any, start: Poses, fidelity: str, moves: Sequence[tuple[Step, Transfer]], error: Any = None
 ) -> list[bytes]:
-    """What has led to each state: two marks for each move, one when the part is lifted, one when the move is done."""
+    """What has led to each state: two keys for each move, one when the part is lifted, one when the move is done."""
     digest = hashlib.sha256(
         _bytes((id(scene), sorted(start), [start[part] for part in sorted(start)], fidelity, error))
     )
-    found = []
+    keys = []
     for step, t in moves:
         before = digest.copy()
         before.update(_bytes(_until_lifted(t)))
         digest.update(_bytes((step, t)))
-        found += [before.digest(), digest.digest()]
-    return found
+        keys += [before.digest(), digest.digest()]
+    return keys
 
 
 def _until_lifted(t: Transfer) -> tuple[Any, ...]:

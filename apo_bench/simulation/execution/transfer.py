@@ -1,11 +1,16 @@
-"""What the controller needs to know to move one part, with what it carries, from one place to another."""
+"""What the controller needs to know to move one part, with what it carries: grips, lines, macros, guards."""
 
 from dataclasses import dataclass, replace
 from typing import NamedTuple, final
 
 import numpy as np
 
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.topology import Operation
+from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.insertion.arrival import Arrival
+from apo_bench.insertion.line import Attach
 from apo_bench.insertion.macros import MacroName
 from apo_bench.insertion.surroundings import WALL_MARGIN_M
 from apo_bench.simulation.robot.paths import shifted, with_height
@@ -19,6 +24,10 @@ _HOVER_M = 0.11
 ASIDE_M = 0.006
 """A slide begins this far from the side it shall touch; what touches at its side is moved off as far before it is
 lifted, since in the hand it drifts into its neighbour."""
+
+
+PUT_DOWN = Attach(np.array([0.0, 0.0, -1.0]), 0.05)
+"""How a part that was taken off is put down, in the world."""
 
 
 class Grip(NamedTuple):
@@ -137,6 +146,12 @@ class Transfer:
         return replace(self, grips=grips, centring=tuple(grip.with_tip_at(T) for grip in self.centring))
 
 
+def after_transfer(operation: Operation, target: Array, poses: Poses) -> Poses:
+    """Where all parts are once the main part of an operation was brought to a pose, (4, 4), with what it carries."""
+    T = target @ pose.inverse(poses[operation.main])
+    return {**poses, **{part: T @ poses[part] for part in operation.moves}}
+
+
 def first_contact_pose(t: Transfer) -> Array:
     """Where the part first comes down: at its goal, or aside of what it shall touch."""
     return shifted(t.T_world_goal, np.sum(t.sides, axis=0), -ASIDE_M) if t.sides else t.T_world_goal
@@ -157,3 +172,24 @@ def key_poses(t: Transfer) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
 
 def hover_pose(grasp: Array) -> float:
     return float(grasp[2, 3]) + _HOVER_M
+
+
+def arrival_line(arrival: Arrival, T: Array) -> ApproachLine:
+    """The line on which a part arrives at T; straight down if it touches nothing there that is known of."""
+    if not arrival.touched:
+        return ApproachLine(PUT_DOWN.direction, PUT_DOWN.travel_m)
+    return ApproachLine(T[:3, :3] @ arrival.line.direction, arrival.line.travel_m)
+
+
+def motions(arrival: Arrival, T: Array, sides: tuple[Array, ...]) -> tuple[Motion, ...]:
+    """The macros in the world, for a part that arrives at T; slides as they are believed to be."""
+    straight = [macro for macro in arrival.macros if macro.name != "slide-to-contact"]
+    turned = [Motion(macro.name, T[:3, :3] @ arrival.own(macro.direction)) for macro in straight]
+    return (*turned, *(Motion("slide-to-contact", side) for side in sides))
+
+
+def departure_motions(arrival: Arrival, T: Array, sides: tuple[Array, ...]) -> tuple[Motion, ...]:
+    """The macros backwards, for a part that leaves T: off its sides, the last first, then out of what encloses it."""
+    out = [macro for macro in arrival.departs if macro.length_m is not None]
+    drawn = [Motion(macro.name, T[:3, :3] @ arrival.own(macro.direction)) for macro in out]
+    return (*(Motion("depart", -side) for side in reversed(sides)), *drawn)

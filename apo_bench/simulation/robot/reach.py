@@ -1,6 +1,7 @@
 """Joint angles along a line: inverse kinematics at knots, a cubic spline through them."""
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -22,63 +23,75 @@ _FAR_RAD = 1.0
 """The spacing of knots where only the joint angles at the end are asked for."""
 
 
-def along(kinematics: Kinematics, line: Trajectory, s: Array, q: Array) -> Array | None:
+class Knots(NamedTuple):
+    """Joint angles that inverse kinematics found at places along a line."""
+
+    s: Array
+    """(k,), from 0 to 1."""
+    q: Array
+    """(k, joints), [rad]."""
+
+
+def along(kinematics: Kinematics, line: Trajectory, s: Array, q: Array, known: Knots | None = None) -> Array | None:
     """Joint angles, (k, joints), at places along a line; None where the arm does not reach.
 
     Args:
         s: (k,), in ascending order, from 0 to 1.
         q: (joints,), at the first of the places, [rad].
+        known: From `within_speed`, of a line that begins at `q`; solved again only where other knots are needed.
     """
     if len(s) == 1:
         return np.asarray(q)[None]
     part = float(s[-1] - s[0])
     least = 3 if part * _steps(line, _SHORT_M, _SHORT_RAD) <= 1.0 else 4
     count = max(least, int(np.ceil(part * _steps(line, _KNOT_M, _KNOT_RAD))) + 1)
-    at = np.linspace(s[0], s[-1], count)
-    found = _angles(kinematics, line, at, q)
-    return None if found is None else np.asarray(CubicSpline(at, found)(s))
+    places = np.linspace(s[0], s[-1], count)
+    if known is None or not np.array_equal(known.s, places):
+        known = _knots(kinematics, line, places, q)
+    return None if known is None else np.asarray(CubicSpline(*known)(s))
 
 
 def at_end(kinematics: Kinematics, line: Trajectory, begin: float, end: float, q: Array) -> Array | None:
     """Joint angles, (joints,), at `end`, found by way of a few places from `begin`, where they are q."""
     count = 1 + max(1, int(np.ceil((end - begin) * _steps(line, _FAR_M, _FAR_RAD))))
-    found = _angles(kinematics, line, np.linspace(begin, end, count), q)
-    return None if found is None else np.asarray(found[-1])
+    knots = _knots(kinematics, line, np.linspace(begin, end, count), q)
+    return None if knots is None else knots.q[-1]
 
 
-def within_speed(kinematics: Kinematics, line: Trajectory, q: Array, most: Array | None) -> Trajectory:
-    """The same line, slower where a joint would turn faster than it can.
+def within_speed(
+    kinematics: Kinematics, line: Trajectory, q: Array, limit: Array | None
+) -> tuple[Trajectory, Knots | None]:
+    """The same line, slower where a joint would turn faster than it can; and the knots that were solved for that.
 
     Args:
         q: (joints,), where the line begins, [rad].
-        most: (joints,), the speed limits, [rad/s]; None: there are none.
+        limit: (joints,), the speed limits, [rad/s]; None: there are none, and nothing is solved.
     """
-    if most is None:
-        return line
+    if limit is None:
+        return line, None
     count = 1 + max(4, int(np.ceil(_steps(line, _KNOT_M, _KNOT_RAD))))
-    at = np.linspace(0.0, 1.0, count)
-    path = _angles(kinematics, line, at, q)
-    if path is None:
-        return line
+    knots = _knots(kinematics, line, np.linspace(0.0, 1.0, count), q)
+    if knots is None:
+        return line, None
     t = np.linspace(0.0, 1.0, _SPEED_LOOKS)
-    s = line.progress(t)
-    speed = np.abs(np.gradient(CubicSpline(at, path)(s), t, axis=0)) / line.seconds
-    ratio = float((speed / most).max())
-    return line if ratio <= 1.0 else replace(line, seconds=line.seconds * ratio)
+    # dq/dt = dq/d(t/seconds) / seconds, so a line that takes `ratio` times as long keeps the limit.
+    speed = np.abs(np.gradient(CubicSpline(*knots)(line.progress(t)), t, axis=0)) / line.seconds
+    ratio = float((speed / limit).max())
+    return (line if ratio <= 1.0 else replace(line, seconds=line.seconds * ratio)), knots
 
 
 def _steps(line: Trajectory, far: float, turn: float) -> float:
     """How many steps of these lengths, [m] and [rad], a line takes."""
-    return max(
-        float(np.linalg.norm(line.end[:3, 3] - line.start[:3, 3])) / far, float(np.linalg.norm(line.turn)) / turn
-    )
+    length = float(np.linalg.norm(line.end[:3, 3] - line.start[:3, 3]))
+    return max(length / far, float(np.linalg.norm(line.turn)) / turn)
 
 
-def _angles(kinematics: Kinematics, line: Trajectory, s: Array, q: Array) -> Array | None:
+def _knots(kinematics: Kinematics, line: Trajectory, s: Array, q: Array) -> Knots | None:
+    """Each is looked for from where the two before it lead, so that the arm does not leap to another way to stand."""
     path = [np.asarray(q)]
     for i, T in enumerate(line.poses(s[1:])):
-        found = kinematics.inverse(T, 2 * path[-1] - path[-2] if i else path[-1])
-        if found is None:
+        reached = kinematics.inverse(T, 2 * path[-1] - path[-2] if i else path[-1])
+        if reached is None:
             return None
-        path.append(found)
-    return np.array(path)
+        path.append(reached)
+    return Knots(s, np.array(path))

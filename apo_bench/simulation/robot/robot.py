@@ -104,7 +104,7 @@ class Robot:
         if np.abs(line.start - line.end).max() < 1e-7:
             return 0.0
         kinematics = self.scene.kinematics
-        line = within_speed(kinematics, line, self.q, self.arm.limits.speed_rad_s)
+        line, knots = within_speed(kinematics, line, self.q, self.arm.limits.speed_rad_s)
         n = max(1, round(line.seconds / self.step_s))
         s = np.concatenate([[0.0], line.progress(np.arange(1, n + 1) / n)])
         done = 0
@@ -112,7 +112,7 @@ class Robot:
             q = self.q
             if begin > done:
                 q = self._reached(at_end(kinematics, line, s[done], s[begin], q))
-            path = self._reached(along(kinematics, line, s[begin : end + 1], q))
+            path = self._reached(along(kinematics, line, s[begin : end + 1], q, knots))
             velocity = np.gradient(path, self.step_s, axis=0) if end > begin else np.zeros((1, len(q)))
             if begin > done:
                 joints = (self._qpos, self._dof)
@@ -137,9 +137,9 @@ class Robot:
             Halt: The line leaves the arm's reach.
         """
         kinematics = self.scene.kinematics
-        line = within_speed(kinematics, line, self.q, self.arm.limits.speed_rad_s)
+        line, knots = within_speed(kinematics, line, self.q, self.arm.limits.speed_rad_s)
         n = max(2, round(line.seconds / self.step_s))
-        path = self._reached(along(kinematics, line, line.progress(np.arange(n + 1) / n), self.q))
+        path = self._reached(along(kinematics, line, line.progress(np.arange(n + 1) / n), self.q, knots))
         tips = []
         for target in (path + self._lead * np.gradient(path, self.step_s, axis=0))[1:]:
             self._tick(self._commands(target[None]))

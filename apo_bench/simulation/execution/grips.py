@@ -1,0 +1,81 @@
+"""How the gripper holds the part of a transfer, as poses of the tip."""
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.topology import Assembly
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.clearance import physical_pieces
+from apo_bench.insertion.surroundings import later_walls
+from apo_bench.scenario.scenario import Grasp
+from apo_bench.simulation.execution.grasping import (
+    Grips,
+    RestingPart,
+    Stroke,
+    clear_across,
+    grasp_at,
+    grips_along,
+    half_width,
+    obstacles,
+    tip_frame,
+)
+from apo_bench.simulation.execution.transfer import ApproachLine, Grip, Motion
+from apo_bench.simulation.robot.paths import turn_from
+from apo_bench.simulation.scene.scene import Scene
+
+
+def transfer_grips(
+    scene: Scene, part: str, preferred: Grasp, out: ApproachLine, into: ApproachLine, believed: Poses, after: Poses
+) -> tuple[tuple[Grip, ...], ApproachLine, ApproachLine]:
+    """Where to hold the part, and both lines, out and into, with the place where the grip changes.
+
+    Args:
+        believed: Where all parts are before the transfer.
+        after: Where all parts are after it.
+    """
+    solids = scene.scenario.assembly.solids
+    start = RestingPart(believed[part], obstacles(solids, believed, (part,)))
+    goal = RestingPart(after[part], obstacles(solids, after, (part,)))
+    if into.level:
+        stroke = Stroke(goal.T, into.way, into.travel, goal.around)
+        grips = grips_along(scene, part, preferred, (start,), stroke)
+        into = ApproachLine(into.way, into.travel, grips.left)
+    elif out.level:
+        stroke = Stroke(start.T, out.way, out.travel, start.around)
+        backwards = grips_along(scene, part, preferred, (goal,), stroke)
+        grips = backwards if backwards.second is None else Grips(backwards.second, backwards.left, backwards.first)
+        out = ApproachLine(out.way, out.travel, backwards.left)
+    else:
+        grips = Grips(grasp_at(scene, part, preferred, (start, goal)))
+    grasps = (grips.first,) if grips.second is None else (grips.first, grips.second)
+    return tuple(_grip(scene, part, grasp, start.T, goal.T) for grasp in grasps), out, into
+
+
+def _grip(scene: Scene, part: str, grasp: Grasp, start: Array, goal: Array) -> Grip:
+    """The grasp as a pose of the tip; of the two ways round, the one that turns the wrist less."""
+    other = Grasp(grasp.point, -grasp.across)
+    rest = scene.kinematics.forward(scene.arm.home)
+    tips = [tip_frame(each, start) for each in (grasp, other)]
+    tip = min(tips, key=lambda T: max(abs(turn_from(rest, start @ T)), abs(turn_from(rest, goal @ T))))
+    pieces = physical_pieces(scene.scenario.assembly.solids[part], scene.clearance_mm * 1e-3)
+    return Grip(tip, half_width(pieces, grasp, start))
+
+
+def centring_grips(
+    assembly: Assembly, scene: Scene, k: int, grip: Grip, macros: tuple[Motion, ...], after: Poses
+) -> tuple[Grip, ...]:
+    """Grips across the level directions in which the part's place will matter and nothing has settled it.
+
+    Closing fingers centre a part in their own direction only; along them it has drifted in the hand. What fits into
+    or onto the part later needs it in its place across the walls of that fit.
+    """
+    part = assembly.operations[k].main
+    T = after[assembly.operations[k].main]
+    sides = [macro.way for macro in macros if macro.name == "slide-to-contact"]
+    settled = [T[:3, :3] @ grip.T_part_tip[:3, 0], *sides]
+    place = RestingPart(T, obstacles(assembly.solids, after, (part,)))
+    grips = []
+    for wall in later_walls(assembly, k, part):
+        if abs((T[:3, :3] @ wall)[2]) < 0.5 and all(abs(T[:3, :3] @ wall @ way) < 0.5 for way in settled):
+            settled.append(T[:3, :3] @ wall)
+            grasp = clear_across(scene, part, wall, place)
+            grips += [] if grasp is None else [_grip(scene, part, grasp, T, T)]
+    return tuple(grips)
