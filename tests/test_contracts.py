@@ -33,6 +33,11 @@ BREACHES = {
         ("apo_bench.simulation.execution.controller", "apo_bench.simulation.film.track"),
         ("apo_bench.simulation.execution.prepare", "apo_bench.simulation.arm_checks.plan_check"),
     ],
+    "cad": [
+        ("apo_bench.cad.faces.fitting", "apo_bench.cad.step.surfaces"),
+        ("apo_bench.cad.pieces.cutting", "apo_bench.cad.solid_moments"),
+        ("apo_bench.cad.contact_faces", "apo_bench.cad.importing"),
+    ],
     "workshop": [
         ("apo_bench.trial.trial", "apo_bench.recording.importing"),
         ("apo_bench.show.card", "apo_bench.drafting.draft"),

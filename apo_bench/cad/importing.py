@@ -2,24 +2,23 @@
 
 import os
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import final
 
 import numpy as np
 
-from apo_bench.cad.cutting import Cut, cut
-from apo_bench.cad.matter import matter
-from apo_bench.cad.naming import renamed, with_names
-from apo_bench.cad.patience import in_time
-from apo_bench.cad.raw import RawSolid
-from apo_bench.cad.reading import CadFile, read_meshes
-from apo_bench.cad.regions import regions_of
-from apo_bench.cad.shells import closed_solids
-from apo_bench.cad.stating import flat_face, round_face
-from apo_bench.cad.step import KINDS as STEP_KINDS
-from apo_bench.cad.step import read_step
+from apo_bench.cad.contact_faces import contact_faces
+from apo_bench.cad.faces.regions import regions_of
+from apo_bench.cad.meshes.mesh_file import CadFile, read_meshes
+from apo_bench.cad.meshes.shells import closed_solids
+from apo_bench.cad.naming import with_names
+from apo_bench.cad.pieces.cutting import Cut, cut
+from apo_bench.cad.raw_solid import RawSolid, without_copies
+from apo_bench.cad.solid_moments import solid_moments
+from apo_bench.cad.step.step_file import STEP_SUFFIXES, read_step
+from apo_bench.cad.time_limit import time_limit
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.hull import Hull
@@ -58,16 +57,17 @@ def raw_solids(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
     Raises:
         InputError: The file cannot be read, or holds no closed solid.
     """
-    with in_time(f"{path}: finding the faces", "save it with fewer triangles"):
-        if path.suffix.lower() in STEP_KINDS:
+    with time_limit(f"{path}: finding the faces", "save it with fewer triangles"):
+        if path.suffix.lower() in STEP_SUFFIXES:
             return read_step(path, unit)
-        file = read_meshes(path, unit)
-        found = []
-        for each in closed_solids(path, file.shapes):
-            regions, facets = regions_of(each.mesh)
-            named = with_names(each.mesh, regions)
-            found.append(RawSolid(each.name, each.mesh, named, facets, each.places, each.said))
-        return file, found
+        file, meshes = read_meshes(path, unit)
+        solids = without_copies(raw for name, mesh in meshes for raw in closed_solids(path, name, mesh))
+        return file, [_with_faces(raw) for raw in solids]
+
+
+def _with_faces(raw: RawSolid) -> RawSolid:
+    regions, facets = regions_of(raw.mesh)
+    return replace(raw, regions=with_names(raw.mesh, regions), facets=facets)
 
 
 def import_part(raw: RawSolid, name: str, folder: Path, source: str, density: float = 1000.0) -> Imported:
@@ -79,7 +79,9 @@ def import_part(raw: RawSolid, name: str, folder: Path, source: str, density: fl
     Raises:
         InputError: It has more faces or pieces than a part may have, or is too light or too heavy for one.
     """
-    with in_time(f"{source}: cutting the part into convex pieces", "leave out small holes, fillets and free surfaces"):
+    with time_limit(
+        f"{source}: cutting the part into convex pieces", "leave out small holes, fillets and free surfaces"
+    ):
         return _imported(raw, name, folder, source, density)
 
 
@@ -91,35 +93,31 @@ def _imported(raw: RawSolid, name: str, folder: Path, source: str, density: floa
             f"{HEAVIEST_KG / 1e3:g} t are allowed, so give another --density, or scale the part."
         )
     try:
-        found = cut(raw)
+        pieces = cut(raw)
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
-    corners = sum(len(piece.corners) for piece in found.pieces)
+    corners = sum(len(piece.corners) for piece in pieces.pieces)
     if corners > MOST_CORNERS_IN_ALL:
         raise InputError(
             f"{source}: the convex pieces of the part have {corners:,} corners; {MOST_CORNERS_IN_ALL:,} are the most, "
             "so leave out small holes and fillets."
         )
-    flats, rounds, refused = _faces(raw)
+    flats, rounds, refused = contact_faces(raw)
     if len(flats) + len(rounds) > MOST_FACES:
         raise InputError(f"{source}: the part has {len(flats) + len(rounds)} faces; {MOST_FACES} are the most.")
-    body = Body(found.pieces, tuple(flats), tuple(rounds), matter(raw, found))
+    body = Body(pieces.pieces, tuple(flats), tuple(rounds), solid_moments(raw, pieces))
     solid = solid_of(name, body)
-    faces: list[Face | RoundFace] = [*flats, *rounds]
     shares: dict[str, float] = {}
-    for face in faces:
-        reason = _reason(solid, face)
-        less = supported(face, solid.pieces) if reason and isinstance(face, Face) and found.hulls else None
-        if less is not None and less[1] > _LEAST_SHARE and not _reason(solid, less[0]):
-            shares[face.name] = less[1]
-            flats = [less[0] if flat is face else flat for flat in flats]
+    faces: list[Face | RoundFace] = [*flats, *rounds]
+    for i, face in enumerate(faces):
+        reason = _why_not(solid, face)
+        # A flat face beside a free shape is stated as far as the pieces that stand for the shape hold it.
+        less = supported(face, solid.pieces) if reason and isinstance(face, Face) and pieces.hulls else None
+        if less is not None and less[1] > _LEAST_SHARE and not _why_not(solid, less[0]):
+            flats[i], shares[face.name] = less
         elif reason:
             refused[face.name] = reason
-    body = replace(
-        body,
-        flats=tuple(f for f in flats if f.name not in refused),
-        rounds=tuple(f for f in rounds if f.name not in refused),
-    )
+    body = _without(replace(body, flats=tuple(flats)), refused)
     if not (body.flats or body.rounds):
         raise InputError(
             f"{source}: no face of the part is flat or round, so it could touch nothing; draw one that is."
@@ -131,7 +129,16 @@ def _imported(raw: RawSolid, name: str, folder: Path, source: str, density: floa
 
     path, solid = _as_read(write, body, refused, source)
     free = {wall.name: 1e3 * _free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
-    return Imported(path, raw, solid, found, refused, shares, free)
+    return Imported(path, raw, solid, pieces, refused, shares, free)
+
+
+def _without(body: Body, names: Container[str]) -> Body:
+    """A body without some of its faces."""
+    return replace(
+        body,
+        flats=tuple(face for face in body.flats if face.name not in names),
+        rounds=tuple(face for face in body.rounds if face.name not in names),
+    )
 
 
 def _as_read(write: Callable[[Body], Path], body: Body, refused: dict[str, str], source: str) -> tuple[Path, Solid]:
@@ -156,36 +163,10 @@ def _as_read(write: Callable[[Body], Path], body: Body, refused: dict[str, str],
                     "out fillets and free surfaces."
                 ) from error
             refused[face[1]] = face[2]
-            body = replace(
-                body,
-                flats=tuple(f for f in body.flats if f.name != face[1]),
-                rounds=tuple(f for f in body.rounds if f.name != face[1]),
-            )
+            body = _without(body, refused)
 
 
-def with_new_names(raw: RawSolid, names: Mapping[str, str]) -> RawSolid:
-    """With other names for some faces."""
-    return replace(raw, regions=renamed(raw.regions, names))
-
-
-def _faces(raw: RawSolid) -> tuple[list[Face], list[RoundFace], dict[str, str]]:
-    flats: list[Face] = []
-    rounds: list[RoundFace] = []
-    refused: dict[str, str] = {}
-    for region in raw.regions:
-        if not region.name:
-            continue
-        face = round_face(region) if region.is_round else flat_face(raw, region)
-        if face is None:
-            refused[region.name] = "it is too thin" if region.is_round else "it has more than one outline"
-        elif isinstance(face, Face):
-            flats.append(face)
-        else:
-            rounds.append(face)
-    return flats, rounds, refused
-
-
-def _reason(solid: Solid, face: Face | RoundFace) -> str:
+def _why_not(solid: Solid, face: Face | RoundFace) -> str:
     """Why a face is not as the pieces are; empty if it is."""
     if isinstance(face, Face) and not _is_one_area(face):
         return "its outline crosses itself"
@@ -207,29 +188,32 @@ def _is_one_area(face: Face) -> bool:
 def _free_radius(solid: Solid, wall: RoundFace) -> float:
     """How far the pieces are from the axis of a hole, where it is narrowest, [m]."""
     angle = 2.0 * np.pi * np.arange(_RAYS) / _RAYS
-    x = wall.frame[:3, 0]
-    y = wall.frame[:3, 1]
-    out = np.outer(np.cos(angle), x) + np.outer(np.sin(angle), y)
-    share = (0.5,) if wall.kind == "cylinder" else ((0.02,) if wall.radii[0] < wall.radii[1] else (0.98,))
-    found = np.inf
-    for s in share:
-        at = wall.point + (wall.span[0] + s * wall.length) * wall.axis
-        for piece in solid.pieces:
-            planes = piece.planes if isinstance(piece, Hull) else None
-            if planes is not None and np.abs(at - piece.center).max() < piece.half.max() + 2.0 * max(wall.radii):
-                found = min(found, _nearest(planes, at, out))
-    return float(found)
+    out = np.outer(np.cos(angle), wall.frame[:3, 0]) + np.outer(np.sin(angle), wall.frame[:3, 1])
+    share = 0.5
+    if wall.kind == "cone":
+        share = 0.02 if wall.radii[0] < wall.radii[1] else 0.98
+    at = wall.point + (wall.span[0] + share * wall.length) * wall.axis
+    reach = 2.0 * max(wall.radii)
+    near = [
+        _nearest(piece.planes, at, out)
+        for piece in solid.pieces
+        if isinstance(piece, Hull) and np.abs(at - piece.center).max() < piece.half.max() + reach
+    ]
+    return min(near, default=np.inf)
 
 
 def _nearest(planes: Array, at: Array, out: Array) -> float:
-    """Where rays from a point first enter a piece; infinite if none does."""
+    """Where rays from a point first enter a piece; infinite if none does.
+
+    A ray x + t v crosses the side n . x = d at t = (d - n . x) / (n . v): into the piece if n . v < 0, else out of it.
+    It is inside of all sides at once from the last way in to the first way out.
+    """
     rate = planes[:, :3] @ out.T
     room = (planes[:, 3] - planes[:, :3] @ at)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):
         cross = room / rate
-    enter = np.where(rate < -1e-12, cross, np.where((np.abs(rate) <= 1e-12) & (room < 0.0), np.inf, -np.inf)).max(
-        axis=0
-    )
+    never = np.where((np.abs(rate) <= 1e-12) & (room < 0.0), np.inf, -np.inf)
+    enter = np.where(rate < -1e-12, cross, never).max(axis=0)
     leave = np.where(rate > 1e-12, cross, np.inf).min(axis=0)
     hit = (enter < leave - 1e-9) & (leave > 0.0)
     return float(np.maximum(enter[hit], 0.0).min(initial=np.inf))

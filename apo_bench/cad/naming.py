@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from apo_bench.cad.raw import Mesh, Region
+from apo_bench.cad.raw_solid import Mesh, RawSolid, Region
 from apo_bench.errors import InputError, unknown
 from apo_bench.parts.allowed import FACE_OR_PART_NAME, LONGEST_NAME
 
@@ -21,28 +21,26 @@ def with_names(mesh: Mesh, regions: Sequence[Region]) -> tuple[Region, ...]:
     """
     by_stem: dict[str, list[int]] = {}
     for k, region in enumerate(regions):
-        stem = _stem(region)
-        if stem:
-            by_stem.setdefault(stem, []).append(k)
-    found = list(regions)
+        by_stem.setdefault(_stem(region), []).append(k)
+    by_stem.pop("", None)
+    named = list(regions)
     for stem, members in by_stem.items():
         members.sort(key=lambda k: _order(mesh, regions[k]))
         for number, k in enumerate(members, start=1):
-            side = len(stem) == 2
-            name = stem if side and number == 1 else f"{stem}{number}"
-            found[k] = replace(regions[k], name=name)
-    return tuple(found)
+            is_outermost_side = len(stem) == 2 and number == 1
+            named[k] = replace(regions[k], name=stem if is_outermost_side else f"{stem}{number}")
+    return tuple(named)
 
 
-def renamed(regions: Sequence[Region], names: Mapping[str, str]) -> tuple[Region, ...]:
-    """With other names for some; `+z` stands for `pz`, `-z` for `nz`.
+def renamed(raw: RawSolid, names: Mapping[str, str]) -> RawSolid:
+    """With other names for some faces; `+z` stands for `pz`, `-z` for `nz`.
 
     Raises:
         InputError: No face has the name, or two would have one.
     """
-    said = {_plain(old): new for old, new in names.items()}
-    have = [region.name for region in regions if region.name]
-    for old, new in said.items():
+    new_names = {_plain(old): new for old, new in names.items()}
+    have = list(raw.named())
+    for old, new in new_names.items():
         if old not in have:
             raise InputError(unknown("face", old, have))
         if not FACE_OR_PART_NAME.fullmatch(new) or len(new) > LONGEST_NAME or new.startswith("auto_"):
@@ -50,11 +48,12 @@ def renamed(regions: Sequence[Region], names: Mapping[str, str]) -> tuple[Region
                 f"--name {old}={new} was given; a letter, then letters, digits and underscores, {LONGEST_NAME} in all "
                 "at most, are allowed, and not auto_ at the beginning."
             )
-    after = [said.get(name, name) for name in have]
+    after = [new_names.get(name, name) for name in have]
     twice = sorted({name for name in after if after.count(name) > 1})
     if twice:
         raise InputError(f"--name gives two faces the name {twice[0]}; give each its own.")
-    return tuple(replace(region, name=said.get(region.name, region.name)) for region in regions)
+    regions = (replace(region, name=new_names.get(region.name, region.name)) for region in raw.regions)
+    return replace(raw, regions=tuple(regions))
 
 
 def part_name(text: str) -> str:
@@ -78,12 +77,12 @@ def _plain(name: str) -> str:
 
 
 def _stem(region: Region) -> str:
+    """What a name begins with; empty for what has none."""
     if region.kind == "plane":
-        assert region.normal is not None
-        axis = int(np.abs(region.normal).argmax())
-        if abs(region.normal[axis]) < 1.0 - 1e-9:
+        axis = int(np.abs(region.direction).argmax())
+        if abs(region.direction[axis]) < 1.0 - 1e-9:
             return "flat"
-        return ("p" if region.normal[axis] > 0.0 else "n") + "xyz"[axis]
+        return ("p" if region.direction[axis] > 0.0 else "n") + "xyz"[axis]
     if not region.is_whole:
         return ""
     if region.kind == "cone":
@@ -92,11 +91,8 @@ def _stem(region: Region) -> str:
 
 
 def _order(mesh: Mesh, region: Region) -> tuple[float, ...]:
+    """How far out a plane is, or how wide a wall, then its lowest corner; on a grid that hides rounding."""
     low = mesh.corners[np.unique(mesh.triangles[region.triangles])].min(axis=0)
+    first = float(region.direction @ region.point) if region.kind == "plane" else max(region.radii)
     grid = _GRID * mesh.extent
-    place = tuple(float(round(x / grid)) for x in low)
-    if region.kind == "plane":
-        assert region.normal is not None
-        assert region.point is not None
-        return (-float(round(float(region.normal @ region.point) / grid)), *place)
-    return (-float(round(max(region.radii) / grid)), *place)
+    return (-float(round(first / grid)), *(float(round(x / grid)) for x in low))

@@ -16,7 +16,7 @@ from apo_bench.errors import InputError
 
 if TYPE_CHECKING:
     from apo_bench.cad.importing import Imported
-    from apo_bench.cad.raw import RawSolid
+    from apo_bench.cad.raw_solid import RawSolid
 
 part = typer.Typer(name="part", cls=Grouped, rich_markup_mode=None, help="Parts from CAD files.")
 
@@ -35,10 +35,10 @@ def part_import(
     as_json: AsJson = False,
 ) -> None:
     """Make part files from a CAD file: find its faces, cut it into convex pieces, and say what was done."""
-    from apo_bench.cad.importing import raw_solids, with_new_names
-    from apo_bench.cad.places import named_places, write_places
-    from apo_bench.cad.show.part_form import report_form
-    from apo_bench.cad.show.part_text import unit_line
+    from apo_bench.cad.import_report import report_form, unit_line
+    from apo_bench.cad.importing import raw_solids
+    from apo_bench.cad.naming import renamed
+    from apo_bench.cad.poses_file import named_places, write_places
 
     names = _pairs(name or [])
     if not 1.0 <= density <= 25_000.0:
@@ -48,7 +48,7 @@ def part_import(
         raise InputError(
             f"--name was given, and {file} holds {len(raws)} different solids; import them from files of their own."
         )
-    raws = [with_new_names(raw, names) for raw in raws]
+    raws = [renamed(raw, names) for raw in raws]
     with writing(f"--out {out}"):
         out.mkdir(parents=True, exist_ok=True)
         _say(f"{file}: {unit_line(source)}", as_json)
@@ -68,10 +68,10 @@ def _written(
     file: Path, raws: Sequence[RawSolid], out: Path, density: float, as_json: bool
 ) -> tuple[list[Imported], list[str]]:
     """Parts with their pictures; and why others of the file became none."""
+    from apo_bench.cad.import_report import import_lines
     from apo_bench.cad.importing import import_part
     from apo_bench.cad.naming import free_name, part_name
-    from apo_bench.cad.show.part_picture import draw_part
-    from apo_bench.cad.show.part_text import import_lines
+    from apo_bench.cad.part_picture import draw_part
 
     imported: list[Imported] = []
     left_out: list[str] = []

@@ -7,8 +7,8 @@ import numpy as np
 
 from apo_bench.cad.importing import import_part, raw_solids
 from apo_bench.cad.naming import free_name, part_name
-from apo_bench.cad.places import named_places, write_places
-from apo_bench.cad.raw import Mesh, Place, RawSolid, Region
+from apo_bench.cad.poses_file import named_places, write_places
+from apo_bench.cad.raw_solid import Mesh, RawSolid, Region, SolidPlace
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -39,7 +39,7 @@ def import_assembly(file: Path, folder: Path, unit: str | None = None, fewest: i
     if sum(len(raw.places) for raw in raws) < fewest:
         raise InputError(f"{file}: the file holds one solid; an assembly of at least two is needed.")
     folder.mkdir(parents=True, exist_ok=True)
-    places = dict[str, list[Place]]()
+    places = dict[str, list[SolidPlace]]()
     said = list[str]()
     for raw in raws:
         called = free_name(part_name(raw.name), places)
@@ -60,7 +60,7 @@ def _foot(raw: RawSolid) -> Array:
     high = raw.mesh.corners.max(axis=0)
     middle = np.array([(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, low[2]])
     for region in raw.regions:
-        if region.point is not None and region.axis is not None and abs(region.axis[2]) > _UPRIGHT:
+        if region.is_round and abs(region.direction[2]) > _UPRIGHT:
             beside = region.point[:2] - middle[:2]
             if np.linalg.norm(beside) < _NEAR * np.ptp([low, high], axis=0)[:2].max():
                 middle[:2] += beside
@@ -77,10 +77,9 @@ def _shifted(raw: RawSolid, by: Array) -> RawSolid:
 
 def _moved(region: Region, by: Array) -> Region:
     """A plane is known by one of its points, an axis by the foot of the origin on it."""
-    if region.point is None:
-        return region
     point = region.point + by
-    if region.axis is None:
+    if not region.is_round:
         return replace(region, point=point)
-    along = float(point @ region.axis)
-    return replace(region, point=point - along * region.axis, span=(region.span[0] + along, region.span[1] + along))
+    along = float(point @ region.direction)
+    span = (region.span[0] + along, region.span[1] + along)
+    return replace(region, point=point - along * region.direction, span=span)

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from apo_bench.cad.brep import BrepFace, BrepSolid
-from apo_bench.cad.from_brep import raw_of
 from apo_bench.cad.importing import import_part, raw_solids
-from apo_bench.cad.patience import in_time
+from apo_bench.cad.step.brep import BrepFace, BrepSolid
+from apo_bench.cad.step.from_brep import raw_of
+from apo_bench.cad.time_limit import time_limit
 from apo_bench.cli.app import main
 from apo_bench.errors import InputError
 from tests.cad.made import block, rod, write_stl, write_triangles
@@ -137,7 +137,7 @@ def test_inside_out_is_turned_and_said(tmp_path: Path) -> None:
     path = write_triangles(triangles(block(20, 20, 20) - rod(4, 20))[:, ::-1], tmp_path / "a.stl")
     _, (raw,) = raw_solids(path, None)
     assert raw.mesh.volume > 0.0
-    assert raw.said == ("it was inside out, and was turned",)
+    assert raw.mended == ("it was inside out, and was turned",)
 
 
 def test_triangles_turned_the_wrong_way_are_turned_and_said(tmp_path: Path) -> None:
@@ -145,7 +145,7 @@ def test_triangles_turned_the_wrong_way_are_turned_and_said(tmp_path: Path) -> N
     given[::3] = given[::3, ::-1]
     _, (raw,) = raw_solids(write_triangles(given, tmp_path / "a.stl"), None)
     assert raw.mesh.volume == pytest.approx(8000.0)
-    assert "looked the other way" in raw.said[0]
+    assert "looked the other way" in raw.mended[0]
 
 
 def test_solids_of_one_shape_are_one_part_with_places(tmp_path: Path) -> None:
@@ -208,7 +208,7 @@ def test_the_command_says_what_it_did_and_names_as_asked(tmp_path: Path, capsys:
 
 
 def test_step_needs_its_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("apo_bench.cad.step.find_spec", lambda name: None)
+    monkeypatch.setattr("apo_bench.cad.step.step_file.find_spec", lambda name: None)
     path = tmp_path / "a.step"
     path.write_text("ISO-10303-21;\n")
     with pytest.raises(InputError, match=r"needs the extra cad; run: pip install 'apo_bench\[cad\]'"):
@@ -281,7 +281,7 @@ def test_more_holes_than_a_part_may_have_pieces_are_refused_at_once(tmp_path: Pa
 
 def test_what_takes_too_long_is_given_up() -> None:
     def wait() -> None:
-        with in_time("a.stl", "leave out holes", 0.05):
+        with time_limit("a.stl", "leave out holes", 0.05):
             while True:
                 pass
 

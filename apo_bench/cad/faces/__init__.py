@@ -1,0 +1,1 @@
+"""Faces of a mesh: planes, cylinders and cones are fitted to its triangles, [mm]."""

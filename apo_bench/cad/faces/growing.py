@@ -1,0 +1,193 @@
+"""Cylinders and cones in a mesh: grown from smooth parts of its surface, or from single edges in them."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from apo_bench.cad.faces.facets import Facets
+from apo_bench.cad.faces.fitted_region import ON_WALL
+from apo_bench.cad.faces.fitting import Round, axis_of, circle_through, on_it, refined
+from apo_bench.cad.raw_solid import Mesh, connected
+from apo_bench.geometry.arrays import Array
+
+_FEWEST = 3
+_MOST_WORK = 3_000_000
+_MOST_FAILED = 100
+_MOST_SEED = 100
+"""How many flat pieces are looked at, over all trials, in one part; trials in vain, one after the other, in one smooth
+part of its surface; flat pieces that a trial begins with."""
+_SAME_BEND = 0.15
+
+
+class FoundWall(NamedTuple):
+    """A round surface and the flat pieces on it."""
+
+    surface: Round
+    members: Any
+    hole: bool
+    spans: Array
+
+
+def walls_of(mesh: Mesh, facets: Facets) -> list[FoundWall]:
+    """Cylinders and cones, in each smooth part of the surface: first all of it, then from edges in it."""
+    walls: list[FoundWall] = []
+    work = _MOST_WORK
+    for group in smooth_groups(facets, np.unique(facets.smooth)):
+        if len(group) < _FEWEST:
+            continue
+        inside = np.isin(facets.smooth[:, 0], group)
+        whole = _grown(mesh, facets, group, inside, _whole_starts(mesh, facets, group, inside))
+        work -= 2 * len(group)
+        if whole is not None and len(whole.members) == len(group):
+            walls.append(whole)
+        else:
+            work = _add_from_edges(mesh, facets, group, inside, walls, work)
+    return walls
+
+
+def _add_from_edges(mesh: Mesh, facets: Facets, group: Any, inside: Any, walls: list[FoundWall], work: int) -> int:
+    """Look for round surfaces in part of a smooth surface, the longest edges first; returns what work is left."""
+    taken = np.zeros(len(facets.areas), dtype=bool)
+    rows = np.flatnonzero(inside)
+    around = _edges_of_pieces(facets, rows)
+    ends = mesh.corners[facets.along[rows]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    failed = 0
+    for row in rows[np.argsort(-length, kind="stable")]:
+        if taken[facets.smooth[row]].any():
+            continue
+        if work < 0 or failed > _MOST_FAILED:
+            break
+        best = None
+        for cone in (False, True):
+            start, near = (_seed_cone if cone else _seed_cylinder)(mesh, facets, row, around, taken)
+            if start is None or len(on_it(mesh, facets, near, start, 3.0 * (ON_WALL * mesh.extent))[0]) < _FEWEST:
+                continue
+            left = group[~taken[group]]
+            untaken = inside & ~taken[facets.smooth].any(axis=1)
+            best = _grown(mesh, facets, left, untaken, [(start, cone)], int(facets.smooth[row, 0]))
+            work -= 4 * len(left)
+            if best is not None:
+                break
+        failed += 1
+        if best is not None:
+            failed = 0
+            walls.append(best)
+            taken[best.members] = True
+    return work
+
+
+def _edges_of_pieces(facets: Facets, rows: Any) -> dict[int, list[int]]:
+    """The smooth edges of each flat piece."""
+    edges: dict[int, list[int]] = {}
+    for row in rows.tolist():
+        for piece in facets.smooth[row].tolist():
+            edges.setdefault(piece, []).append(row)
+    return edges
+
+
+def _whole_starts(mesh: Mesh, facets: Facets, group: Any, inside: Any) -> list[tuple[Round, bool]]:
+    """What all of a smooth surface may be: a cylinder, a cone."""
+    points = mesh.corners[np.unique(facets.along[inside])]
+    starts = [(circle_through(points, axis_of(facets.normals[group], cone)), cone) for cone in (False, True)]
+    return [(start, cone) for start, cone in starts if start is not None]
+
+
+def _seed_cylinder(
+    mesh: Mesh, facets: Facets, row: int, around: dict[int, list[int]], taken: Any
+) -> tuple[Round | None, Any]:
+    """The cylinder along an edge, through the edges beside it; and the flat pieces there."""
+    a, b = mesh.corners[facets.along[row]]
+    length = np.linalg.norm(b - a)
+    rows = np.array([r for f in facets.smooth[row].tolist() for r in around[f] if not taken[facets.smooth[r]].any()])
+    near = np.unique(facets.smooth[rows])
+    if length < 1e-9 * mesh.extent:
+        return None, near
+    axis = (b - a) / length
+    ends = mesh.corners[facets.along[rows]]
+    along = ends[:, 1] - ends[:, 0]
+    straight = np.linalg.norm(np.cross(along, axis), axis=1) < 0.02 * np.linalg.norm(along, axis=1)
+    if straight.sum() < 2:
+        return None, near
+    return circle_through(ends[straight].reshape(-1, 3), axis), near
+
+
+def _seed_cone(
+    mesh: Mesh, facets: Facets, row: int, around: dict[int, list[int]], taken: Any
+) -> tuple[Round | None, Any]:
+    """The cone of the pieces that meet at one angle, one after the other; and these pieces."""
+    angle = facets.angle[row]
+    members = {int(facets.smooth[row, 0])}
+    rows = set()
+    to_visit = [int(facets.smooth[row, 0])]
+    while to_visit and len(members) < _MOST_SEED:
+        for r in around[to_visit.pop()]:
+            if abs(facets.angle[r] - angle) < _SAME_BEND * abs(angle) and not taken[facets.smooth[r]].any():
+                rows.add(r)
+                more = set(facets.smooth[r].tolist()) - members
+                members |= more
+                to_visit += sorted(more)
+    near = np.array(sorted(members))
+    if len(members) < 5:
+        return None, near
+    points = mesh.corners[np.unique(facets.along[sorted(rows)])]
+    first = circle_through(points, axis_of(facets.normals[near], True))
+    return (None if first is None else refined(first, points, True)), near
+
+
+def _grown(
+    mesh: Mesh, facets: Facets, among: Any, inside: Any, starts: list[tuple[Round, bool]], seed: int | None = None
+) -> FoundWall | None:
+    """The flat pieces on a surface, connected with a seed or all of them, and the surface fitted to them."""
+    for start, cone in starts:
+        surface: Round | None = start
+        if seed is None:
+            surface = refined(start, mesh.corners[np.unique(facets.along[inside])], cone)
+        # In turns: what lies on the surface, loosely at first, and the surface nearest to that, until nothing changes.
+        count = 0
+        loose = 3.0
+        best = None
+        for _ in range(8):
+            if surface is None or not surface.radius < 50.0 * mesh.extent:
+                break
+            members, hole, spans = on_it(mesh, facets, among, surface, loose * (ON_WALL * mesh.extent))
+            if seed is not None:
+                members, spans = _with_seed(facets, inside, members, spans, seed)
+            if len(members) < _FEWEST:
+                best = None
+                break
+            best = FoundWall(surface, members, hole, spans)
+            if len(members) == count and loose == 1.0:
+                break
+            count = len(members)
+            loose = 1.0
+            both = inside & np.isin(facets.smooth, members).all(axis=1)
+            points = mesh.corners[np.unique(facets.along[both])]
+            surface = refined(surface, points, cone) if len(points) >= 6 else None
+        if best is not None and (not cone or abs(best.surface.slope) > 1e-3):
+            return best
+    return None
+
+
+def _with_seed(facets: Facets, inside: Any, members: Any, spans: Array, seed: int) -> tuple[Any, Array]:
+    """Those that hang together with a seed; none if it is not among them."""
+    if seed not in members:
+        return members[:0], spans[:0]
+    _, group = _smoothly_connected(facets.smooth[inside], members)
+    same = group == group[np.searchsorted(members, seed)]
+    return members[same], spans[same]
+
+
+def smooth_groups(facets: Facets, members: Any) -> list[Any]:
+    """Flat pieces that hang together smoothly, over those of the list alone."""
+    if not len(members):
+        return []
+    count, group = _smoothly_connected(facets.smooth, members)
+    order = np.argsort(group, kind="stable")
+    return np.split(members[order], np.cumsum(np.bincount(group, minlength=count))[:-1])
+
+
+def _smoothly_connected(smooth: Any, members: Any) -> tuple[int, Any]:
+    """How many groups members, ascending, are by the pairs among them, and the group of each."""
+    pairs = smooth[np.isin(smooth, members).all(axis=1)]
+    return connected(np.searchsorted(members, pairs), len(members))

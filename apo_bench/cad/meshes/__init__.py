@@ -1,0 +1,1 @@
+"""Files of triangles become closed meshes of solids, [mm]."""

@@ -1,0 +1,1 @@
+"""Solids are cut into convex pieces, [mm]."""

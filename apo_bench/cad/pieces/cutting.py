@@ -1,0 +1,91 @@
+"""Solids cut into convex pieces: along the planes of reflex edges, then around round holes, [mm]."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from apo_bench.cad.pieces.boring import bored, filling, least_pieces
+from apo_bench.cad.pieces.corners import corners_of, extremes, is_thick, without_near
+from apo_bench.cad.pieces.halving import at_shoulders, convex_parts, settled
+from apo_bench.cad.pieces.shafts import as_cylinders, with_round_shafts
+from apo_bench.cad.raw_solid import Mesh, RawSolid
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.hull import Hull
+from apo_bench.parts.allowed import MOST_PIECES
+
+_MOST_TRIANGLES = 20_000
+_LOSS = 1e-3
+"""A piece whose volume differs by more than this part from what it stands for is said to do so."""
+
+
+class Cut(NamedTuple):
+    """The convex pieces of a solid."""
+
+    pieces: tuple[Hull, ...]
+    """[m]."""
+    grown: float
+    """By how much pieces that stand for hollow or free shapes are larger, [mm^3]; negative: smaller."""
+    hulls: int
+    """How many do."""
+
+
+def cut(raw: RawSolid) -> Cut:
+    """The convex pieces of a solid: flat ones exact, round holes as wedges that touch the fitted wall.
+
+    Raises:
+        InputError: The mesh makes no solid, or there are more pieces than a part may have.
+    """
+    from scipy.spatial import ConvexHull
+
+    size = raw.mesh.extent
+    body = _manifold_of(raw.mesh)
+    bores = [r for r in raw.regions if r.is_round and r.hole and r.square]
+    if least_pieces(bores) > MOST_PIECES:
+        raise InputError(
+            f"its {len(bores)} round holes take {least_pieces(bores):,} convex pieces; {MOST_PIECES:,} are the most "
+            "in a part, so leave out small ones."
+        )
+    for bore in bores:
+        body = body + filling(raw.mesh, bore)
+    if body.num_tri() > _MOST_TRIANGLES:
+        body = body.simplify(1e-3 * size)
+    grown = 0.0
+    hulls = 0
+    flats = np.array([(*r.direction, r.direction @ r.point) for r in raw.regions if r.kind == "plane"]).reshape(-1, 4)
+    outlines: list[Array] = []
+    shafts = [r for r in raw.regions if r.is_round and not r.hole and r.square]
+    for part in at_shoulders(convex_parts(body, size, flats), shafts, size):
+        coarse = without_near(settled(corners_of(part.body), part.planes, size))
+        if len(coarse) < 4 or not is_thick(coarse):
+            continue
+        fine = with_round_shafts(coarse, shafts)
+        corners = extremes(fine, flats, part.planes)
+        # What a hull fills of a hollow part, and what is lost where corners are left out; round walls are no loss.
+        true = part.body.volume()
+        coarse_volume, fine_volume, kept_volume = (ConvexHull(each).volume for each in (coarse, fine, corners))
+        more = coarse_volume - true + kept_volume - fine_volume
+        if abs(more) > _LOSS * true:
+            grown += more
+            hulls += 1
+        outlines.append(corners)
+    pieces: list[Hull] = []
+    for corners in outlines:
+        pieces += [Hull("", 1e-3 * each) for each in bored(corners, bores, flats, MOST_PIECES - len(pieces))]
+        if len(pieces) > MOST_PIECES:
+            raise InputError(
+                f"the part takes more than {MOST_PIECES:,} convex pieces, which are the most; leave out small holes "
+                "and fillets."
+            )
+    return Cut(tuple(as_cylinders(pieces, shafts)), grown, hulls)
+
+
+def _manifold_of(mesh: Mesh) -> Any:
+    """The mesh as manifold3d has it."""
+    import manifold3d
+
+    corners = np.ascontiguousarray(mesh.corners)
+    body = manifold3d.Manifold(manifold3d.Mesh64(corners, np.ascontiguousarray(mesh.triangles, dtype=np.uint64)))
+    if body.status() != manifold3d.Error.NoError or body.is_empty():
+        raise InputError("the mesh makes no solid; mend it where it was drawn, and save it again.")
+    return body

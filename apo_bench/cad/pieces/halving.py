@@ -1,0 +1,213 @@
+"""Solids cut along planes until the parts are convex: first along flat faces, then along sides of free shapes, [mm]."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from apo_bench.cad.pieces.corners import SAME_CORNER_MM, corners_of, mesh_of
+from apo_bench.cad.raw_solid import Region
+from apo_bench.geometry.arrays import Array
+
+_MOST_CUTS = 400
+_TRIES = 6
+_HAIR = 2e-6
+_MOST_FREE_PLANES = 80
+_MOST_BISECTED = 40
+_ROUGH = 0.01
+_FINE_TRIANGLES = 4000
+"""Free shapes with more planes at reflex edges are halved instead, into so many pieces, until their hulls are so little
+larger; they need not have more triangles."""
+
+
+class CutPart(NamedTuple):
+    """A part of a solid that is to be one piece."""
+
+    body: Any
+    """As manifold3d has it."""
+    planes: Array
+    """Along which it was cut, (k, 4)."""
+
+    def halves(self, n: Array, d: float, hair: float = 0.0) -> tuple["CutPart", "CutPart"]:
+        """What is above and below the plane n . x = d, both a hair's breadth off it.
+
+        On the plane, rounding would leave flaps of no thickness.
+        """
+        planes = np.concatenate([self.planes, [[*n, d]]])
+        above = CutPart(self.body.trim_by_plane(n, d + hair), planes)
+        return above, CutPart(self.body.trim_by_plane(-n, hair - d), planes)
+
+
+def convex_parts(solid: Any, size: float, flats: Array) -> Iterator[CutPart]:
+    """Parts that are convex, or that stand for a hollow free shape with their hull.
+
+    Args:
+        flats: Planes of flat faces, (k, 4).
+    """
+    cuts = [_MOST_CUTS]
+    volume = solid.volume()
+    for part in _cut(CutPart(solid, np.zeros((0, 4))), size, flats, True, cuts, volume):
+        planes = _reflex_planes(part.body, size)
+        if not len(planes) or (part.body.num_tri() > _FINE_TRIANGLES and _is_nearly_convex(part.body)):
+            yield part
+        elif len(planes) <= _MOST_FREE_PLANES:
+            yield from _cut(part, size, flats, False, cuts, volume)
+        else:
+            yield from _halved(part, size, volume)
+
+
+def _cut(
+    part: CutPart, size: float, flats: Array, only_flats: bool, cuts: list[int], volume: float
+) -> Iterator[CutPart]:
+    """Cut along planes of reflex edges, as long as there are cuts left."""
+    to_cut = [part]
+    least = 1e-7 * volume
+    while to_cut:
+        whole, along = to_cut.pop()
+        for body in _without_cavities(whole, least):
+            if body.volume() < least:
+                continue
+            each = CutPart(body, along)
+            planes = _planes_to_cut(body, size, flats, only_flats) if cuts[0] > 0 else []
+            for n, d in [*planes[:_TRIES], *_through_cavity(body, least)]:
+                halves = each.halves(n, d, _HAIR * size)
+                if min(half.body.volume() for half in halves) > least:
+                    cuts[0] -= 1
+                    to_cut += halves
+                    break
+            else:
+                yield each
+
+
+def _without_cavities(body: Any, least: float) -> list[Any]:
+    """The bodies that one consists of; the whole, if there is a cavity in one of them.
+
+    Args:
+        least: A cavity that is smaller is rounding.
+    """
+    bodies = body.decompose()
+    return [body] if any(each.volume() < -least for each in bodies) else bodies
+
+
+def _through_cavity(body: Any, least: float) -> Iterator[tuple[Array, float]]:
+    """Planes through the middle of a cavity, if there is one."""
+    for each in body.decompose():
+        if each.volume() < -least:
+            low, high = np.array(each.bounding_box()).reshape(2, 3)
+            for axis in np.argsort(high - low):
+                yield np.eye(3)[axis], float(low[axis] + high[axis]) / 2.0
+
+
+def _planes_to_cut(body: Any, size: float, flats: Array, only_flats: bool) -> list[tuple[Array, float]]:
+    """Planes of reflex edges, as the flat face in them has it."""
+    planes = []
+    for plane in _reflex_planes(body, size):
+        cosine = flats[:, :3] @ plane[:3]
+        same = (np.abs(cosine) > 1.0 - 1e-6) & (np.abs(flats[:, 3] * np.sign(cosine) - plane[3]) < _HAIR * size)
+        if same.any() or not only_flats:
+            n_d = flats[same][0] if same.any() else plane
+            planes.append((n_d[:3], float(n_d[3])))
+    return planes
+
+
+def _is_nearly_convex(body: Any) -> bool:
+    return bool(body.hull().volume() < 1.001 * body.volume())
+
+
+def _spare(part: CutPart) -> float:
+    """What the hull of a part fills beyond the part."""
+    return float(part.body.hull().volume() - part.body.volume())
+
+
+def _halved(part: CutPart, size: float, volume: float) -> list[CutPart]:
+    """A hollow free shape, halved where that brings its hulls nearest to it."""
+    body = part.body.simplify(1e-3 * size) if part.body.num_tri() > _FINE_TRIANGLES else part.body
+    parts = [CutPart(each, part.planes) for each in body.decompose()]
+    spare = [_spare(each) for each in parts]
+    while parts and len(parts) < _MOST_BISECTED and max(spare) > _ROUGH * volume / len(parts):
+        k = int(np.argmax(spare))
+        halves = _best_halves(parts[k])
+        parts[k : k + 1] = halves
+        spare[k : k + 1] = [_spare(each) for each in halves] if len(halves) > 1 else [0.0]
+    return parts
+
+
+def _best_halves(part: CutPart) -> list[CutPart]:
+    """The bodies on both sides of the middle, along the axis of the frame that leaves the least hulls."""
+    low, high = np.array(part.body.bounding_box()).reshape(2, 3)
+    least = np.inf
+    best = [part]
+    for axis in np.argsort(low - high):
+        halves = part.halves(np.eye(3)[axis], float(low[axis] + high[axis]) / 2.0)
+        bodies = [CutPart(body, half.planes) for half in halves for body in half.body.decompose()]
+        hulls = float(sum(each.body.hull().volume() for each in bodies))
+        if len(bodies) > 1 and hulls < least * (1.0 - 1e-6):
+            least = hulls
+            best = bodies
+    return best
+
+
+def at_shoulders(parts: Iterator[CutPart], shafts: Sequence[Region], size: float) -> Iterator[CutPart]:
+    """Parts cut where one round wall goes over into another one: a cylinder and its chamfer are two pieces."""
+    hair = _HAIR * size
+    for part in parts:
+        corners = corners_of(part.body)
+        mine = [shaft for shaft in shafts if _touches(corners, shaft)]
+        cut_parts = [part]
+        for shaft in mine if len(mine) > 1 else ():
+            for end in shaft.span:
+                d = float(shaft.point @ shaft.direction) + end
+                after: list[CutPart] = []
+                for each in cut_parts:
+                    height = corners_of(each.body) @ shaft.direction - d
+                    is_beside = height.min() > -10.0 * hair or height.max() < 10.0 * hair
+                    after += [each] if is_beside else each.halves(shaft.direction, d, hair)
+                cut_parts = after
+        yield from cut_parts
+
+
+def _touches(corners: Array, shaft: Region) -> bool:
+    """Whether so many corners of a part are on the wall of a shaft that it is one."""
+    height, distance, _ = shaft.polar(corners)
+    within = (height > shaft.span[0] - SAME_CORNER_MM) & (height < shaft.span[1] + SAME_CORNER_MM)
+    return int((within & (np.abs(distance - shaft.radius_at(height)) < 1e-3)).sum()) >= 6
+
+
+def settled(corners: Array, planes: Array, size: float) -> Array:
+    """Corners that are a hair's breadth off the planes of cuts, on them."""
+    corners = corners.copy()
+    # A corner on two or three planes is brought onto them in turns, as each step leaves the other ones a little.
+    for _ in range(4):
+        for n, d in zip(planes[:, :3], planes[:, 3], strict=True):
+            off = corners @ n - d
+            off[np.abs(off) > 3.0 * _HAIR * size] = 0.0
+            corners -= np.outer(off, n)
+    return corners
+
+
+def _reflex_planes(body: Any, size: float) -> Array:
+    """Planes, (k, 4), of sides at reflex edges, those with the longest edges in them first."""
+    mesh = mesh_of(body)
+    length = np.linalg.norm(mesh.across, axis=1)
+    normals = mesh.across / np.maximum(length, 1e-300)[:, None]
+    # An edge is reflex if the far corner of one triangle is above the plane of the other one.
+    i, k = mesh.neighbours.T
+    points = mesh.corners[mesh.triangles[k]] - mesh.corners[mesh.edges[:, 0]][:, None]
+    above = (points * normals[i][:, None]).sum(axis=2).max(axis=1)
+    sound = (length[i] > 1e-9 * size**2) & (length[k] > 1e-9 * size**2)
+    reflex = sound & (above > max(1e-6 * size, 1e-4)) & ((normals[i] * normals[k]).sum(axis=1) < 1.0 - 1e-7)
+    if not reflex.any():
+        return np.zeros((0, 4))
+    ends = mesh.corners[mesh.edges[reflex]]
+    sides = np.concatenate([i[reflex], k[reflex]])
+    n = normals[sides]
+    planes = np.column_stack([n, (n * mesh.corners[mesh.triangles[sides, 0]]).sum(axis=1)])
+    # Each plane once, up to rounding; the score of a plane is the length of all reflex edges in it, planes along the
+    # frame before others of the same score.
+    keys = np.round(planes * [1e5, 1e5, 1e5, 1e5 / size])
+    _, first = np.unique(keys, axis=0, return_index=True)
+    planes = planes[np.sort(first)][:400]
+    inside = (np.abs(ends @ planes[:, :3].T - planes[:, 3]) < 2e-6 * size).all(axis=1)
+    score = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) @ inside
+    aligned = np.abs(planes[:, :3]).max(axis=1) > 1.0 - 1e-9
+    return np.asarray(planes[np.lexsort((~aligned, -np.round(score / size, 6)))])

@@ -1,0 +1,41 @@
+"""A limit of time for what a file asks for."""
+
+import signal
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Never
+
+from apo_bench.errors import InputError
+
+_LIMIT_S = 20.0
+"""Time of the processor that reading a file may take, and cutting each solid of it."""
+
+
+class _Late(BaseException):
+    """Not an `Exception`: a library that reads on after any of these must not swallow it."""
+
+
+@contextmanager
+def time_limit(what: str, remedy: str, limit_s: float = _LIMIT_S) -> Iterator[None]:
+    """Raise an `InputError` if more time of the processor is taken.
+
+    Nothing is limited outside of the main thread, nor on systems without such a clock.
+    """
+    if not hasattr(signal, "setitimer") or threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGPROF, _stop)
+    signal.setitimer(signal.ITIMER_PROF, limit_s)
+    try:
+        yield
+    except _Late:
+        raise InputError(f"{what} takes more than {limit_s:g} s; {remedy}.") from None
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
+
+
+def _stop(number: int, frame: FrameType | None) -> Never:
+    raise _Late
