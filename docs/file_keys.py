@@ -22,7 +22,7 @@ from fields import sentences
 
 from apo_bench.cli.setting_options import shown_default
 from apo_bench.drafting.writing import THRESHOLDS
-from apo_bench.io.strict_json import JsonNode
+from apo_bench.io.documents import JsonNode
 from apo_bench.observation.models.fitted import ConstantError, ViewNoise
 from apo_bench.observation.noise_file import noise_text, read_noise
 from apo_bench.observation.presets import presets

@@ -54,7 +54,7 @@ def recording_import(
 def _import(
     log: Any, objects: Any, camera: Any, tracks: Any, scenario: str, said: tuple[str | None, str | None], files: Any
 ) -> None:
-    from apo_bench.io.csv_file import write_csv
+    from apo_bench.io.tables import write_csv
     from apo_bench.recording.bare import deviations
     from apo_bench.recording.importing import import_recording
     from apo_bench.recording.show.drawing import draw_recording

@@ -12,8 +12,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid, world_bounds
-from apo_bench.io.strict_json import JsonNode
-from apo_bench.io.strict_toml import read_toml
+from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.parts import load_part, part_path
 from apo_bench.parts.allowed import FACE_OR_PART_NAME
 

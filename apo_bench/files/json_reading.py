@@ -15,7 +15,7 @@ from apo_bench.files.deviations import ALLOWED_DEVIATIONS, SHIFT_M, TURN_RAD, is
 from apo_bench.files.json_forms import OBSERVATION, OUTLIER_KEYS, PLAN
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.io.strict_json import JsonNode, read_json
+from apo_bench.io.documents import JsonNode, read_json
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario
 

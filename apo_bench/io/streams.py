@@ -1,9 +1,12 @@
-"""The surroundings of a process: standard streams that may be closed or full, and a current folder that may be gone."""
+"""Standard streams that may be closed, full or redirected, and a current folder that may be gone."""
 
 import os
 import sys
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
+
+from apo_bench.io.processes import flush
 
 
 class Unusable(Exception):
@@ -58,6 +61,33 @@ def give_up(error: OSError) -> str:
         _lead_nowhere(1)
     sys.stdout = sys.__stdout__
     return f"standard output could not be written ({error.strerror or error}); what was not printed is lost."
+
+
+@contextmanager
+def redirect_output(wanted: bool) -> Iterator[None]:
+    """If wanted, what is printed meanwhile, by whatever code and below Python too, goes to standard error.
+
+    Standard output is then left to one JSON object.
+    """
+    if not wanted:
+        yield
+        return
+    flush()
+    try:
+        ours = os.dup(1)
+    except OSError:
+        ours = None
+    try:
+        if ours is not None:
+            with suppress(OSError):
+                os.dup2(2, 1)
+        with redirect_stdout(sys.stderr):
+            yield
+    finally:
+        flush()
+        if ours is not None:
+            os.dup2(ours, 1)
+            os.close(ours)
 
 
 def _lead_nowhere(number: int) -> None:

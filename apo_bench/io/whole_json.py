@@ -4,6 +4,7 @@ import json
 import math
 import re
 from collections import Counter
+from collections.abc import Callable
 from typing import Any, Never
 
 import msgspec
@@ -36,6 +37,23 @@ def read_whole(text: bytes, where: str, half: re.Pattern[str]) -> Any:
         ValueError: It is no JSON.
     """
 
+    def refuse(constant: str) -> Never:
+        raise ValueError(constant)
+
+    def finite(number: str) -> float:
+        return x if math.isfinite(x := float(number)) else refuse(number)
+
+    hook = unique_members(where)
+    document = json.loads(text.decode(), object_pairs_hook=hook, parse_constant=refuse, parse_float=finite)
+    field = half_letter(document, half)
+    if field is not None:
+        raise InputError(f"{where}, field {field}: {WHOLE_LETTERS}; remove it, or the folder.")
+    return document
+
+
+def unique_members(where: str) -> Callable[[list[tuple[str, Any]]], dict[str, Any]]:
+    """What makes an object of its members for `json.loads`; a key that stands twice is an `InputError`."""
+
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
         members = dict(pairs)
         if len(members) < len(pairs):
@@ -43,29 +61,19 @@ def read_whole(text: bytes, where: str, half: re.Pattern[str]) -> Any:
             raise InputError(f"{where}: the key '{twice}' stands twice in one object; keep one of the two.")
         return members
 
-    def refuse(constant: str) -> Never:
-        raise ValueError(constant)
-
-    def finite(number: str) -> float:
-        return x if math.isfinite(x := float(number)) else refuse(number)
-
-    said = json.loads(text.decode(), object_pairs_hook=unique, parse_constant=refuse, parse_float=finite)
-    field = half_letter(said, half)
-    if field is not None:
-        raise InputError(f"{where}, field {field}: {WHOLE_LETTERS}; remove it, or the folder.")
-    return said
+    return unique
 
 
-def half_letter(said: Any, half: re.Pattern[str], field: str = "") -> str | None:
+def half_letter(value: Any, half: re.Pattern[str], field: str = "") -> str | None:
     """The first field of a document with half a letter in its name or text, such as `tried[0].step`."""
-    if isinstance(said, str):
-        return field if half.search(said) else None
+    if isinstance(value, str):
+        return field if half.search(value) else None
     inside: list[tuple[str, Any]] = []
-    if isinstance(said, list):
-        inside = [(f"{field}[{i}]", entry) for i, entry in enumerate(said)]
-    if isinstance(said, dict):
-        for name, entry in said.items():
+    if isinstance(value, list):
+        inside = [(f"{field}[{i}]", entry) for i, entry in enumerate(value)]
+    if isinstance(value, dict):
+        for name, entry in value.items():
             place = f"{field}.{clean(name)[:_LONGEST_KEY]}".lstrip(".")
             inside += [(place, name), (place, entry)]
-    found = (half_letter(entry, half, place) for place, entry in inside)
-    return next((place for place in found if place is not None), None)
+    places = (half_letter(entry, half, place) for place, entry in inside)
+    return next((place for place in places if place is not None), None)

@@ -1,7 +1,8 @@
-"""Files are written here: ordinary ones only, and never through a link."""
+"""Files are written here: ordinary ones only, and never through a link; one that was removed meanwhile is put back."""
 
 import os
 import secrets
+import shutil
 import stat
 from collections.abc import Iterable
 from contextlib import suppress
@@ -58,22 +59,57 @@ def write_whole(path: Path, text: str, *, over: bool = True) -> None:
         beside.unlink(missing_ok=True)
 
 
+def is_there(file: IO[bytes], path: Path) -> bool:
+    """Whether an open file stands where it was opened."""
+    try:
+        return os.path.samestat(os.fstat(file.fileno()), path.stat())
+    except OSError:
+        return False
+
+
+def put_back(file: IO[bytes], path: Path) -> IO[Any]:
+    """Write what an open file holds to a new one at `path`, at once, in place of whatever stands there.
+
+    Args:
+        file: Opened in the mode `a+b`; it is not closed.
+
+    Returns:
+        The new file, in the same mode.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    beside = path.with_name(f"{path.name}.new")
+    beside.unlink(missing_ok=True)
+    with beside.open("xb") as copy:
+        file.seek(0)
+        shutil.copyfileobj(file, copy)
+    kept = beside.open("a+b", buffering=0)
+    try:
+        os.replace(beside, path)
+    except BaseException:
+        kept.close()
+        raise
+    return kept
+
+
 def check_target(path: Path) -> None:
     """Raise an `InputError` if something else than an ordinary file stands where one is to be written."""
-    found = _mode(path)
-    if found is not None and not stat.S_ISREG(found):
-        raise InputError(f"{path} is {_kind(found)}, and only an ordinary file is written over; remove it.")
+    mode = _mode(path)
+    if mode is not None and not stat.S_ISREG(mode):
+        raise InputError(f"{path} is {_kind(mode)}, and only an ordinary file is written over; remove it.")
 
 
 def check_folders(folders: Iterable[Path]) -> None:
     """Raise an `InputError` if something else than a folder stands where one is to be, or if in one of them there is
     anything but folders and ordinary files."""
     for folder in folders:
-        found = _mode(folder)
-        if found is None:
+        mode = _mode(folder)
+        if mode is None:
             continue
-        if not stat.S_ISDIR(found):
-            raise InputError(f"{folder} is {_kind(found)}, where a folder is needed; remove it.")
+        if not stat.S_ISDIR(mode):
+            raise InputError(f"{folder} is {_kind(mode)}, where a folder is needed; remove it.")
         for path in sorted(folder.iterdir()):
             inside = _mode(path)
             if inside is not None and not stat.S_ISDIR(inside):
@@ -93,7 +129,7 @@ def _mode(path: Path) -> int | None:
 
 
 def _kind(mode: int) -> str:
-    return next((name for found, name in _KINDS if found(mode)), "something else")
+    return next((name for is_kind, name in _KINDS if is_kind(mode)), "something else")
 
 
 def _flag(name: str) -> int:

@@ -7,8 +7,7 @@ import numpy as np
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.io.strict_json import JsonNode
-from apo_bench.io.strict_toml import read_toml
+from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.empirical import Empirical, empirical_noise
 from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST, ConstantError, Fitted, MeasuredNoise, ViewNoise

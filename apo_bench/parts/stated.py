@@ -11,8 +11,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Face
-from apo_bench.io.strict_json import JsonNode
-from apo_bench.io.strict_toml import read_toml
+from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.parts.allowed import FACE_OR_PART_NAME, FRICTION, LONGEST_NAME, MOST_FACES
 
 SCHEMA = "apo-bench/part/1"

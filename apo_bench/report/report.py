@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from apo_bench.errors import InputError
-from apo_bench.io.parquet import write_columns
+from apo_bench.io.tables import write_columns
 from apo_bench.io.writing import check_folders, check_target, to_write
 from apo_bench.records.row import Row
 from apo_bench.records.run.report_rows import COLUMNS as KEPT

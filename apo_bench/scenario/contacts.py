@@ -17,7 +17,7 @@ from apo_bench.assembly.kinds import CONTACT_KINDS, contact_kind, geometric_play
 from apo_bench.assembly.topology import Contact, Gap, Kind, PartFace
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, Solid
-from apo_bench.io.strict_json import JsonNode
+from apo_bench.io.documents import JsonNode
 from apo_bench.scenario.keys import LARGEST_MM, read_span, refuse, refuse_name
 
 Asked = Mapping[Contact, Gap]

@@ -14,7 +14,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.holds import PAD_M, ROOM_M, holds, holds_whole
 from apo_bench.geometry.solid import Solid, all_boxes, extent
 from apo_bench.insertion.line import Preference
-from apo_bench.io.strict_json import JsonNode
+from apo_bench.io.documents import JsonNode
 from apo_bench.parts import load_part, part_path
 from apo_bench.parts.allowed import FACE_OR_PART_NAME
 from apo_bench.scenario.contacts import Asked, check_kinds, read_contacts

@@ -8,7 +8,7 @@ import numpy as np
 from apo_bench.errors import InputError, unknown
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.io.strict_json import JsonNode
+from apo_bench.io.documents import JsonNode
 
 LARGEST_MM = 2000.0
 """No length in a scenario is larger: the room of an arm on a table."""

@@ -15,8 +15,7 @@ from apo_bench.geometry.mate import mate
 from apo_bench.geometry.overlap import Overlap, overlap
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, world_bounds
-from apo_bench.io.default_looks import default_looks
-from apo_bench.io.figure_file import save_figure
+from apo_bench.io.figures import default_looks, save_figure
 from apo_bench.io.words import listed_words
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.axes import axis_marks

@@ -10,8 +10,7 @@ from apo_bench.correction.directions import Direction
 from apo_bench.correction.explanation import Explanation, OperationExplanation
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid, extent, world_bounds
-from apo_bench.io.default_looks import default_looks
-from apo_bench.io.figure_file import save_figure
+from apo_bench.io.figures import default_looks, save_figure
 from apo_bench.io.words import listed_words, with_article
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.axes import axis_marks

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.io.default_looks import default_looks
+from apo_bench.io.figures import default_looks
 from apo_bench.show.noise_card import PANEL_UNITS, PANELS, Drawn
 
 _SIZE_INCH = (9.0, 2.3)

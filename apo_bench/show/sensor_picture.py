@@ -12,8 +12,7 @@ from apo_bench.depth_camera.follow import Event
 from apo_bench.depth_camera.view import View
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.io.default_looks import default_looks
-from apo_bench.io.figure_file import save_figure
+from apo_bench.io.figures import default_looks, save_figure
 from apo_bench.show.sensor_run import SensorRun
 from apo_bench.simulation.sensor.watch import DemonstrationImages
 

@@ -18,8 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.errors import InputError
-from apo_bench.io.strict_json import JsonNode
-from apo_bench.io.strict_toml import read_toml
+from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.records.setting_columns import in_python
 from apo_bench.records.settings import LEVEL, SETTINGS
 from apo_bench.sweeps.grid import AXES, LARGEST_TRIALS, SHARED, SweepSettings

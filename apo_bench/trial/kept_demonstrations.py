@@ -21,8 +21,8 @@ from apo_bench.assembly.goals import Demonstration, Layout
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.pose import is_rigid
+from apo_bench.io.documents import JsonNode, parse_json
 from apo_bench.io.reading import read_text
-from apo_bench.io.strict_json import JsonNode, parse_json
 from apo_bench.io.writing import write_whole
 from apo_bench.records.settings import RANGE, TrialSettings
 from apo_bench.simulation.scene.scene import Scene

@@ -14,9 +14,8 @@ import pytest
 from apo_bench.errors import InputError
 from apo_bench.files.bop import read_results
 from apo_bench.files.observation import read_observation
+from apo_bench.io.documents import DEEPEST_NESTING, parse_json, parse_toml
 from apo_bench.io.reading import read_bytes, read_text
-from apo_bench.io.strict_json import DEEPEST, parse_json
-from apo_bench.io.strict_toml import parse_toml
 from apo_bench.observation.noise_file import read_noise
 from apo_bench.parts import load_part
 from apo_bench.scenario.file import load_scenario
@@ -106,7 +105,7 @@ def test_long_words_and_texts_are_no_long_keys() -> None:
 
 
 def test_names_with_dots_as_deep_as_allowed_are_read() -> None:
-    assert parse_toml((".".join("a" * (DEEPEST - 1)) + " = 1").encode(), "deep.toml").value
+    assert parse_toml((".".join("a" * (DEEPEST_NESTING - 1)) + " = 1").encode(), "deep.toml").value
 
 
 @pytest.mark.parametrize(

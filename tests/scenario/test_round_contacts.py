@@ -10,7 +10,7 @@ import pytest
 
 from apo_bench.assembly.topology import Contact, Gap, PartFace
 from apo_bench.errors import InputError
-from apo_bench.io.strict_json import JsonNode
+from apo_bench.io.documents import JsonNode
 from apo_bench.scenario.checks import check_clearance, check_scenario
 from apo_bench.scenario.contacts import Asked, read_contacts
 from apo_bench.scenario.scenario import Shift, Site

@@ -10,8 +10,7 @@ import numpy as np
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid
-from apo_bench.io.default_looks import default_looks
-from apo_bench.io.figure_file import save_figure
+from apo_bench.io.figures import default_looks, save_figure
 from apo_bench.recording.log import Track
 from apo_bench.recording.stays import Stays
 

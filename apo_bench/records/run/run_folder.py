@@ -16,9 +16,8 @@ from pathlib import Path
 from typing import IO, Any, final
 
 from apo_bench.errors import InputError
-from apo_bench.io.kept_file import is_there, put_back
 from apo_bench.io.reading import each_line
-from apo_bench.io.writing import check_target, to_write
+from apo_bench.io.writing import check_target, is_there, put_back, to_write
 from apo_bench.records.row import Row
 from apo_bench.records.run.checked import row_of, unwritable
 from apo_bench.records.run.run_file import check_same, write_run

@@ -6,8 +6,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
-from apo_bench.io.csv_file import write_csv
-from apo_bench.io.parquet import write_columns
+from apo_bench.io.tables import write_columns, write_csv
 
 
 class Column(NamedTuple):

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.assembly.graph import Arc, ArcResiduals, Graph, Node
-from apo_bench.io.default_looks import default_looks
+from apo_bench.io.figures import default_looks
 from apo_bench.show.graph.layout import GraphLayout, arrange
 
 _INK = "#222222"

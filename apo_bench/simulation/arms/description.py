@@ -9,8 +9,7 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
-from apo_bench.io.strict_json import JsonNode
-from apo_bench.io.strict_toml import read_toml
+from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.scenario.keys import read_pose
 
 _SCHEMA = "apo-bench/arm/1"

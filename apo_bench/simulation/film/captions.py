@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from apo_bench.io.default_looks import load_matplotlib
+from apo_bench.io.figures import load_matplotlib
 
 _Picture = NDArray[np.uint8]
 ABOVE_PX = 32

@@ -1,4 +1,4 @@
-"""Matplotlib as it comes, whatever a `matplotlibrc` in the current folder or at home says.
+"""Figures of matplotlib: drawn as it comes, whatever a `matplotlibrc` in the current folder or at home says.
 
 Matplotlib reads that of the current folder when it is first imported: its settings change every picture, a file that is
 no text is an exception, and a pipe is waited for.
@@ -10,6 +10,8 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+from apo_bench.errors import InputError
 
 _READ = "matplotlibrc"
 
@@ -39,3 +41,15 @@ def load_matplotlib() -> Any:
     import matplotlib
 
     return matplotlib
+
+
+def save_figure(figure: Any, out: str | Path, *, dpi: int = 100, given: str = "") -> None:
+    """Write a figure of matplotlib as PNG; `given` is the option that named the file, for the message.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    try:
+        figure.savefig(out, dpi=dpi, format="png", metadata={"Software": None})
+    except OSError as error:
+        raise InputError(f"{given}{out} cannot be written ({error.strerror}); choose another place.") from error

@@ -1,8 +1,12 @@
-"""Tables as CSV that a spreadsheet shows and does not obey: a text that it would take for a formula has ' in front."""
+"""Tables as CSV and as Parquet.
+
+A spreadsheet shows a CSV file and does not obey it: a text that it would take for a formula has ' in front.
+"""
 
 import csv
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Any
 
 from apo_bench.io.writing import to_write
 
@@ -36,3 +40,19 @@ def _number(text: str) -> bool:
     except ValueError:
         return False
     return "_" not in text
+
+
+def write_columns(names: Sequence[str], columns: Sequence[Sequence[Any]], path: Path) -> None:
+    """Write columns; lists of a column are lists there, and a column without any value is one of numbers.
+
+    Raises:
+        InputError: A link or anything else that is no regular file stands there.
+        OSError: The file cannot be written.
+    """
+    import pyarrow as pa
+    from pyarrow import parquet
+
+    arrays = [pa.array(column, from_pandas=False) for column in columns]
+    arrays = [a.cast(pa.float64()) if pa.types.is_null(a.type) else a for a in arrays]
+    with to_write(path) as out:
+        parquet.write_table(pa.table(arrays, names=list(names)), out, compression="zstd")

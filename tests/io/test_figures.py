@@ -65,7 +65,7 @@ def test_a_file_of_settings_in_the_folder_changes_nothing(content: bytes | None,
 def test_the_settings_of_whoever_draws_come_back() -> None:
     import matplotlib
 
-    from apo_bench.io.default_looks import default_looks
+    from apo_bench.io.figures import default_looks
 
     with matplotlib.rc_context({"font.size": 33.0}):
         with default_looks({"lines.linewidth": 7.0}) as inside:

@@ -1,10 +1,11 @@
-"""JSON read strictly: every complaint is one sentence that names the file and the key."""
+"""JSON and TOML read strictly: every complaint is one sentence that names the file and the line or the key."""
 
 from __future__ import annotations
 
 import json
 import math
-from collections import Counter
+import re
+import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
@@ -16,12 +17,16 @@ import numpy as np
 from apo_bench.errors import InputError, one_line
 from apo_bench.geometry.arrays import Array
 from apo_bench.io.plain_text import UNSHOWN
-from apo_bench.io.reading import read_text
+from apo_bench.io.reading import decoded, read_bytes, read_text
+from apo_bench.io.whole_json import unique_members
 
-DEEPEST = 32
+DEEPEST_NESTING = 32
 """Levels of nesting; no file of ours has more than 6."""
 _LARGEST_INTEGER = 10**308
 """Larger ones are no floating-point numbers."""
+_PART = r"""(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')"""
+_LONG_KEY = re.compile(rf"(?<![\w.-]){_PART}(?:[ \t]*+\.[ \t]*+{_PART}){{{DEEPEST_NESTING}}}")
+"""More names with dots between them than any key has; the time to read such keys grows with their square."""
 
 
 @final
@@ -34,10 +39,14 @@ class JsonNode:
     key: str = ""
     """From the root, such as `operation 2, position_mm`; empty for the document itself."""
 
+    @property
+    def place(self) -> str:
+        """File and key, for messages."""
+        return f"{self.file}, {self.key}" if self.key else self.file
+
     def fail(self, allowed: str, remedy: str = "") -> NoReturn:
         """Raise the `InputError` that says what stands here and what is allowed instead."""
-        place = f"{self.file}, {self.key}" if self.key else self.file
-        raise InputError(f"{place}: {allowed}, {_short(self.value)} was given{f'; {remedy}' if remedy else ''}.")
+        raise InputError(f"{self.place}: {allowed}, {_short(self.value)} was given{f'; {remedy}' if remedy else ''}.")
 
     def child(self, value: Any, key: str) -> JsonNode:
         name = one_line(key, 60)
@@ -46,20 +55,17 @@ class JsonNode:
     def fields(self, required: Iterable[str], optional: Iterable[str] = ()) -> Mapping[str, JsonNode]:
         """The members of an object: every required key, no unknown one."""
         required = tuple(required)
-        optional = tuple(optional)
-        if not isinstance(self.value, dict):
-            self.fail("an object with named keys is needed", f"its keys are {', '.join((*required, *optional))}")
         known = (*required, *optional)
+        if not isinstance(self.value, dict):
+            self.fail("an object with named keys is needed", f"its keys are {', '.join(known)}")
         for key in self.value:
             if key not in known:
                 near = get_close_matches(key, known, n=1, cutoff=0.5)
                 hint = f"; did you mean '{near[0]}'? Allowed" if near else "; allowed"
-                place = f"{self.file}, {self.key}" if self.key else self.file
-                raise InputError(f"{place}: unknown key '{one_line(key, 60)}'{hint}: {', '.join(known)}.")
+                raise InputError(f"{self.place}: unknown key '{one_line(key, 60)}'{hint}: {', '.join(known)}.")
         for key in required:
             if key not in self.value:
-                place = f"{self.file}, {self.key}" if self.key else self.file
-                raise InputError(f"{place}: the key '{key}' is missing; needed are {', '.join(required)}.")
+                raise InputError(f"{self.place}: the key '{key}' is missing; needed are {', '.join(required)}.")
         return {key: self.child(value, key) for key, value in self.value.items()}
 
     def fields_of(self, schema: str, required: Iterable[str], optional: Iterable[str] = ()) -> Mapping[str, JsonNode]:
@@ -79,9 +85,7 @@ class JsonNode:
     def numbers(self, *shape: int) -> Array:
         """Finite numbers in nested lists of this shape."""
         size = " x ".join(map(str, shape))
-        if not _fits(self.value, shape):
-            self.fail(f"{size} finite numbers are needed")
-        array = np.array(self.value, dtype=np.float64)
+        array = np.array(self.value if _fits(self.value, shape) else math.nan, dtype=np.float64)
         if not np.isfinite(array).all():
             self.fail(f"{size} finite numbers are needed")
         return array
@@ -97,9 +101,7 @@ class JsonNode:
         """A finite number that is at least `low`, or above it, and at most `high`."""
         most = f" to {high:g}" if math.isfinite(high) else ""
         wanted = f"a finite number {'above' if above else 'from'} {low:g}{most} is needed"
-        if not _fits(self.value, ()):
-            self.fail(wanted)
-        x = float(self.value)
+        x = float(self.value) if _fits(self.value, ()) else math.nan
         if not math.isfinite(x) or x > high or x < low or (above and x == low):
             self.fail(wanted)
         return x
@@ -134,18 +136,11 @@ def read_json(path: str | Path) -> JsonNode:
 def parse_json(text: str, file: str) -> JsonNode:
     """The document in a text; `file` is its name in messages."""
 
-    def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        members = dict(pairs)
-        if len(members) < len(pairs):
-            twice = Counter(key for key, _ in pairs).most_common(1)[0][0]
-            raise InputError(f"{file}: the key '{twice[:60]}' stands twice in one object; keep one of the two.")
-        return members
-
     def refuse(constant: str) -> NoReturn:
         raise InputError(f"{file}: every number must be finite, {constant} was given.")
 
     try:
-        document = json.loads(text, object_pairs_hook=unique, parse_constant=refuse)
+        document = json.loads(text, object_pairs_hook=unique_members(file), parse_constant=refuse)
     except json.JSONDecodeError as error:
         raise InputError(f"{file}, line {error.lineno}: this is not JSON ({error.msg}).") from error
     except (RecursionError, ValueError) as error:
@@ -154,18 +149,45 @@ def parse_json(text: str, file: str) -> JsonNode:
         raise InputError(
             f"{file}: this is not a JSON document that can be read (nested too deep, or a huge number)."
         ) from error
-    check_plain(document, file)
+    _check_plain(document, file)
     return JsonNode(document, file)
 
 
-def check_plain(document: Any, file: str) -> None:
+def read_toml(path: str | Path, kind: str) -> JsonNode:
+    """The document in a file.
+
+    Args:
+        kind: What the file should be, for the message: `sweep file`.
+
+    Raises:
+        InputError: No such file, too large, not UTF-8, not TOML, nested too deep, a huge number, or a date or time.
+    """
+    return parse_toml(read_bytes(path, f"{kind} (.toml)"), str(path))
+
+
+def parse_toml(raw: bytes, file: str) -> JsonNode:
+    """The document in a text; `file` is its name in messages."""
+    text = decoded(raw, file, "TOML file")
+    if found := _LONG_KEY.search(text):
+        line = text.count("\n", 0, found.start()) + 1
+        raise InputError(f"{file}, line {line}: at most {DEEPEST_NESTING} names with dots between them are allowed.")
+    try:
+        document = tomllib.loads(text)
+    except (ValueError, RecursionError) as error:
+        what = str(error) if isinstance(error, tomllib.TOMLDecodeError) else "nested too deep, or a huge number"
+        raise InputError(f"{file}: this is not TOML: {what}; mend the file at that place.") from error
+    _check_plain(document, file)
+    return JsonNode(document, file)
+
+
+def _check_plain(document: Any, file: str) -> None:
     """Raise an `InputError` if a document is nested too deep or holds a huge number, a date or a time."""
 
     def place(key: str) -> str:
         return f"{file}, {key}" if key else file
 
     level: list[tuple[str, Any]] = [("", document)]
-    for _ in range(DEEPEST):
+    for _ in range(DEEPEST_NESTING):
         below: list[tuple[str, Any]] = []
         for key, value in level:
             if isinstance(value, dict):
@@ -184,7 +206,7 @@ def check_plain(document: Any, file: str) -> None:
         if not below:
             return
         level = below
-    raise InputError(f"{file}: the document is nested more than {DEEPEST} levels deep; no file of ours is.")
+    raise InputError(f"{file}: the document is nested more than {DEEPEST_NESTING} levels deep; no file of ours is.")
 
 
 def _fits(value: Any, shape: tuple[int, ...]) -> bool:
