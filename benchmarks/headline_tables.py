@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.records.method import as_seen
-from apo_bench.report.compare import compare
+from apo_bench.report.comparison.compare import compare
+from apo_bench.statistics.effort import read_timing
 from apo_bench.statistics.paired import Paired
 from apo_bench.statistics.rates import Cell, Rate, wilson
-from apo_bench.statistics.times import read_timing
 
 Of = Callable[[Cell], Hashable]
 

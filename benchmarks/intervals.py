@@ -26,10 +26,10 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import expit, ndtr, ndtri
 
-from apo_bench.statistics.levels.area import reach, weights
-from apo_bench.statistics.levels.bounded import surprise, threshold
+from apo_bench.statistics.levels.curves import reach, weights
 from apo_bench.statistics.levels.falling import profile
 from apo_bench.statistics.levels.half_level import sure
+from apo_bench.statistics.over_seeds import mean_surprise, threshold
 from apo_bench.statistics.paired import tango
 from apo_bench.statistics.rates import wilson
 
@@ -113,7 +113,7 @@ def difference(s: Setting, count: int, rng: np.random.Generator) -> np.ndarray:
 def area(s: Setting, count: int, rng: np.random.Generator) -> np.ndarray:
     p = falling(s.rate, s.other)
     right = np.round(drawn([p], s, count, rng)[0] @ weights(LEVELS), 12)
-    return surprise(right, np.ones_like(right), np.full(count, p @ weights(LEVELS))) <= threshold(s.seeds)
+    return mean_surprise(right, np.ones_like(right), np.full(count, p @ weights(LEVELS))) <= threshold(s.seeds)
 
 
 def area_difference(s: Setting, count: int, rng: np.random.Generator) -> np.ndarray:
@@ -124,7 +124,7 @@ def area_difference(s: Setting, count: int, rng: np.random.Generator) -> np.ndar
     apart = ours - theirs
     truth = np.full(count, (p - q) @ weights(LEVELS))
     most = reach(apart, LEVELS)
-    return surprise(apart, np.ones_like(apart), truth, -most, most) <= threshold(s.seeds)
+    return mean_surprise(apart, np.ones_like(apart), truth, -most, most) <= threshold(s.seeds)
 
 
 def half_level(s: Setting, count: int, rng: np.random.Generator) -> np.ndarray:

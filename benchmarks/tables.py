@@ -11,10 +11,8 @@ from typing import Any
 
 from apo_bench.records.row import ROW_FIELDS
 from apo_bench.records.settings import SETTINGS
-from apo_bench.report.tables.calibration import CALIBRATION_NOTE, calibration_table
-from apo_bench.report.tables.confusion import CONFUSION_NOTE, confusion_table
-from apo_bench.statistics.calibration import calibrations
-from apo_bench.statistics.confusion import confusions
+from apo_bench.report.tables.forecasts import calibration_table, confusion_table
+from apo_bench.statistics.forecasts import calibrations, confusions
 from apo_bench.statistics.paired import paired
 from apo_bench.statistics.rates import Cell, tally
 
@@ -36,6 +34,8 @@ def main() -> None:
     cells = [cell for cell in tally(rows) if cell.careless == 1.0 or cell.method == "oracle"]
     plain = [cell for cell in cells if (cell.noise, cell.relations) == ("isotropic", "given")]
     known = [row for row in rows if row["p_value"] is not None or row["planned_error_free_mm"] is not None]
+    calibrated = calibration_table([c for c in calibrations(known) if c.method.startswith("contact")])
+    confused = confusion_table(confusions(rows))
     lines = [
         "# Tables of earlier sweeps",
         "",
@@ -114,15 +114,15 @@ def main() -> None:
         "",
         "## Calibration",
         "",
-        CALIBRATION_NOTE,
+        calibrated.note,
         "",
-        *calibration_table([c for c in calibrations(known) if c.method.startswith("contact")]).markdown(),
+        *calibrated.markdown(),
         "",
         "## Prediction and physics",
         "",
-        CONFUSION_NOTE,
+        confused.note,
         "",
-        *confusion_table(confusions(rows)).markdown(),
+        *confused.markdown(),
     ]
     PAGE.write_text("\n".join(lines) + "\n", encoding="utf-8")
     print(f"Wrote {PAGE}")

@@ -44,13 +44,14 @@ BREACHES = {
         ("apo_bench.scenario.file", "apo_bench.cad.importing"),
     ],
     "report": [
-        ("apo_bench.report.compare_text", "apo_bench.report.page.trials"),
-        ("apo_bench.report.tables.cells", "apo_bench.report.run_facts"),
+        ("apo_bench.report.page.document", "apo_bench.report.comparison.text"),
+        ("apo_bench.report.page.report_page", "apo_bench.report.answer"),
+        ("apo_bench.report.tables.cells", "apo_bench.report.run.facts"),
         ("apo_bench.report.figures.levels", "apo_bench.report.page.document"),
     ],
     "statistics": [
-        ("apo_bench.statistics.rates", "apo_bench.statistics.levels.bounded"),
-        ("apo_bench.statistics.levels.area", "apo_bench.statistics.over_seeds"),
+        ("apo_bench.statistics.rates", "apo_bench.statistics.levels.curves"),
+        ("apo_bench.statistics.settings", "apo_bench.statistics.levels.summary"),
         ("apo_bench.statistics.paired", "apo_bench.statistics.power"),
     ],
     "sweeps": [

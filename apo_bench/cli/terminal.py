@@ -12,16 +12,16 @@ from apo_bench.io.plain_text import clean
 from apo_bench.records.row import FreedSet, MovedInHand, Predicted, Row
 from apo_bench.records.settings import RANGE
 from apo_bench.report.tables.cells import cell_table
-from apo_bench.report.tables.confusion import prediction_summary
+from apo_bench.report.tables.forecasts import prediction_summary
 from apo_bench.report.tables.table import Column
 from apo_bench.report.tables.table import Table as Data
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.statistics.confusion import confusions
+from apo_bench.statistics.forecasts import confusions
 from apo_bench.statistics.rate_text import level_label
 from apo_bench.statistics.rates import Cell
 
 if TYPE_CHECKING:
-    from apo_bench.report.compare import Comparison
+    from apo_bench.report.comparison.compare import Comparison
     from apo_bench.report.report import Report
 
 _MOST_NAMES = 8
@@ -83,7 +83,7 @@ def print_report(report: Report) -> None:
 
 def print_comparison(comparison: Comparison) -> None:
     """How far two sweeps agree, and what is not the same in them."""
-    from apo_bench.report.compare_text import agreement_table, in_words
+    from apo_bench.report.comparison.text import agreement_table, in_words
 
     console().print(clean(in_words(comparison)))
     print_table(agreement_table(comparison))

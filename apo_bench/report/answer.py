@@ -11,10 +11,10 @@ from apo_bench.records.method import knows_relations, knows_truth
 from apo_bench.records.row import Row, look_up
 from apo_bench.records.short_names import CORRECTOR
 from apo_bench.statistics.levels.half_level import HalfLevel
-from apo_bench.statistics.over_seeds import FEWEST_SEEDS, Contrast, Results, contrast, pooled
+from apo_bench.statistics.levels.summary import Summary
+from apo_bench.statistics.over_seeds import FEWEST_SEEDS, Contrast, Results, contrast, pooled_rate
 from apo_bench.statistics.rate_text import percent
 from apo_bench.statistics.rates import Interval, Place, rank
-from apo_bench.statistics.summary import Summary
 
 ALIKE = 0.05
 """Two methods are alike only where the whole interval of their difference is within this, to either side of 0."""
@@ -34,7 +34,7 @@ def answer(rows: Iterable[Row], found: Summary) -> str:
     if not results:
         return "No trial counts here: either no demonstration was right itself, or only the oracle was tried."
     best, *others = _ranked(results)
-    own = pooled(results[best])
+    own = pooled_rate(results[best])
     few = own.seeds < FEWEST_SEEDS
     if not any(any(each.values()) for each in results.values()):
         return f"No method succeeds in any trial: {_nothing([best, *others], results)}.{_wrong(told)}"

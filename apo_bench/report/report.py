@@ -14,28 +14,24 @@ from apo_bench.records.run.report_rows import report_rows
 from apo_bench.records.run.run_file import read_run
 from apo_bench.records.salt import check_same_salt, one_salt, read_salt
 from apo_bench.report.answer import answer
-from apo_bench.report.failures import Draw, Failures
 from apo_bench.report.figures.every import figures
-from apo_bench.report.page.report_page import Found, report_page
-from apo_bench.report.run_facts import scenario_files
-from apo_bench.report.tables.calibration import calibration_table
+from apo_bench.report.page.report_page import report_page
+from apo_bench.report.run.facts import scenario_files
+from apo_bench.report.run.trials import Draw, Failures
 from apo_bench.report.tables.cells import cell_table
-from apo_bench.report.tables.confusion import confusion_table
 from apo_bench.report.tables.effort import effort_table, time_table, work_table
+from apo_bench.report.tables.forecasts import calibration_table, confusion_table, recognition_table
 from apo_bench.report.tables.gaps import gap_table
 from apo_bench.report.tables.half_levels import area_difference_table, area_table, half_table
 from apo_bench.report.tables.pairs import pair_table
-from apo_bench.report.tables.recognition import recognition_table
 from apo_bench.report.tables.table import Table
-from apo_bench.statistics.calibration import calibrations
-from apo_bench.statistics.confusion import Confusion, confusions
-from apo_bench.statistics.effort import efforts
+from apo_bench.statistics.effort import efforts, read_timing, trial_times, work
+from apo_bench.statistics.forecasts import Confusion, calibrations, confusions
 from apo_bench.statistics.gaps import gaps
+from apo_bench.statistics.levels.summary import Summary, summary
 from apo_bench.statistics.rates import Cell
 from apo_bench.statistics.recognition import recognitions
 from apo_bench.statistics.settings import members, settings
-from apo_bench.statistics.summary import Summary, summary
-from apo_bench.statistics.times import read_timing, times, work
 
 MOST_PANELS = 16
 """Of a PNG; drawing more takes minutes."""
@@ -97,8 +93,8 @@ def report(
     salt = None if salt_file is None else read_salt(salt_file)
     if salt is not None:
         check_same_salt(f"'{folder}'", salt.hash, one_salt(rows))
-    found = summary(rows)
-    if not found.cells:
+    numbers = summary(rows)
+    if not numbers.cells:
         raise InputError(
             f"'{folder}' holds replays of measured demonstrations alone, which belong to no cell of a sweep."
         )
@@ -109,63 +105,63 @@ def report(
             (folder / name).mkdir(exist_ok=True)
         _remove_older(folder)
         _write_rows(rows, folder / TABLES / ROWS)
-        return _written(folder, rows, found, Failures(pictures if draw else 0, draw, salt, trust_code))
+        return _written(folder, rows, numbers, Failures(pictures if draw else 0, draw, salt, trust_code))
     except OSError as error:
         raise InputError(f"'{folder}' cannot be written ({error.strerror}); copy it to a place that can.") from error
 
 
-def _written(folder: Path, rows: Sequence[Row], found: Summary, failed: Failures) -> Report:
+def _written(folder: Path, rows: Sequence[Row], numbers: Summary, failed: Failures) -> Report:
     run = read_run(folder)
     timing = read_timing(folder)
-    files = scenario_files(run)
-    took = times(timing)
-    known = work(timing)
-    recognised = recognitions(rows)
+    workers = work(timing)
     confused = confusions(rows)
-    gap = gaps(rows)
-    grouped = members(settings(found.cells), found.cells)
+    grouped = members(settings(numbers.cells), numbers.cells)
+    gap_summaries = gaps(rows)
+    recognised = recognitions(rows)
+    times = trial_times(timing)
     tables = {
-        "cells": cell_table(found.cells),
-        "pairs": pair_table(found.pairs),
-        "half_levels": half_table(found.half_levels, found.areas),
-        "areas": area_table(found.areas, found.area_differences),
-        "area_differences": area_difference_table(found.area_differences),
-        "gaps": gap_table(gap),
+        "cells": cell_table(numbers.cells),
+        "pairs": pair_table(numbers.pairs),
+        "half_levels": half_table(numbers.half_levels, numbers.areas),
+        "areas": area_table(numbers.areas, numbers.area_differences),
+        "area_differences": area_difference_table(numbers.area_differences),
+        "gaps": gap_table(gap_summaries),
         "confusion": confusion_table(confused),
         "recognised": recognition_table(recognised),
         "calibration": calibration_table(calibrations(rows)),
         "effort": effort_table(efforts(rows)),
-        "times": time_table(took),
-        "work": work_table(known),
+        "times": time_table(times),
+        "work": work_table(workers),
     }
     kept = _write_tables(tables, folder / TABLES)
-    drawn = figures(found, grouped, gap, confused, recognised, took)
+    drawn = figures(numbers, grouped, gap_summaries, confused, recognised, times)
     paths = [drawing.write(folder / FIGURES / f"{name}.svg") for name, drawing in drawn.items()]
     for name in PNG:
         if name in drawn and len(drawn[name].panels) <= MOST_PANELS:
             paths.append(drawn[name].write(folder / FIGURES / f"{name}.png"))
-    taken, missed = failed.drawn(rows, folder, files)
+    pictures, no_pictures = failed.drawn(rows, folder, scenario_files(run))
     beside = [path for table in kept.values() for path in (table, table.with_suffix(".parquet"))]
-    said = answer(rows, found)
-    page = Found(
+    sentences = answer(rows, numbers)
+    html = report_page(
         name=folder.resolve().name,
-        answer=said,
+        answer=sentences,
         rows=rows,
-        summary=found,
+        summary=numbers,
         grouped=grouped,
         figures=drawn,
         tables=tables,
-        timed=len(timing),
-        work=known,
         run=run,
-        files=files,
-        pictures=taken,
-        no_pictures=missed,
+        work=workers,
+        timed=len(timing),
+        pictures=pictures,
+        no_pictures=no_pictures,
         beside=[str(path.relative_to(folder)) for path in (*beside, folder / TABLES / ROWS, *paths)],
     )
     with to_write(folder / PAGE, "w") as file:
-        file.write(report_page(page))
-    return Report(folder / PAGE, said, kept, tuple(paths), found.cells, confused, len(taken), tuple(missed))
+        file.write(html)
+    return Report(
+        folder / PAGE, sentences, kept, tuple(paths), numbers.cells, confused, len(pictures), tuple(no_pictures)
+    )
 
 
 def _remove_older(folder: Path) -> None:
@@ -187,6 +183,6 @@ def _write_rows(rows: Sequence[Row], path: Path) -> None:
     """The rows themselves, what was predicted in columns of its own."""
     plain = [name for name in KEPT if name != "predicted"]
     columns = [[row.get(name) for row in rows] for name in plain]
-    said = ("fails", "operation", "code")
-    predicted = [[None if (p := row.get("predicted")) is None else itemgetter(key)(p) for row in rows] for key in said]
-    write_columns([*plain, *(f"predicted_{key}" for key in said)], [*columns, *predicted], path)
+    keys = ("fails", "operation", "code")
+    predicted = [[None if (p := row.get("predicted")) is None else itemgetter(key)(p) for row in rows] for key in keys]
+    write_columns([*plain, *(f"predicted_{key}" for key in keys)], [*columns, *predicted], path)

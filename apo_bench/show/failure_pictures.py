@@ -27,7 +27,7 @@ from apo_bench.records.run.replay_command import Files
 from apo_bench.records.salt import Salt
 from apo_bench.records.setting_columns import row_key, settings_of
 from apo_bench.records.settings import TrialSettings
-from apo_bench.report.failures import FailurePicture
+from apo_bench.report.run.trials import FailurePicture
 from apo_bench.show.axes import axis_marks
 
 _WIDTH = 640

@@ -11,10 +11,11 @@ import numpy as np
 from apo_bench.geometry.arrays import Array
 from apo_bench.records.method import knows_relations, knows_truth, may_look
 from apo_bench.records.row import Row
-from apo_bench.statistics.mcnemar import mcnemar
 from apo_bench.statistics.rates import CONFIDENCE, Interval, Place, Rate, by_place, order
 
 K = TypeVar("K", bound=Hashable)
+_Where = TypeVar("_Where", bound=Any)
+"""`Place` of a cell, or the setting of a curve."""
 _Counts = Array | int
 
 REFERENCES = ("paper", "none")
@@ -85,15 +86,14 @@ def paired(rows: Iterable[Row], references: Sequence[str] = REFERENCES) -> tuple
     """
     counted = {place: _counted(seeds) for place, seeds in by_place(rows).items()}
     cells = {place: counted[place] for place in sorted(counted, key=order) if counted[place]}
-    found = [
+    pairs = [
         _paired(place, reference, cells[place], cells[place_of_reference(place, reference)])
         for place in cells
         for reference in references
         if place.method != reference and not knows_truth(place.method) and place_of_reference(place, reference) in cells
     ]
-    p = {_comparison(pair): pair.p for pair in found if pair.p is not None}
-    raised = holm(p)
-    return tuple(replace(pair, p_adjusted=raised.get(_comparison(pair))) for pair in found)
+    raised = holm({_comparison(pair): pair.p for pair in pairs if pair.p is not None})
+    return tuple(replace(pair, p_adjusted=raised.get(_comparison(pair))) for pair in pairs)
 
 
 def holm(p: Mapping[K, float]) -> dict[K, float]:
@@ -102,14 +102,15 @@ def holm(p: Mapping[K, float]) -> dict[K, float]:
     After S. Holm, A simple sequentially rejective multiple test procedure, Scandinavian Journal of Statistics 6 (1979),
     65-70.
     """
-    order = sorted(p, key=lambda test: p[test])
-    raised = np.maximum.accumulate([(len(p) - i) * p[test] for i, test in enumerate(order)])
-    found = dict(zip(order, np.minimum(raised, 1.0).tolist(), strict=True))
-    return {test: found[test] for test in p}
+    tests = sorted(p, key=lambda test: p[test])
+    # of m tests the i-th smallest (from 0) is held to its share of the m - i that are left, and is never below the last
+    raised = np.maximum.accumulate([(len(p) - i) * p[test] for i, test in enumerate(tests)])
+    adjusted = dict(zip(tests, np.minimum(raised, 1.0).tolist(), strict=True))
+    return {test: adjusted[test] for test in p}
 
 
-def place_of_reference(place: Place, reference: str) -> Place:
-    """The cell that a cell is compared with."""
+def place_of_reference(place: _Where, reference: str) -> _Where:
+    """What a cell, or a curve, is compared with: `none` asks for no relations, and few methods for looks."""
     other = place._replace(method=reference, looks=place.looks if may_look(reference) else 0)
     return other if knows_relations(reference) else other._replace(relations="given")
 
@@ -120,6 +121,22 @@ def _counted(seeds: Mapping[int, Mapping[str, Any]]) -> dict[int, Mapping[str, A
 
 def _comparison(pair: Paired) -> frozenset[Place]:
     return frozenset((pair.place, place_of_reference(pair.place, pair.reference)))
+
+
+def mcnemar(only_first: int, only_second: int) -> float:
+    """The two-sided exact p-value: how unlikely so uneven a split is if each discordant pair falls either way alike.
+
+    After Q. McNemar, Note on the sampling error of the difference between correlated proportions or percentages,
+    Psychometrika 12 (1947), 153-157; exact by the binomial distribution. Without a discordant pair it is 1.
+
+    Args:
+        only_first: Pairs in which the first alone succeeded.
+        only_second: Pairs in which the second alone succeeded.
+    """
+    from scipy.stats import binomtest
+
+    pairs = only_first + only_second
+    return float(binomtest(min(only_first, only_second), pairs, 0.5).pvalue) if pairs else 1.0
 
 
 @lru_cache(maxsize=65536)
@@ -136,19 +153,27 @@ def tango(b: int, c: int, n: int) -> Interval:
         n: All pairs; without one nothing is known: -1 to 1.
     """
     from scipy.optimize import brentq
-    from scipy.stats import norm
 
     if n == 0:
         return Interval(-1.0, 1.0)
-    z = float(norm.ppf((1 + CONFIDENCE) / 2))
+    z = normal_quantile()
     d = (b - c) / n
+    # the statistic falls from far above z at delta = -1 through 0 at the estimate d to far below -z at delta = 1
     low = -1.0 if c == n else brentq(lambda x: float(score(b, c, n, x)) - z, -1 + _EDGE, d - _EDGE)
     high = 1.0 if b == n else brentq(lambda x: float(score(b, c, n, x)) + z, d + _EDGE, 1 - _EDGE)
     return Interval(float(low), float(high))
 
 
+def normal_quantile() -> float:
+    """Of a two-sided 95 % interval: 1.96."""
+    from scipy.special import ndtri
+
+    return float(ndtri((1 + CONFIDENCE) / 2))
+
+
 def score(b: _Counts, c: _Counts, n: _Counts, delta: Array | float) -> Array:
     """Tango's score statistic of a difference delta; q is the likeliest share of c if that is the difference."""
+    # q is the larger root of 2 n q^2 + B q - c delta (1 - delta) = 0, where the likelihood is flat along delta
     B = -b - c + (2 * n - b + c) * delta
     q = (np.sqrt(np.maximum(B * B + 8 * n * c * delta * (1 - delta), 0.0)) - B) / (4 * n)
     return np.asarray((b - c - n * delta) / np.sqrt(n * (2 * q + delta * (1 - delta))))
@@ -178,7 +203,7 @@ def _paired(
 
 
 def _student(x: Sequence[float]) -> Interval | None:
-    """Student's t interval of a mean at 95 %."""
+    """Student's t interval of a mean at 95 %: mean -+ t(n - 1) s / sqrt(n), s with n - 1 degrees of freedom."""
     from scipy.stats import t
 
     if len(x) < 2:

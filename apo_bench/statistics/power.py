@@ -14,15 +14,15 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
-from apo_bench.statistics.paired import score
-from apo_bench.statistics.rates import CONFIDENCE, Interval, wilson
+from apo_bench.statistics.paired import normal_quantile, score
+from apo_bench.statistics.rates import Interval, wilson
 
 ERROR = 0.05
 """Of a two-sided test."""
 _POWER = 0.8
 _MOST = 1_000_000
 """More trials than this are not sought."""
-_SPREAD = 9.0
+_FAR = 9.0
 """Standard deviations beyond which a count is not expected (less than 1e-18 of all cases)."""
 
 
@@ -55,7 +55,8 @@ def rate_trials(rate: float, half_width: float) -> int:
 
 def wilson_half_width(rate: float, trials: int) -> float:
     """Half the width of Wilson's 95 % interval where the rate seen is `rate`."""
-    z2 = _z() ** 2
+    z2 = normal_quantile() ** 2
+    # Wilson: z sqrt(p (1 - p) / n + z^2 / 4 n^2) / (1 + z^2 / n)
     return float(np.sqrt(z2 * (rate * (1 - rate) / trials + z2 / (4 * trials**2))) / (1 + z2 / trials))
 
 
@@ -77,8 +78,8 @@ def shares(rate: float, reference: float, agree: float | None = None) -> tuple[f
             f"{most:g} of the pairs to end alike."
         )
     apart = 1.0 - agree
-    win, lose = (max(0.0, 0.5 * (apart + sign * (rate - reference))) for sign in (1, -1))
-    return win, lose
+    # win + lose = apart, and win - lose = rate - reference
+    return max(0.0, 0.5 * (apart + (rate - reference))), max(0.0, 0.5 * (apart - (rate - reference)))
 
 
 def paired_trials(win: float, lose: float, power: float = _POWER, comparisons: int = 1) -> int:
@@ -110,8 +111,10 @@ def paired_power(pairs: int, win: float, lose: float, error: float = ERROR) -> f
     if better == 0.0:
         return 0.0
     m = _likely(pairs, better + worse)
+    # ppf is the first count that is reached with error / 2: one less where it is passed
     k = np.asarray(binom.ppf(error / 2, m, 0.5))
     k = np.where(binom.cdf(k, m, 0.5) <= error / 2, k, k - 1)
+    # of m discordant pairs each falls the other way with worse / (better + worse)
     rejects = np.where(k >= 0, binom.cdf(k, m, worse / (better + worse)), 0.0)
     return float(np.sum(binom.pmf(m, pairs, better + worse) * rejects))
 
@@ -140,8 +143,9 @@ def margin_power(pairs: int, margin: float, win: float = 0.0, lose: float = 0.0)
     c = _likely(pairs, lose)[None, :]
     fits = b + c <= pairs
     rest = np.where(fits, pairs - b, 0)
+    # a trinomial: wins out of all pairs, then losses out of those that are left
     weight = binom.pmf(b, pairs, win) * binom.pmf(c, rest, min(1.0, lose / (1 - win)) if win < 1 else 0.0)
-    rejects = score(b, np.where(fits, c, 0), pairs, -margin) > _z()
+    rejects = score(b, np.where(fits, c, 0), pairs, -margin) > normal_quantile()
     return float(np.sum(np.where(fits & rejects, weight, 0.0)))
 
 
@@ -151,7 +155,7 @@ def evidence(trials: int, power: float = _POWER, comparisons: int = 1) -> PowerE
         raise InputError(f"{trials} trials were given; a whole number from 1 to {_MOST} is allowed.")
     _inside(power, "power", 0.0, 1.0)
     error = _error(comparisons)
-    z2 = _z() ** 2
+    z2 = normal_quantile() ** 2
     discordant = least_discordant(error)
     return PowerEvidence(
         trials=trials,
@@ -193,14 +197,9 @@ def _least(enough: Callable[[int], bool], what: str) -> int:
 
 def _likely(n: int, p: float) -> Array:
     """The counts out of n that are not out of the question."""
-    spread = _SPREAD * np.sqrt(n * p * (1 - p)) + 40.0 * (0.0 < p < 1.0)
-    return np.arange(max(0, int(n * p - spread)), min(n, int(np.ceil(n * p + spread))) + 1, dtype=float)
-
-
-def _z() -> float:
-    from scipy.special import ndtri
-
-    return float(ndtri((1 + CONFIDENCE) / 2))
+    # the normal tail is too short where n p is small, so 40 more to either side
+    far = _FAR * np.sqrt(n * p * (1 - p)) + 40.0 * (0.0 < p < 1.0)
+    return np.arange(max(0, int(n * p - far)), min(n, int(np.ceil(n * p + far))) + 1, dtype=float)
 
 
 def _error(comparisons: int) -> float:

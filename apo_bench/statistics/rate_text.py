@@ -1,7 +1,7 @@
-"""How rates are said."""
+"""How rates, differences and levels are said."""
 
 from apo_bench.records.settings import RANGE
-from apo_bench.statistics.rates import Cell
+from apo_bench.statistics.rates import Cell, Interval, Rate
 
 
 def percent(rate: float | None, digits: int = 1) -> str:
@@ -15,10 +15,27 @@ def percent(rate: float | None, digits: int = 1) -> str:
     return f"< {least:.{digits}f} %" if rate > 0.0 and float(said) == 0.0 else f"{said} %"
 
 
-def interval(cell: Cell) -> str:
+def percents(interval: Interval, digits: int = 1) -> str:
     """`91.5 to 99.0 %`."""
-    low, high = cell.interval
-    return f"{100 * low:.1f} to {100 * high:.1f} %"
+    return f"{100 * interval.low:.{digits}f} to {100 * interval.high:.{digits}f} %"
+
+
+def share(r: Rate) -> str | None:
+    """`12 of 13 (66.7 to 98.6 %)`; None without a trial."""
+    return f"{r.successes} of {r.trials} ({percents(r.interval)})" if r.trials else None
+
+
+def signed(x: float, digits: int) -> str:
+    """`+4.0`; what is nothing to so many digits has no minus."""
+    return f"{round(x, digits) + 0.0:+.{digits}f}"
+
+
+def points(difference: float | None, interval: Interval) -> str | None:
+    """`+4.0 (-0.3 to +9.1)`."""
+    if difference is None:
+        return None
+    said, low, high = (signed(100 * x, 1) for x in (difference, *interval))
+    return f"{said} ({low} to {high})"
 
 
 def failures(cell: Cell, most: int = 3) -> str:

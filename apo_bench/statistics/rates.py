@@ -130,8 +130,8 @@ def wilson(successes: int, trials: int) -> Interval:
 
     if trials == 0:
         return Interval(0.0, 1.0)
-    found = binomtest(successes, trials).proportion_ci(confidence_level=CONFIDENCE, method="wilson")
-    return Interval(float(found.low), float(found.high))
+    interval = binomtest(successes, trials).proportion_ci(confidence_level=CONFIDENCE, method="wilson")
+    return Interval(float(interval.low), float(interval.high))
 
 
 def rank(method: str) -> int:

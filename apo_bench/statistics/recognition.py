@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, final
 
 from apo_bench.records.relations import RECOGNISED
 from apo_bench.records.row import Row, look_up
-from apo_bench.statistics.confusion import ALL
+from apo_bench.statistics.forecasts import ALL
 from apo_bench.statistics.rates import Rate
 
 

@@ -46,20 +46,20 @@ class Setting(NamedTuple):
     def conditions(self, clearance: bool = True) -> list[str]:
         """All but the scenario, as a person says it; the clearance can be left out."""
         human = {0.0: "careful human", 1.0: "careless human"}.get(self.careless, f"carelessness {self.careless:g}")
-        said = [human, *[f"{self.clearance_mm:g} mm clearance"] * clearance]
+        words = [human, *[f"{self.clearance_mm:g} mm clearance"] * clearance]
         if self.noise != USUAL:
-            said.append("range finder" if self.noise == RANGE else f"{self.noise} noise")
+            words.append("range finder" if self.noise == RANGE else f"{self.noise} noise")
         if self.relations != "given":
-            said.append(f"relations {self.relations}")
+            words.append(f"relations {self.relations}")
         if self.grasp != "friction":
-            said.append(f"{self.grasp} grasp")
+            words.append(f"{self.grasp} grasp")
         if self.robot_error != NO_ROBOT_ERROR:
-            said.append(f"robot error {self.robot_error}")
+            words.append(f"robot error {self.robot_error}")
         if self.fidelity != "full":
-            said.append(f"fidelity {self.fidelity}")
+            words.append(f"fidelity {self.fidelity}")
         if self.looks:
-            said.append(f"{self.looks} more look{'s' * (self.looks > 1)}")
-        return said
+            words.append(f"{self.looks} more look{'s' * (self.looks > 1)}")
+        return words
 
 
 def cell_place(item: Any) -> Place:
@@ -71,19 +71,20 @@ def cell_place(item: Any) -> Place:
 def settings(cells: Iterable[Any]) -> list[Setting]:
     """The settings of cells, sorted by scenario first; a cell makes its own only if no other setting holds it."""
     places = [cell_place(cell) for cell in cells]
-    found = set[Setting]()
-    for meets_all in (may_look, knows_relations, _sees, knows_truth):
-        own = {setting_of(p): p for p in places if meets_all(p.method)}
-        found |= {s for s, p in own.items() if not any(other.holds(p) for other in found)}
-    return sorted(found, key=lambda s: (s[:2], s.noise != USUAL, s.noise, rank_relations(s.relations), s[4:]))
+    chosen = set[Setting]()
+    # who meets most of what a setting says goes first, so that others find the setting that they belong to
+    for meets_it in (may_look, knows_relations, lambda method: not knows_truth(method), knows_truth):
+        own = {setting_of(p): p for p in places if meets_it(p.method)}
+        chosen |= {s for s, p in own.items() if not any(other.holds(p) for other in chosen)}
+    return sorted(chosen, key=lambda s: (s[:2], s.noise != USUAL, s.noise, rank_relations(s.relations), s[4:]))
 
 
-def members(found: Sequence[Setting], items: Iterable[_Item]) -> dict[Setting, list[_Item]]:
+def members(settings: Sequence[Setting], items: Iterable[_Item]) -> dict[Setting, list[_Item]]:
     """The cells, or whatever has a place, of every setting, in their order; of several oracles the one most tried."""
     near: dict[tuple[Any, ...], list[_Item]] = {}
     for item in items:
         near.setdefault(_site(cell_place(item)), []).append(item)
-    grouped = {s: [item for item in near.get(_site(s), ()) if s.holds(cell_place(item))] for s in found}
+    grouped = {s: [item for item in near.get(_site(s), ()) if s.holds(cell_place(item))] for s in settings}
     return {s: _one_ceiling(inside) for s, inside in grouped.items()}
 
 
@@ -110,17 +111,11 @@ def level_unit(noise: str) -> str:
 
 def setting_of(p: Place) -> Setting:
     """The setting that a place belongs to by itself."""
-    robot = (p.grasp, p.fidelity, p.looks, p.robot_error)
-    return Setting(p.scenario, p.clearance_mm, p.noise, p.relations, p.careless, *robot)
+    return Setting(*(getattr(p, name) for name in Setting._fields))
 
 
 def _site(x: Place | Setting) -> tuple[Any, ...]:
     return x.scenario, x.clearance_mm, x.grasp, x.fidelity, x.robot_error
-
-
-def _sees(method: str) -> bool:
-    """Whether a method looks at what was seen."""
-    return not knows_truth(method)
 
 
 def _one_ceiling(inside: list[_Item]) -> list[_Item]:

@@ -15,9 +15,9 @@ from apo_bench.io.plain_text import clean
 from apo_bench.records.run.report_rows import report_rows
 from apo_bench.records.run.run_file import read_run
 from apo_bench.report import report as reports
-from apo_bench.report.compare import compare
-from apo_bench.report.compare_text import comparison_form
-from apo_bench.statistics.times import read_timing
+from apo_bench.report.comparison.compare import compare
+from apo_bench.report.comparison.text import comparison_form
+from apo_bench.statistics.effort import read_timing
 from tests.altered import FILES, altered
 
 KEPT = Path(__file__).parents[1] / "kept" / "row7"

@@ -22,7 +22,7 @@ from apo_bench.records import salt as module
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.salt import Salt, make_salt, read_salt, salt_of_sweep
 from apo_bench.records.settings import TrialSettings
-from apo_bench.report.compare import compare
+from apo_bench.report.comparison.compare import compare
 from apo_bench.report.report import report
 from apo_bench.show.failure_pictures import failure_pictures
 from apo_bench.simulation.scene.scene import Scene

@@ -20,7 +20,7 @@ from apo_bench.records.row import REQUIRED, ROW_FIELDS, look_up
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.records.setting_columns import KEY, setting_columns, settings_of
 from apo_bench.records.settings import LEVEL, SETTINGS, TrialSettings
-from apo_bench.report.compare import compare
+from apo_bench.report.comparison.compare import compare
 from apo_bench.sweeps.grid import SweepSettings
 from apo_bench.sweeps.sweep_file import KEYS
 from apo_bench.trial.trial import run_trial

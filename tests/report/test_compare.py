@@ -11,8 +11,8 @@ import pytest
 
 from apo_bench.cli import app as cli
 from apo_bench.errors import InputError
-from apo_bench.report.compare import compare
-from apo_bench.report.compare_text import comparison_form, in_words
+from apo_bench.report.comparison.compare import compare
+from apo_bench.report.comparison.text import comparison_form, in_words
 from apo_bench.statistics.rate_text import percent
 from apo_bench.statistics.rates import wilson
 from tests import pages

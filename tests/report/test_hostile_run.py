@@ -22,8 +22,8 @@ from apo_bench.records.run.own_code import own_code
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.report import report as reports
-from apo_bench.report.failures import sample
 from apo_bench.report.report import report
+from apo_bench.report.run.trials import sample
 from apo_bench.report.tables.table import Column, Table
 from apo_bench.show.failure_pictures import failure_pictures
 from apo_bench.statistics.rates import tally

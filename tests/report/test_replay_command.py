@@ -14,8 +14,8 @@ from apo_bench.cli import app as cli
 from apo_bench.records.run.replay_command import milli, number, replay_command
 from apo_bench.records.setting_columns import settings_of
 from apo_bench.records.settings import TrialSettings
-from apo_bench.report.failures import sample
 from apo_bench.report.report import report
+from apo_bench.report.run.trials import sample
 from apo_bench.scenario.file import load_scenario
 from apo_bench.show.failure_pictures import failure_pictures
 from apo_bench.simulation.scene.scene import build_scene

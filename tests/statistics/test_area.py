@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.statistics.levels.area import area, area_differences, areas, reach, weights
-from apo_bench.statistics.levels.bounded import mean_interval
-from apo_bench.statistics.levels.curve import Curve, CurveSetting
+from apo_bench.statistics.levels.curves import Curve, CurveSetting, area, area_differences, areas, reach, weights
+from apo_bench.statistics.over_seeds import mean_interval
 from tests.statistics.test_half_level import HERE
 
 LEVELS = np.array([0.0, 0.1, 0.4, 1.0, 4.0])

@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from statsmodels.emplike.descriptive import DescStat
 
-from apo_bench.statistics.levels.bounded import mean_interval, surprise, threshold
+from apo_bench.statistics.over_seeds import mean_interval, mean_surprise, threshold
 
 STEPS = st.lists(st.integers(0, 20), min_size=2, max_size=40)
 """Numbers from 0 to 1 in twentieths: such that ties and bounds happen."""
@@ -21,7 +21,7 @@ def test_of_zeros_and_ones_it_is_the_binomial_likelihood(k: int, n: int, p: floa
     def part(count: int, rate: float) -> float:
         return count * math.log(count / n / rate) if count else 0.0
 
-    found = float(surprise(np.array([0.0, 1.0]), np.array([n - k, k]), p))
+    found = float(mean_surprise(np.array([0.0, 1.0]), np.array([n - k, k]), p))
     assert found == pytest.approx(2 * (part(k, p) + part(n - k, 1 - p)), rel=1e-9)
 
 
@@ -30,7 +30,7 @@ def test_of_zeros_and_ones_it_is_the_binomial_likelihood(k: int, n: int, p: floa
 def test_between_the_values_it_is_owens_empirical_likelihood(mean: float) -> None:
     x = np.random.default_rng(4).beta(2.0, 2.0, 30)
     expected = DescStat(x).test_mean(mean)[0]
-    assert float(surprise(x, np.ones_like(x), mean)) == pytest.approx(expected, rel=1e-6)
+    assert float(mean_surprise(x, np.ones_like(x), mean)) == pytest.approx(expected, rel=1e-6)
 
 
 def test_few_seeds_are_held_against_students_t() -> None:
@@ -70,7 +70,7 @@ def test_its_ends_are_where_the_surprise_passes_its_threshold(steps: list[int]) 
         inwards = 1e-4 * np.sign(x.mean() - end)
         for mean, believed in ((end + inwards, True), (end - inwards, False)):
             if 0.0 < mean < 1.0 and abs(x.mean() - end) > 2e-4:
-                assert (float(surprise(x, np.ones_like(x), mean)) <= threshold(len(x))) is believed
+                assert (float(mean_surprise(x, np.ones_like(x), mean)) <= threshold(len(x))) is believed
 
 
 @settings(max_examples=20, deadline=None)

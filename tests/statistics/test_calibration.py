@@ -11,8 +11,8 @@ import pytest
 from apo_bench.errors import InputError
 from apo_bench.records.row import ROW_FIELDS
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.report.tables.calibration import calibration_table
-from apo_bench.statistics.calibration import calibrations
+from apo_bench.report.tables.forecasts import calibration_table
+from apo_bench.statistics.forecasts import calibrations
 from tests.statistics.test_rates import row, write
 
 

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from scipy.special import expit, ndtri, xlogy
 from scipy.stats import binomtest
 
-from apo_bench.statistics.levels.bounded import threshold
-from apo_bench.statistics.levels.curve import Curve, CurveSetting, curves
-from apo_bench.statistics.levels.falling import OTHERS, curve, misfit, profile, variation
+from apo_bench.statistics.levels.curves import Curve, CurveSetting, curves
+from apo_bench.statistics.levels.falling import CURVE_SHAPES, curve, misfit, profile, variation
 from apo_bench.statistics.levels.half_level import HalfLevel, half_level, half_levels, sure
+from apo_bench.statistics.over_seeds import threshold
 from tests.statistics.test_rates import row
 
 LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)
@@ -27,10 +27,10 @@ def made(rates: tuple[float, ...], levels: tuple[float, ...] = LEVELS, seeds: in
 
 def test_every_curve_is_one_half_at_its_half_level_and_falls() -> None:
     x = np.linspace(-3.0, 3.0, 13)
-    p = curve(x[:, None], np.array(0.5), *OTHERS)
-    assert np.allclose(curve(np.array(0.5), np.array(0.5), *OTHERS), 0.5, atol=1e-9)
+    p = curve(x[:, None], np.array(0.5), *CURVE_SHAPES)
+    assert np.allclose(curve(np.array(0.5), np.array(0.5), *CURVE_SHAPES), 0.5, atol=1e-9)
     assert np.all(np.diff(p, axis=0) <= 1e-12)
-    assert np.all((p >= 0) & (p <= OTHERS[1] + 1e-12))
+    assert np.all((p >= 0) & (p <= CURVE_SHAPES[1] + 1e-12))
 
 
 @pytest.mark.parametrize(

@@ -18,8 +18,7 @@ from statsmodels.stats.multitest import multipletests
 
 from apo_bench.report.report import report
 from apo_bench.report.tables.pairs import pair_table
-from apo_bench.statistics.mcnemar import mcnemar
-from apo_bench.statistics.paired import holm, paired, tango
+from apo_bench.statistics.paired import holm, mcnemar, paired, tango
 from apo_bench.statistics.rates import wilson
 from tests import pages
 from tests.statistics.test_rates import row, write

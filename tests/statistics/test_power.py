@@ -12,8 +12,7 @@ from scipy.stats import binom, multinomial
 
 from apo_bench.cli.app import main
 from apo_bench.errors import InputError
-from apo_bench.statistics.mcnemar import mcnemar
-from apo_bench.statistics.paired import tango
+from apo_bench.statistics.paired import mcnemar, tango
 from apo_bench.statistics.power import (
     evidence,
     margin_power,

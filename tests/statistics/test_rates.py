@@ -20,13 +20,13 @@ from apo_bench.report.figures.sheet import draw
 from apo_bench.report.figures.styles import OWN_STYLES, STYLES
 from apo_bench.report.report import report
 from apo_bench.report.tables.cells import cell_table
-from apo_bench.report.tables.confusion import prediction_summary
-from apo_bench.statistics.confusion import Confusion, confusions
+from apo_bench.report.tables.forecasts import prediction_summary
 from apo_bench.statistics.effort import Effort, efforts
+from apo_bench.statistics.forecasts import Confusion, confusions
+from apo_bench.statistics.levels.summary import summary
 from apo_bench.statistics.rates import Rate, place_of, tally, wilson
 from apo_bench.statistics.settings import members
 from apo_bench.statistics.settings import settings as settings_of_cells
-from apo_bench.statistics.summary import summary
 from tests import pages
 
 UNKNOWN = dict.fromkeys(

@@ -26,7 +26,7 @@ from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_file import read_run
 from apo_bench.records.settings import TrialSettings
 from apo_bench.report.report import report
-from apo_bench.report.run_facts import limits_of
+from apo_bench.report.run.facts import limits_of
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps.environment_lock import EnvironmentLock, versions

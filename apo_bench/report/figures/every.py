@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
+from apo_bench.report.figures.bars import outcome_figure, prediction_figure, time_figure
 from apo_bench.report.figures.levels import (
     difference_figure,
     gap_figure,
@@ -9,20 +10,16 @@ from apo_bench.report.figures.levels import (
     recognition_figure,
     success_figure,
 )
-from apo_bench.report.figures.looks import looks_figure
-from apo_bench.report.figures.outcome_bars import outcome_figure
-from apo_bench.report.figures.prediction import prediction_figure
+from apo_bench.report.figures.other_axes import looks_figure, tightness_figure
 from apo_bench.report.figures.sheet import Drawing, draw
 from apo_bench.report.figures.styles import styles
-from apo_bench.report.figures.tightness import tightness_figure
-from apo_bench.report.figures.times import time_figure
-from apo_bench.statistics.confusion import Confusion
+from apo_bench.statistics.effort import TrialTimes
+from apo_bench.statistics.forecasts import Confusion
 from apo_bench.statistics.gaps import GapSummary
+from apo_bench.statistics.levels.summary import Summary
 from apo_bench.statistics.rates import Cell
 from apo_bench.statistics.recognition import Recognition
 from apo_bench.statistics.settings import Setting, members
-from apo_bench.statistics.summary import Summary
-from apo_bench.statistics.times import Times
 
 
 def figures(
@@ -31,7 +28,7 @@ def figures(
     gaps: Sequence[GapSummary],
     confusions: Sequence[Confusion],
     recognitions: Sequence[Recognition],
-    times: Sequence[Times],
+    times: Sequence[TrialTimes],
 ) -> dict[str, Drawing]:
     """By the name of their file."""
     where = list(grouped)

@@ -9,10 +9,10 @@ from apo_bench.records.settings import RANGE
 from apo_bench.report.figures.lines import Axis, MethodLine, Point, Rule, dodges, entries, levels_axis, line_panel
 from apo_bench.report.figures.sheet import Figure, Panel
 from apo_bench.report.figures.styles import RECOGNITION_STYLES, SEEN, Style, styles
-from apo_bench.statistics.confusion import ALL
+from apo_bench.statistics.forecasts import ALL
 from apo_bench.statistics.gaps import GapSummary, Quantiles
 from apo_bench.statistics.paired import Paired
-from apo_bench.statistics.rate_text import interval, percent
+from apo_bench.statistics.rate_text import percent, percents
 from apo_bench.statistics.rates import Cell
 from apo_bench.statistics.recognition import Recognition
 from apo_bench.statistics.settings import (
@@ -99,7 +99,7 @@ def _success(setting: Setting, cells: Sequence[Cell], looks: Mapping[str, Style]
         return c.rate or 0.0, *c.interval
 
     def tip(c: Cell) -> str:
-        return f"{percent(c.rate)} ({interval(c)}), n {c.trials}"
+        return f"{percent(c.rate)} ({percents(c.interval)}), n {c.trials}"
 
     known = [c for c in cells if c.rate is not None]
     lines = _lines(setting, known, looks, point, tip)

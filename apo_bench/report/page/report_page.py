@@ -2,27 +2,24 @@
 
 import base64
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any, final
+from typing import Any
 
+from apo_bench.records.limits import Limits
 from apo_bench.records.method import knows_truth
 from apo_bench.records.row import Row, look_up
 from apo_bench.records.run.replay_command import Files, replay_command
 from apo_bench.records.salt import one_salt
 from apo_bench.records.settings import RANGE
-from apo_bench.report.failures import FailurePicture
 from apo_bench.report.figures.sheet import Drawing
+from apo_bench.report.page.cells import matrices, packed_json, trials
 from apo_bench.report.page.document import page
-from apo_bench.report.page.matrix import matrices
-from apo_bench.report.page.trials import packed_json, trials
-from apo_bench.report.run_facts import limits_of, run_facts
-from apo_bench.report.tables import calibration, confusion, effort, gaps, half_levels, pairs, recognition
+from apo_bench.report.run.facts import limits_of, run_facts, scenario_files
+from apo_bench.report.run.trials import FailurePicture, why
 from apo_bench.report.tables.table import Table
-from apo_bench.report.trial_words import why
+from apo_bench.statistics.effort import Work
+from apo_bench.statistics.levels.summary import Summary
 from apo_bench.statistics.rates import Cell, place_of
 from apo_bench.statistics.settings import Setting, cell_place, setting_of
-from apo_bench.statistics.summary import Summary
-from apo_bench.statistics.times import Work
 
 _SECTIONS = {
     "success": "Success",
@@ -49,77 +46,65 @@ _SUCCESS = (
 _LEVELS = "Bands are Wilson's 95 % intervals; methods stand a little apart so that equal rates do not hide each other."
 
 
-@final
-@dataclass(frozen=True)
-class Found:
-    """All that a page shows."""
+def report_page(
+    name: str,
+    answer: str,
+    rows: Sequence[Row],
+    summary: Summary,
+    grouped: Mapping[Setting, Sequence[Cell]],
+    figures: Mapping[str, Drawing],
+    tables: Mapping[str, Table],
+    run: Mapping[str, Any],
+    work: Sequence[Work],
+    timed: int,
+    pictures: Sequence[FailurePicture],
+    no_pictures: Sequence[str],
+    beside: Sequence[str],
+) -> str:
+    """The page, as HTML.
 
-    name: str
-    """Of the folder."""
-    answer: str
-    """The sentence at the top, with `code` marked."""
-    rows: Sequence[Row]
-    summary: Summary
-    grouped: Mapping[Setting, Sequence[Cell]]
-    figures: Mapping[str, Drawing]
-    tables: Mapping[str, Table]
-    timed: int
-    """Trials whose time is known."""
-    work: Sequence[Work]
-    run: Mapping[str, Any]
-    files: Files
-    pictures: Sequence[FailurePicture]
-    no_pictures: Sequence[str]
-    """Why pictures are missing, in sentences."""
-    beside: Sequence[str]
-    """Files beside the page, relative to it."""
-
-
-def report_page(found: Found) -> str:
-    """The page, as HTML."""
-    cells = found.summary.cells
-    limits = limits_of(found.run)
+    Args:
+        name: Of the folder.
+        answer: The sentences at the top, with `code` marked.
+        grouped: The cells of each setting.
+        run: What `run.json` says.
+        timed: Trials whose time is known.
+        no_pictures: Why pictures are missing, in sentences.
+        beside: Files beside the page, relative to it.
+    """
+    cells = summary.cells
+    limits = limits_of(run)
+    files = scenario_files(run)
     numbers = {cell_place(cell): i for i, cell in enumerate(cells)}
     pictured = {}
-    for k, picture in enumerate(found.pictures):
+    for k, picture in enumerate(pictures):
         place = place_of(picture.row)
         if place in numbers:
             pictured[numbers[place], picture.row["seed"]] = k
     return page(
         "report.html",
-        title=found.name if "sweep" in found.name.lower() else f"Sweep {found.name}",
+        title=name if "sweep" in name.lower() else f"Sweep {name}",
         sections=_SECTIONS,
-        answer=found.answer,
-        scope=_scope(found.rows),
-        words={
-            "success": f"{_level_meaning(found.rows)} {_SUCCESS}",
-            "levels": _LEVELS,
-            "half_levels": half_levels.HALF_LEVEL_NOTE,
-            "pairs": pairs.PAIR_NOTE,
-            "gaps": gaps.GAP_NOTE,
-            "confusion": confusion.CONFUSION_NOTE,
-            "effort": effort.EFFORT_NOTE,
-            "calibration": calibration.CALIBRATION_NOTE,
-            "recognised": recognition.RECOGNITION_NOTE,
-            "run": _run_words(found.rows),
-        },
-        matrices=matrices(found.grouped, numbers),
+        answer=answer,
+        scope=_scope(rows),
+        words={"success": f"{_level_meaning(rows)} {_SUCCESS}", "levels": _LEVELS, "run": _run_words(rows)},
+        matrices=matrices(grouped, numbers),
         still=_still(cells),
-        figures=found.figures,
-        tables=found.tables,
+        figures=figures,
+        tables=tables,
         references=[
             reference
-            for reference in dict.fromkeys(p.reference for p in found.summary.pairs)
-            if f"difference_to_{reference}" in found.figures
+            for reference in dict.fromkeys(p.reference for p in summary.pairs)
+            if f"difference_to_{reference}" in figures
         ],
-        pictures=[_picture(one, found) for one in found.pictures],
-        no_pictures="; ".join(found.no_pictures),
-        timed=_timed(found.timed, found.work),
-        facts=run_facts(found.run, _said(found)),
-        command_line=found.run.get("command"),
-        no_run="" if found.run else "There is no run.json beside the rows, so versions and command are not known.",
-        beside=found.beside,
-        trials=packed_json(trials(found.rows, cells, found.files, pictured, limits)),
+        pictures=[_picture(picture, files, limits) for picture in pictures],
+        no_pictures="; ".join(no_pictures),
+        timed=_timed(timed, work),
+        facts=run_facts(run, _facts_of(rows, work)),
+        command_line=run.get("command"),
+        no_run="" if run else "There is no run.json beside the rows, so versions and command are not known.",
+        beside=beside,
+        trials=packed_json(trials(rows, cells, files, pictured, limits)),
     )
 
 
@@ -173,14 +158,15 @@ def _still(cells: Sequence[Cell]) -> str:
     return f"No level varied: {what}, so there is no curve."
 
 
-def _picture(one: FailurePicture, found: Found) -> dict[str, str]:
-    place = place_of(one.row)
+def _picture(picture: FailurePicture, files: Files, limits: Limits) -> dict[str, str]:
+    row = picture.row
+    place = place_of(row)
     where = "" if place is None else f"{setting_of(place).title()}, level {place.level:g}, "
     return {
-        "title": f"{one.row['method']}: {why(one.row)}.",
-        "words": f"{where}seed {one.row['seed']}: {one.row.get('sentence') or 'it failed'}. ({one.words})",
-        "command": replay_command(one.row, found.files, limits_of(found.run)),
-        "source": f"data:image/jpeg;base64,{base64.b64encode(one.jpeg).decode()}",
+        "title": f"{row['method']}: {why(row)}.",
+        "words": f"{where}seed {row['seed']}: {row.get('sentence') or 'it failed'}. ({picture.words})",
+        "command": replay_command(row, files, limits),
+        "source": f"data:image/jpeg;base64,{base64.b64encode(picture.jpeg).decode()}",
     }
 
 
@@ -212,19 +198,22 @@ def _run_words(rows: Sequence[Row]) -> str:
     )
 
 
-def _said(found: Found) -> dict[str, Any]:
+def _facts_of(rows: Sequence[Row], work: Sequence[Work]) -> dict[str, Any]:
     """What the rows say of how they were made."""
-    rows = found.rows
     salt = one_salt(rows)
+
+    def different(column: str) -> list[Any]:
+        return sorted({look_up(row, column) for row in rows})
+
     return {
-        "schemas": sorted({str(row["schema"]) for row in rows}),
-        "fidelity": sorted({str(row["fidelity"]) for row in rows}),
-        "grasp": sorted({str(row["grasp"]) for row in rows}),
-        "arm": sorted({str(row["arm"]) for row in rows}),
-        "time step [s]": sorted({row["timestep_s"] for row in rows}),
-        "clearance [mm]": sorted({row["clearance_mm"] for row in rows}),
+        "schemas": different("schema"),
+        "fidelity": different("fidelity"),
+        "grasp": different("grasp"),
+        "arm": different("arm"),
+        "time step [s]": different("timestep_s"),
+        "clearance [mm]": different("clearance_mm"),
         "seeds": f"{min(r['seed'] for r in rows)} to {max(r['seed'] for r in rows)}",
-        "hosts": sorted({w.host for w in found.work}) or "not known",
+        "hosts": sorted({w.host for w in work}) or "not known",
         "specifications": f"{len({row.get('spec_hash') for row in rows}):,} by their hash",
         **({"salt": salt} if salt else {}),
     }

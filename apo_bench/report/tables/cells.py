@@ -3,9 +3,8 @@
 from collections.abc import Callable, Sequence
 
 from apo_bench.records.method import knows_relations, knows_truth, may_look
-from apo_bench.report.tables.saying import interval_columns, level_text, rate_columns
-from apo_bench.report.tables.table import Column, Table
-from apo_bench.statistics.rate_text import failures, interval, percent
+from apo_bench.report.tables.table import Column, Table, interval_columns, level_text, rate_columns
+from apo_bench.statistics.rate_text import failures, percent, percents
 from apo_bench.statistics.rates import Cell
 
 
@@ -39,7 +38,7 @@ def cell_table(cells: Sequence[Cell]) -> Table:
             axis("looks", 0),
             axis("robot_error", "none"),
             Column("", "success", text=lambda c: percent(c.rate)),
-            Column("", "95 % interval", text=interval),
+            Column("", "95 % interval", text=lambda c: percents(c.interval)),
             Column("trials", "n"),
             Column("successes"),
             Column("rate"),

@@ -3,16 +3,15 @@
 from collections.abc import Sequence
 
 from apo_bench.report.tables.table import Column, Table
-from apo_bench.statistics.effort import Effort
-from apo_bench.statistics.times import Times, Work
+from apo_bench.statistics.effort import Effort, TrialTimes, Work
 
-EFFORT_NOTE = (
+_NOTE = (
     "Of trials that were right: the operations that were undone and done again, the simulated time, and how far a part "
     "that was in place was pushed at most."
 )
 
 
-def effort_table(found: Sequence[Effort]) -> Table:
+def effort_table(efforts: Sequence[Effort]) -> Table:
     """One line per scenario and method; for people."""
     columns = (
         Column("scenario", "scenario", words=True),
@@ -22,10 +21,10 @@ def effort_table(found: Sequence[Effort]) -> Table:
         Column("sim_seconds", "simulated", text=lambda e: f"{e.sim_seconds:.0f} s"),
         Column("pushed_mm", "pushed at most", text=lambda e: f"{e.pushed_mm:.2f} mm"),
     )
-    return Table(found, columns, "No trial was right.")
+    return Table(efforts, columns, "No trial was right.", _NOTE)
 
 
-def time_table(found: Sequence[Times]) -> Table:
+def time_table(times: Sequence[TrialTimes]) -> Table:
     """Wall times, one line per scenario and method."""
     columns = (
         Column("scenario", "scenario", words=True),
@@ -36,10 +35,10 @@ def time_table(found: Sequence[Times]) -> Table:
         Column("trial_95_s", "95 % are below [s]", lambda t: t.high, lambda t: f"{t.high:.2f}"),
         Column("trial_sum_s", "together [min]", lambda t: t.total, lambda t: f"{t.total / 60:.1f}"),
     )
-    return Table(found, columns)
+    return Table(times, columns)
 
 
-def work_table(found: Sequence[Work]) -> Table:
+def work_table(work: Sequence[Work]) -> Table:
     """One line per worker; for people."""
     columns = (
         Column("host", "host", words=True),
@@ -48,4 +47,4 @@ def work_table(found: Sequence[Work]) -> Table:
         Column("busy_s", "busy [min]", text=lambda w: f"{w.busy_s / 60:.1f}"),
         Column("rows_per_minute", "rows per minute", text=lambda w: f"{w.rows_per_minute:.1f}"),
     )
-    return Table(found, columns)
+    return Table(work, columns)

@@ -2,20 +2,19 @@
 
 from collections.abc import Sequence
 
-from apo_bench.report.tables.saying import level_text, millimetres, place_columns
-from apo_bench.report.tables.table import Column, Table
+from apo_bench.report.tables.table import Column, Table, level_text, millimetres, place_columns
 from apo_bench.statistics.gaps import GapSummary
 
-GAP_NOTE = (
+_NOTE = (
     "The largest distance of any face from the one it should touch, as it was seen and as the method planned it: "
     "medians, and in the drawing bands from the 5th to the 95th percentile of the trials. What is below 0.001 mm is "
     "drawn there. `none` plans what was seen."
 )
 
 
-def gap_table(found: Sequence[GapSummary]) -> Table:
+def gap_table(gaps: Sequence[GapSummary]) -> Table:
     """One line per cell."""
-    return Table(found, _COLUMNS)
+    return Table(gaps, _COLUMNS, note=_NOTE)
 
 
 _COLUMNS = (

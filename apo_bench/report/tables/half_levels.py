@@ -2,12 +2,12 @@
 
 from collections.abc import Sequence
 
-from apo_bench.report.tables.saying import interval_columns, place_columns, points, span
-from apo_bench.report.tables.table import Column, Table
-from apo_bench.statistics.levels.area import Area, AreaDifference
+from apo_bench.report.tables.table import Column, Table, interval_columns, place_columns
+from apo_bench.statistics.levels.curves import Area, AreaDifference
 from apo_bench.statistics.levels.half_level import HalfLevel
+from apo_bench.statistics.rate_text import points
 
-HALF_LEVEL_NOTE = (
+_NOTE = (
     "Where success falls to one half, read along the logarithm of the level, with a 95 % interval; *surely* is from "
     "the last level with success surely over one half to the first surely under it, whatever the curve between them. "
     "*Any* is an interval that is open at both ends, *none* is under one half even at level 0. "
@@ -17,13 +17,13 @@ _NONE = "No level varied, so nothing is known of how success falls with it."
 _WHERE = place_columns(lambda x: x.setting, levels=False)
 
 
-def half_table(found: Sequence[HalfLevel], areas: Sequence[Area]) -> Table:
+def half_table(levels: Sequence[HalfLevel], areas: Sequence[Area]) -> Table:
     """One line per method and setting; in files a limit beyond the levels tried is empty."""
     known = {a.setting: a for a in areas if a.area is not None}
 
     def area(h: HalfLevel) -> str | None:
         a = known.get(h.setting)
-        return None if a is None else f"{a.area:.3f} ({span(a.interval)}), {a.seeds} seeds"
+        return None if a is None else f"{a.area:.3f} ({a.interval.low:.3f} to {a.interval.high:.3f}), {a.seeds} seeds"
 
     columns = (
         *_WHERE,
@@ -38,7 +38,7 @@ def half_table(found: Sequence[HalfLevel], areas: Sequence[Area]) -> Table:
         Column("surely_under"),
         Column("", "area (95 %)", text=area),
     )
-    return Table(found, columns, _NONE)
+    return Table(levels, columns, _NONE, _NOTE)
 
 
 def area_table(areas: Sequence[Area], differences: Sequence[AreaDifference]) -> Table:
@@ -46,9 +46,9 @@ def area_table(areas: Sequence[Area], differences: Sequence[AreaDifference]) -> 
     return Table([*areas, *differences], _AREAS)
 
 
-def area_difference_table(found: Sequence[AreaDifference]) -> Table:
+def area_difference_table(differences: Sequence[AreaDifference]) -> Table:
     """For people: one line per method, setting and reference."""
-    return Table(found, _AREAS)
+    return Table(differences, _AREAS)
 
 
 def _difference(d: Area | AreaDifference) -> str | None:

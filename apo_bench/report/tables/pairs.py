@@ -2,20 +2,11 @@
 
 from collections.abc import Sequence
 
-from apo_bench.report.tables.saying import (
-    interval_columns,
-    level_text,
-    p_text,
-    place_columns,
-    points,
-    rate_columns,
-    share,
-    signed,
-)
-from apo_bench.report.tables.table import Column, Table
+from apo_bench.report.tables.table import Column, Table, interval_columns, level_text, place_columns, rate_columns
 from apo_bench.statistics.paired import Paired
+from apo_bench.statistics.rate_text import points, share, signed
 
-PAIR_NOTE = (
+_NOTE = (
     "Over the same seeds: at how many of them both methods were right, one alone, or neither; the difference of their "
     "success rates in points with Tango's score interval for paired proportions; McNemar's exact p-value, and in "
     "brackets the same adjusted for all comparisons of the sweep (Holm); *recovered*, the share of the seeds at which "
@@ -27,9 +18,10 @@ PAIR_NOTE = (
 )
 
 
-def pair_table(found: Sequence[Paired]) -> Table:
+def pair_table(pairs: Sequence[Paired]) -> Table:
     """One line per cell, method and reference."""
-    return Table(found, _COLUMNS, "No method shares a cell with `none` or `paper`, with which methods are paired.")
+    empty = "No method shares a cell with `none` or `paper`, with which methods are paired."
+    return Table(pairs, _COLUMNS, empty, _NOTE)
 
 
 def _counts(p: Paired) -> str:
@@ -37,15 +29,17 @@ def _counts(p: Paired) -> str:
 
 
 def _p(p: Paired) -> str | None:
-    return None if p.p is None else f"{p_text(p.p)} ({p_text(p.p_adjusted)})"
+    if p.p is None or p.p_adjusted is None:
+        return None
+    both = (f"{x:.3f}" if x >= 0.001 else "< 0.001" for x in (p.p, p.p_adjusted))
+    return "{} ({})".format(*both)
 
 
 def _free(p: Paired) -> str | None:
     if p.free_mm is None:
         return None
-    between = (
-        "" if p.free_interval is None else f" ({signed(p.free_interval.low, 3)} to {signed(p.free_interval.high, 3)})"
-    )
+    ends = [signed(x, 3) for x in p.free_interval or ()]
+    between = f" ({' to '.join(ends)})" if ends else ""
     return f"{signed(p.free_mm, 3)}{between}, n {p.planned}"
 
 

@@ -1,4 +1,5 @@
-"""One table, said once: the page, the terminal, Markdown, CSV and Parquet are made from its columns."""
+"""One table, said once: the page, the terminal, Markdown, CSV and Parquet are made from its columns; and the columns
+that several tables share."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -7,6 +8,10 @@ from pathlib import Path
 from typing import Any, NamedTuple, final
 
 from apo_bench.io.tables import write_columns, write_csv
+from apo_bench.records.method import knows_truth
+from apo_bench.statistics.rate_text import level_label
+from apo_bench.statistics.rates import Interval, Place, Rate
+from apo_bench.statistics.settings import cell_place, setting_of
 
 
 class Column(NamedTuple):
@@ -29,10 +34,10 @@ class Column(NamedTuple):
 
     def said(self, item: Any) -> str:
         """What people read of it."""
-        said = self.of(item) if self.text is None else self.text(item)
-        if said is None:
+        value = self.of(item) if self.text is None else self.text(item)
+        if value is None:
             return "–"
-        return f"{said:g}" if isinstance(said, float) else str(said)
+        return f"{value:g}" if isinstance(value, float) else str(value)
 
 
 @final
@@ -44,6 +49,8 @@ class Table:
     columns: Sequence[Column]
     empty: str = "Nothing to show."
     """Said to people where there is no line."""
+    note: str = ""
+    """What its numbers are, in sentences; `code` and *emphasis* are marked as in Markdown."""
 
     @property
     def shown(self) -> list[Column]:
@@ -67,13 +74,13 @@ class Table:
 
     def groups(self) -> list[tuple[str, list[list[str]]]]:
         """What a page says: heading (empty where nothing is grouped), and the lines below it."""
-        made: list[tuple[str, list[list[str]]]] = []
+        groups: list[tuple[str, list[list[str]]]] = []
         for item in self.items:
             heading = ", ".join(column.said(item) for column in self.shown if column.group)
-            if not made or made[-1][0] != heading:
-                made.append((heading, []))
-            made[-1][1].append([column.said(item) for column in self.beside])
-        return made
+            if not groups or groups[-1][0] != heading:
+                groups.append((heading, []))
+            groups[-1][1].append([column.said(item) for column in self.beside])
+        return groups
 
     def markdown(self) -> list[str]:
         """The table as lines of Markdown, or the sentence where there is none."""
@@ -91,6 +98,61 @@ class Table:
         else:
             write_csv(path, names, zip(*columns, strict=True))
         return path
+
+
+def millimetres(x: float | None) -> str | None:
+    """`0.012`: to a thousandth."""
+    return None if x is None else f"{x:.3f}"
+
+
+def place_columns(of: Callable[[Any], Any] = cell_place, levels: bool = True) -> tuple[Column, ...]:
+    """Where something was measured: for people scenario, conditions and method, for files every axis by itself.
+
+    Args:
+        of: From an item to its place, or to the setting of its curve, which has no level.
+    """
+
+    def axis(name: str, called: str = "") -> Column:
+        return Column(called or name, value=lambda x: getattr(of(x), name))
+
+    return (
+        axis("scenario")._replace(head="scenario", words=True, group=True),
+        Column("", "conditions", text=lambda x: ", ".join(setting_of(of(x)).conditions()), words=True, group=True),
+        *map(axis, ("clearance_mm", "noise", "relations", "careless")),
+        *((axis("level", "level_mm"), axis("level_deg")) if levels else ()),
+        axis("method")._replace(head="method", words=True),
+        *map(axis, ("grasp", "fidelity", "looks", "robot_error")),
+    )
+
+
+def level_text(x: Any) -> str:
+    """`0.5`, or `0.5 mm, 1 deg`, of anything that has a place; `any` of the oracle, which meets none."""
+    place = x if isinstance(x, Place) else cell_place(x)
+    return "any" if knows_truth(place.method) else level_label(place.level, place.level_deg, place.noise)
+
+
+def interval_columns(
+    of: Callable[[Any], Interval | None], low: str = "low_95", high: str = "high_95"
+) -> tuple[Column, ...]:
+    """Both ends of an interval, for files."""
+
+    def end(x: Any, i: int) -> float | None:
+        interval = of(x)
+        return None if interval is None else interval[i]
+
+    return Column(low, value=lambda x: end(x, 0)), Column(high, value=lambda x: end(x, 1))
+
+
+def rate_columns(of: Callable[[Any], Rate], names: tuple[str, str, str, str, str]) -> tuple[Column, ...]:
+    """Trials, successes, rate and its interval, for files; an empty name is left out."""
+    trials, successes, rate, low, high = names
+    columns = (
+        Column(trials, value=lambda x: of(x).trials),
+        Column(successes, value=lambda x: of(x).successes),
+        Column(rate, value=lambda x: of(x).rate),
+        *interval_columns(lambda x: of(x).interval, low, high),
+    )
+    return tuple(column for column in columns if column.name)
 
 
 def _text(x: Any) -> Any:

@@ -12,9 +12,8 @@ by how much more the score of h varies from seed to seed than the likelihood say
 of Statistics 12, 1984, 46-60; here never by less than 1).
 """
 
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import final
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,7 +24,7 @@ _STEEPNESS = np.geomspace(0.4, 40.0, 18)
 _CEILINGS = np.array([1.0, 0.98, 0.95, 0.9, 0.82, 0.7, 0.6])
 _POWERS = np.array([-12.0, -3.0, 0.0, 1.0, 3.0, 12.0])
 """Of the shape; those of the mirror image are negative, and 0 stands for the normal curve."""
-OTHERS = tuple(x.ravel() for x in np.meshgrid(_STEEPNESS, _CEILINGS, _POWERS, indexing="ij"))
+CURVE_SHAPES = tuple(x.ravel() for x in np.meshgrid(_STEEPNESS, _CEILINGS, _POWERS, indexing="ij"))
 """(m,) steepness, ceiling and power of every curve that has a half level."""
 _CONSTANTS = 4
 """Of a curve: half level, steepness, ceiling, power."""
@@ -39,9 +38,7 @@ _LEAST = 1e-9
 _STEP = 1e-4
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Profile:
+class Profile(NamedTuple):
     """How surprising every half level is."""
 
     log_half: Array
@@ -62,12 +59,14 @@ def profile(log_levels: Array, success: Array) -> Profile:
     k = right.sum(axis=-2)
     wrong = (known - right).sum(axis=-2)
     log_half, log_p, log_q = _table(tuple(log_levels.tolist()))
-    likelihood = (k @ log_p + wrong @ log_q).reshape(*k.shape[:-1], len(log_half), len(OTHERS[0]))
+    # sum over levels of k log p + (n - k) log (1 - p), for every half level and every shape of the grid
+    likelihood = (k @ log_p + wrong @ log_q).reshape(*k.shape[:-1], len(log_half), len(CURVE_SHAPES[0]))
+    # profile: at each half level the shape that is likeliest there
     best = likelihood.max(axis=-1)
     which = likelihood.argmax(axis=-1)
     at = best.argmax(axis=-1)[..., None]
     likeliest = np.take_along_axis(which, at, axis=-1)
-    more = variation(log_levels, right, known, log_half[at], tuple(x[likeliest] for x in OTHERS))
+    more = variation(log_levels, right, known, log_half[at], tuple(x[likeliest] for x in CURVE_SHAPES))
     more *= misfit(k, wrong, best.max(axis=-1))
     return Profile(log_half, 2.0 * (best.max(axis=-1, keepdims=True) - best) / more[..., None])
 
@@ -77,6 +76,7 @@ def curve(log_levels: Array, log_half: Array, steepness: Array, ceiling: Array, 
     from scipy.special import expit, logit, ndtr, ndtri
 
     half = 0.5 / ceiling
+    # ceiling * g(0 + shift) = 1/2 at log_half: the shift is the inverse of g at half
     normal = ceiling * ndtr(_NORMAL * steepness * (log_half - log_levels) + ndtri(half))
     mirrored = power < 0
     n = np.maximum(1.0, np.abs(power))
@@ -99,17 +99,21 @@ def variation(log_levels: Array, right: Array, known: Array, log_half: Array, ot
         return curve(log_levels, log_half + half, steepness * (1.0 + steeper), ceiling, power)
 
     p = np.clip(at(0.0, 0.0), _LEAST, 1.0 - _LEAST)
+    # derivatives of success by the half level and by the steepness, as central differences
     by_half = at(_STEP, 0.0) - at(-_STEP, 0.0)
     by_steepness = at(0.0, _STEP) - at(0.0, -_STEP)
     by_half = by_half / (2 * _STEP)
     by_steepness = by_steepness / (2 * _STEP)
+    # Fisher's information of both, if trials were independent: sum of n dp dp' / (p (1 - p))
     weight = known.sum(axis=-2) / (p * (1.0 - p))
     hh, hs, ss = (
         (weight * x).sum(axis=-1, keepdims=True) for x in (by_half**2, by_half * by_steepness, by_steepness**2)
     )
+    # the score of the half level with that of the steepness taken out, as the steepness was fitted too
     free = np.where(ss > _LEAST, hs / np.maximum(ss, _LEAST), 0.0)
     direction = (by_half - free * by_steepness) / (p * (1.0 - p))
     scores = (np.where(known, right - p[..., None, :], 0.0) * direction[..., None, :]).sum(axis=-1)
+    # its variance as the likelihood says, and as the seeds say
     expected = (hh - free * hs)[..., 0]
     seen = (scores**2).sum(axis=-1)
     return np.asarray(np.maximum(1.0, np.where(expected > _LEAST, seen / np.maximum(expected, _LEAST), 1.0)))
@@ -127,6 +131,7 @@ def misfit(right: Array, wrong: Array, likelihood: Array) -> Array:
     from scipy.special import chdtri, xlogy
 
     trials = np.maximum(right + wrong, 1.0)
+    # likelihood of a model with a rate of its own at each level; twice what it is better by is the deviance
     best = (xlogy(right, right / trials) + xlogy(wrong, wrong / trials)).sum(axis=-1)
     freedom = max(1, right.shape[-1] - _CONSTANTS)
     return np.asarray(np.maximum(1.0, 2.0 * (best - likelihood) / chdtri(freedom, 0.05)))
@@ -138,6 +143,6 @@ def _table(log_levels: tuple[float, ...]) -> tuple[Array, Array, Array]:
     x = np.array(log_levels)
     inside = np.linspace(x[0], x[-1], 2 + int(_PER_UNIT * (x[-1] - x[0])))
     h = np.unique(np.r_[x[0] - _OUTSIDE, inside, x[-1] + _OUTSIDE])
-    p = curve(x[:, None, None], h[:, None], *OTHERS)
+    p = curve(x[:, None, None], h[:, None], *CURVE_SHAPES)
     p = np.clip(p, _LEAST, 1.0 - _LEAST).reshape(len(x), -1)
     return h, np.log(p), np.log1p(-p)

@@ -16,9 +16,9 @@ from typing import final
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.statistics.levels.bounded import threshold
-from apo_bench.statistics.levels.curve import Curve, CurveSetting
+from apo_bench.statistics.levels.curves import Curve, CurveSetting
 from apo_bench.statistics.levels.falling import profile
+from apo_bench.statistics.over_seeds import threshold
 from apo_bench.statistics.rates import CONFIDENCE
 
 _LIKELIEST = 0.05
@@ -70,9 +70,9 @@ class HalfLevel:
         return _range(self.surely_over, self.surely_under)
 
 
-def half_levels(found: Iterable[Curve]) -> tuple[HalfLevel, ...]:
+def half_levels(curves: Iterable[Curve]) -> tuple[HalfLevel, ...]:
     """One per curve, in the same order."""
-    return tuple(map(half_level, found))
+    return tuple(map(half_level, curves))
 
 
 def half_level(curve: Curve) -> HalfLevel:
@@ -119,10 +119,9 @@ def sure(right: Array, trials: Array) -> tuple[Array, Array]:
 def _profiled(levels: Array, success: Array) -> tuple[float | None, str | None, float | None, float | None]:
     """Estimate, side on which it lies beyond the levels, and both ends of the interval; see `HalfLevel`."""
     x = np.log(levels)
-    found = profile(x, success)
-    h = found.log_half
-    surprise = found.surprise
+    h, surprise = profile(x, success)
     most = threshold(len(success))
+    # several half levels may be as likely as one another (between two levels of all and nothing): their middle
     middle = float(np.median(h[surprise <= _LIKELIEST]))
     beyond = "below" if middle < x[0] else "above" if middle > x[-1] else None
     believed = np.flatnonzero(surprise <= most)
@@ -140,6 +139,7 @@ def _end(h: Array, surprise: Array, most: float, k: int, step: int) -> float:
     """Where between a half level that is believed and the next, which is not, the surprise passes its threshold."""
     if not 0 <= k + step < len(h):
         return step * float("inf")
+    # the surprise is taken for straight between the two
     part = (most - surprise[k]) / (surprise[k + step] - surprise[k])
     return float(h[k] + part * (h[k + step] - h[k]))
 

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 from typing import final
 
 from apo_bench.records.row import Row
-from apo_bench.statistics.levels.area import Area, AreaDifference, area_differences, areas
-from apo_bench.statistics.levels.curve import curves
+from apo_bench.statistics.levels.curves import Area, AreaDifference, area_differences, areas, curves
 from apo_bench.statistics.levels.half_level import HalfLevel, half_levels
 from apo_bench.statistics.paired import REFERENCES, Paired, paired
 from apo_bench.statistics.rates import Cell, tally
@@ -33,12 +32,12 @@ def summary(rows: Iterable[Row], references: Sequence[str] = REFERENCES) -> Summ
     Raises:
         InputError: A trial is there twice.
     """
-    given = list(rows)
-    found = curves(given)
+    rows = list(rows)
+    over_levels = curves(rows)
     return Summary(
-        cells=tally(given),
-        pairs=paired(given, references),
-        half_levels=half_levels(found),
-        areas=areas(found),
-        area_differences=area_differences(found, references),
+        cells=tally(rows),
+        pairs=paired(rows, references),
+        half_levels=half_levels(over_levels),
+        areas=areas(over_levels),
+        area_differences=area_differences(over_levels, references),
     )

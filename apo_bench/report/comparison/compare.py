@@ -13,7 +13,7 @@ from apo_bench.records.run.run_file import read_run
 from apo_bench.records.salt import one_salt, with_salt
 from apo_bench.records.setting_columns import Key, row_key
 from apo_bench.records.settings import SETTINGS
-from apo_bench.statistics.confusion import ALL
+from apo_bench.statistics.forecasts import ALL
 from apo_bench.statistics.paired import tango
 from apo_bench.statistics.rates import Cell, Interval, Place, Rate, order, place_of, tally
 from apo_bench.statistics.settings import cell_place

@@ -1,4 +1,4 @@
-"""Which failures a report shows as pictures; who can draw them is somebody else."""
+"""How trials ended, in a few words, and which failures a report shows as pictures; others can draw them."""
 
 from __future__ import annotations
 
@@ -49,6 +49,23 @@ class Failures(NamedTuple):
         return taken, [*missed, *([without] if without else [])]
 
 
+def verdict(row: Row) -> str:
+    """How a trial ended, in a word or two."""
+    if row["success"] is None:
+        return "excluded"
+    if row["success"]:
+        return "right" if row["as_demonstrated"] else "right, not as demonstrated"
+    return "loosely right" if row["loose_success"] else "failed"
+
+
+def why(row: Row) -> str:
+    """`attach: force_stop, operation 3`; nothing where nothing failed."""
+    if row["failure_stage"] is None:
+        return ""
+    where = "" if row.get("failure_operation") is None else f", operation {row['failure_operation']}"
+    return f"{row['failure_stage']}: {row['failure_code']}{where}"
+
+
 def sample(rows: Iterable[Row], most: int, *, trust_code: bool = False) -> list[Row]:
     """Failures to be drawn: one for each way of failing, the most frequent first, methods and scenarios varied.
 
@@ -63,8 +80,8 @@ def sample(rows: Iterable[Row], most: int, *, trust_code: bool = False) -> list[
         if row["success"] is False and moved and row["level"] is not None and (trust_code or not own_code(row)):
             ways.setdefault((str(row["failure_stage"]), str(row["failure_code"])), []).append(row)
     chosen: list[Row] = []
-    for _, found in sorted(ways.items(), key=lambda way: (-len(way[1]), way[0]))[:most]:
-        chosen.append(_newest(sorted(found, key=_order), chosen))
+    for _, alike in sorted(ways.items(), key=lambda way: (-len(way[1]), way[0]))[:most]:
+        chosen.append(_least_shown(sorted(alike, key=_order), chosen))
     return chosen
 
 
@@ -73,12 +90,12 @@ def _order(row: Row) -> tuple[Any, ...]:
     return (row["seed"], rank(row["method"]) == 1, rank(row["method"]), row["method"], where)
 
 
-def _newest(found: Sequence[Row], chosen: Sequence[Row]) -> Row:
+def _least_shown(alike: Sequence[Row], chosen: Sequence[Row]) -> Row:
     """The first one of a method and scenario that was chosen least."""
     methods = [row["method"] for row in chosen]
     scenarios = [row["scenario"] for row in chosen]
     met: dict[tuple[str, str], int] = {}
-    for i, row in enumerate(found):
+    for i, row in enumerate(alike):
         met.setdefault((row["method"], row["scenario"]), i)
     best = min(met, key=lambda pair: (methods.count(pair[0]) + scenarios.count(pair[1]), met[pair]))
-    return found[met[best]]
+    return alike[met[best]]

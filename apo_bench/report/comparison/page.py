@@ -6,8 +6,8 @@ from typing import NamedTuple
 
 from apo_bench.errors import InputError
 from apo_bench.io.writing import check_folders, to_write
-from apo_bench.report import compare_text as text
-from apo_bench.report.compare import Comparison
+from apo_bench.report.comparison import text
+from apo_bench.report.comparison.compare import Comparison
 from apo_bench.report.page.document import page
 from apo_bench.report.tables.table import Table
 

@@ -1,0 +1,1 @@
+"""What was run, how its trials ended, and which of its failures are drawn."""
