@@ -70,6 +70,37 @@ def joint_play_mm(assembly: Assembly, contact: Contact, made: int, true: Poses, 
     return _opening(faces, together.index(contact), T.tobytes(), clearance_mm)
 
 
+def deep_limit_mm(
+    assembly: Assembly, contact: Contact, clearance_mm: float, margin_mm: float, touching_mm: float
+) -> float:
+    """How deep faces may be in each other: the play of the pair and a margin, or what faces that should touch may."""
+    a, b = map(assembly.face_of, contact)
+    play = play_mm(a, b, clearance_mm)
+    return touching_mm if play is None else play + margin_mm
+
+
+def apart_limit_mm(
+    assembly: Assembly,
+    contact: Contact,
+    made: int,
+    true: Poses,
+    clearance_mm: float,
+    margin_mm: float,
+    touching_mm: float,
+) -> float:
+    """How far apart faces may be: as deep as in `deep_limit_mm`, or the play of all faces together and a margin, if
+    that is more.
+
+    Args:
+        made: As in `joint_play_mm`, and so is `true`.
+        margin_mm: What is allowed beyond the play.
+        touching_mm: What faces that should touch may be off.
+    """
+    deep = deep_limit_mm(assembly, contact, clearance_mm, margin_mm, touching_mm)
+    play = joint_play_mm(assembly, contact, made, true, clearance_mm)
+    return deep if play is None else max(deep, play + margin_mm)
+
+
 @lru_cache(maxsize=1024)
 def _opening(faces: tuple[tuple[AnyFace, AnyFace], ...], which: int, at: bytes, clearance_mm: float) -> float | None:
     """The largest gap of one of some pairs of faces, [mm]; remembered, since all trials of a seed share the true ones.
@@ -82,6 +113,7 @@ def _opening(faces: tuple[tuple[AnyFace, AnyFace], ...], which: int, at: bytes, 
         return None
     T = np.frombuffer(at).reshape(4, 4)
     touches = [_touch(*pair, T, clearance_mm) for pair in faces]
+    # A small motion moves point p by v + w x p, of which n . (v + w x p) = n . v + (p x n) . w opens the contact.
     rows = np.concatenate([_rows(touch) for touch in touches])
     limits = np.concatenate([np.full(len(touch.points), touch.limit_mm) for touch in touches])
     widest = _widest(_rows(touches[which]), rows, limits)
@@ -103,6 +135,8 @@ def _widest(own: Array, rows: Array, limits: Array) -> float:
 
     if not len(own):
         return np.inf
+    # maximise sum_k own_k x_k, with one motion x_k per own row, so that -rows x_k <= limits for each k: the programs
+    # have nothing in common, so the matrix of all constraints is block diagonal.
     together = np.kron(np.eye(len(own)), -rows)
     optimum = linprog(-own.ravel(), together, np.tile(limits, len(own)), bounds=[(None, None)] * own.size)
     return float((own * optimum.x.reshape(own.shape)).sum(axis=1).max()) if optimum.success else np.inf
@@ -126,7 +160,7 @@ def _touch(moved: AnyFace, rests: AnyFace, T: Array, clearance_mm: float) -> _To
     x = across_axis(between.axis)
     turns = 2.0 * np.pi * (np.arange(_WALLS) + 0.5) / _WALLS
     ring = np.outer(np.cos(turns), x) + np.outer(np.sin(turns), np.cross(between.axis, x))
-    play = play_mm(moved, rests, clearance_mm)
-    assert play is not None
+    play = play_mm(moved, rests, clearance_mm) or 0.0
     ends = between.points
+    # Walls at r cos(pi / N) from the axis make a polygon whose corners lie on the circle of radius r.
     return _Touch(np.repeat(ends, _WALLS, axis=0), np.tile(ring, (len(ends), 1)), max(0.0, play) * cos(pi / _WALLS))

@@ -7,15 +7,15 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.joint_play import joint_play_mm
-from apo_bench.assembly.kinds import ContactKind, contact_kind, play_mm
+from apo_bench.assembly.joint_play import apart_limit_mm, deep_limit_mm
+from apo_bench.assembly.kinds import ContactKind, contact_kind
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.geometry.mate import Mate, mate
 from apo_bench.geometry.overlap import Overlap, overlap
 from apo_bench.geometry.solid import Face
 from apo_bench.records.thresholds import Thresholds
 
-Moment = Literal["made", "end"]
+ContactMoment = Literal["made", "end"]
 _OFF: dict[ContactKind, str] = {
     "plane on plane": "off by {:.2f} mm",
     "shaft in hole": "{:.2f} mm off the axis",
@@ -40,7 +40,7 @@ class ContactVerdict(NamedTuple):
     contact: Contact
     operation: int
     """The operation that made it, counted from 0."""
-    moment: Moment
+    moment: ContactMoment
     """`made`: when its operation was over; `end`: at the end, if nothing moved the parts away from each other."""
     gap_mm: float | None
     """Largest |e|: distance of a corner of the overlap to the plane of the other face; of round faces that of the
@@ -72,7 +72,7 @@ class ContactJudge(NamedTuple):
     clearance_mm: float
 
     def verdict(
-        self, contact: Contact, operation: int, moment: Moment, poses: Poses, true: Poses, share: _Share
+        self, contact: Contact, operation: int, moment: ContactMoment, poses: Poses, true: Poses, share: _Share
     ) -> ContactVerdict:
         """Measure one contact.
 
@@ -81,49 +81,36 @@ class ContactJudge(NamedTuple):
             poses: Where the parts are, world frame, [m].
             true: Where they are when it is made, if all goals are the true ones.
         """
-        thresholds = self.thresholds
+        asks = self.thresholds
         gaps, angle, common = _measured(self.assembly, contact, poses)
         allowed, gap = self._nearest_limit(contact, operation, true, gaps)
         covered = share(common, face_overlap(self.assembly, contact, true))
-        covering = gap is not None and covered >= thresholds.overlap_fraction
-        near = angle <= thresholds.loose_angle_deg and (gap is None or gap <= thresholds.loose_gap_mm)
-        touching = near and (gap is None or gap <= allowed)
-        loose = near and covering
+        covering = gap is not None and covered >= asks.overlap_fraction
+        near = angle <= asks.loose_angle_deg and (gap is None or gap <= asks.loose_gap_mm)
         return ContactVerdict(
             contact,
             operation,
             moment,
-            gap,
-            angle,
-            covered,
-            touching,
-            covering,
-            loose,
+            gap_mm=gap,
+            angle_deg=angle,
+            overlap=covered,
+            touching=near and (gap is None or gap <= allowed),
+            covering=covering,
+            loose=near and covering,
             allowed_mm=allowed,
-            kind=self._kind(contact),
+            kind=contact_kind(*map(self.assembly.face_of, contact)) or "plane on plane",
         )
 
     def _nearest_limit(
         self, contact: Contact, operation: int, true: Poses, gaps: Gaps | None
     ) -> tuple[float, float | None]:
         """How large a gap may be and how large it is, [mm], on the side, apart or deep, that is nearer its limit."""
-        deep = self._allowed_mm(contact)
+        lengths = self.clearance_mm, self.thresholds.fit_margin_mm, self.thresholds.support_mm
+        deep = deep_limit_mm(self.assembly, contact, *lengths)
         if gaps is None:
             return deep, None
-        play = joint_play_mm(self.assembly, contact, operation, true, self.clearance_mm)
-        apart = deep if play is None else max(deep, play + self.thresholds.fit_margin_mm)
+        apart = apart_limit_mm(self.assembly, contact, operation, true, *lengths)
         return max((deep, gaps.deep_mm), (apart, gaps.apart_mm), key=lambda side: side[1] - side[0])
-
-    def _allowed_mm(self, contact: Contact) -> float:
-        """The play of a fit and a margin, or the margin of faces that should touch."""
-        a, b = map(self.assembly.face_of, contact)
-        play = play_mm(a, b, self.clearance_mm)
-        return self.thresholds.support_mm if play is None else play + self.thresholds.fit_margin_mm
-
-    def _kind(self, contact: Contact) -> ContactKind:
-        kind = contact_kind(*map(self.assembly.face_of, contact))
-        assert kind is not None
-        return kind
 
 
 def faults_in_words(contacts: Sequence[ContactVerdict], thresholds: Thresholds) -> Iterator[tuple[str, str]]:

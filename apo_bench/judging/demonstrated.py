@@ -10,7 +10,7 @@ from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import Overlap
-from apo_bench.judging.contacts import ContactJudge, ContactVerdict, Moment
+from apo_bench.judging.contacts import ContactJudge, ContactMoment, ContactVerdict
 from apo_bench.judging.displaced import displacements
 from apo_bench.judging.finished import fixtures
 from apo_bench.judging.judgement import Judgement, judgement
@@ -55,7 +55,7 @@ def _contacts(
     true = _true_poses(judge.assembly, (*after, final), reference)
     out = []
     for contact, made, lost in judge.assembly.relations():
-        moments: Mapping[Moment, Snapshot | None] = {"made": after[made], "end": final if lost is None else None}
+        moments: Mapping[ContactMoment, Snapshot | None] = {"made": after[made], "end": final if lost is None else None}
         for moment, snapshot in moments.items():
             if snapshot is not None:
                 out.append(judge.verdict(contact, made, moment, snapshot.poses, true[made], Overlap.share))

@@ -16,7 +16,8 @@ from apo_bench.assembly.goals import Observation, Plan, goals_in_force
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.prediction.failure import Measure, measures, predict
+from apo_bench.prediction.failure import predict
+from apo_bench.prediction.measures import Measure, measures
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.execution.prepare import in_reach
 from apo_bench.simulation.scene.scene import Scene, build_scene
