@@ -18,7 +18,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.mate import mate
 from apo_bench.geometry.overlap import overlap
-from apo_bench.geometry.revolution import across_axis
+from apo_bench.geometry.polygon import across_axis
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face
 

@@ -9,6 +9,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array, remembered
 from apo_bench.geometry.hull import Hull, cylinder_hull
 from apo_bench.geometry.overlap import SLIVER_M2
+from apo_bench.geometry.polygon import flat_area, plane_across
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Box, Face, Piece, Solid, all_boxes
 
@@ -79,11 +80,8 @@ def _plane(face: Face) -> tuple[int, int, float]:
 
 def _flat(face: Face) -> Any:
     """The face in the two coordinates that follow its axis cyclically."""
-    from shapely import Polygon
-
     axis = _plane(face)[0]
-    plane = [(axis + 1) % 3, (axis + 2) % 3]
-    return Polygon(face.outline[:, plane], [hole[:, plane] for hole in face.holes])
+    return flat_area(face.outline, face.holes, np.eye(3)[:, [(axis + 1) % 3, (axis + 2) % 3]])
 
 
 def _receded(solid: Solid, box: Box, sides: Sequence[_Side], clearance_m: float) -> Box:
@@ -207,23 +205,15 @@ def _on_round(face: RoundFace, hull: Hull, side: Array) -> bool:
 
 def _on_flat(face: Face, hull: Hull, side: Array) -> bool:
     """Whether a side lies in the plane of a face and covers some of it."""
+    from shapely import MultiPoint
+
     n = side[:3]
     d = side[3]
     if n @ face.normal < 1.0 - _PARALLEL or abs(n @ face.outline[0] - d) > _ON_M:
         return False
-    u = np.eye(3)[int(np.abs(n).argmin())]
-    u = u - (u @ n) * n
-    u /= np.sqrt(u @ u)
-    plane = np.array([u, np.cross(n, u)])
-    own = _polygon(_corners_on(hull, side) @ plane.T).convex_hull
-    other = _polygon(face.outline @ plane.T, [hole @ plane.T for hole in face.holes])
-    return bool(own.intersection(other).area > _SLIVER * own.area)
-
-
-def _polygon(outline: Array, holes: list[Array] | None = None) -> Any:
-    from shapely import MultiPoint, Polygon
-
-    return MultiPoint(outline) if holes is None else Polygon(outline, holes)
+    to_plane = plane_across(n)
+    own = MultiPoint(_corners_on(hull, side) @ to_plane).convex_hull
+    return bool(own.intersection(flat_area(face.outline, face.holes, to_plane)).area > _SLIVER * own.area)
 
 
 def _corners_on(hull: Hull, side: Array) -> Array:

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.convex import corners_of
 from apo_bench.geometry.hull import Hull
+from apo_bench.geometry.polygon import plane_across
 from apo_bench.geometry.solid import Piece, Solid, extent
 
 PAD_M = (0.016, 0.010, 0.026)
@@ -154,7 +155,7 @@ def _directions(solid: Solid, up: Array) -> Iterator[Array]:
         if not face.hole and face.kind == "cylinder" and abs(face.axis @ up) < _LEVEL:
             ways.append(np.cross(up, face.axis))
         elif not face.hole and face.kind == "cylinder" and abs(face.axis @ up) > 1.0 - _LEVEL:
-            x, y = (np.asarray(axis - (axis @ up) * up) for axis in _level_axes(up))
+            x, y = (np.asarray(axis - (axis @ up) * up) for axis in plane_across(up).T)
             ways += [x, y, (x + y) / np.sqrt(2.0), (x - y) / np.sqrt(2.0)]
     kept: list[Array] = []
     for way in ways:
@@ -163,14 +164,6 @@ def _directions(solid: Solid, up: Array) -> Iterator[Array]:
         if all(abs(way @ other) < 1.0 - 1e-6 for other in kept):
             kept.append(way)
             yield np.asarray(way * np.sign(way[np.abs(way).argmax()]) + 0.0)
-
-
-def _level_axes(up: Array) -> tuple[Array, Array]:
-    """Two perpendicular level directions, along axes of the part where there are such."""
-    x = np.eye(3)[int(np.abs(up).argmin())]
-    x = x - (x @ up) * up
-    x = x / np.linalg.norm(x)
-    return x, np.cross(up, x)
 
 
 def _lines(low: float, high: float, also: Sequence[float], ray_m: float = _RAY_M) -> Array:

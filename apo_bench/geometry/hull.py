@@ -7,6 +7,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from apo_bench.geometry.arrays import Array, copyable, freeze, frozen
+from apo_bench.geometry.polygon import across_axis
 
 SAGITTA_M = 5e-6
 """A round wall is stood for by flat ones that are nowhere farther from it."""
@@ -86,9 +87,7 @@ def cylinder_hull(name: str, cylinder: Cylinder) -> Hull:
     """A cylinder as a piece: a prism whose corners lie on its edges."""
     n = sides_of(cylinder.radius)
     z = cylinder.axis
-    x = np.eye(3)[int(np.abs(z).argmin())]
-    x = x - (x @ z) * z
-    x /= np.sqrt(x @ x)
+    x = across_axis(z)
     angle = 2.0 * np.pi * np.arange(n) / n
     ring = cylinder.radius * (np.outer(np.cos(angle), x) + np.outer(np.sin(angle), np.cross(z, x)))
     ends = [cylinder.center + sign * cylinder.half_length * z + ring for sign in (-1.0, 1.0)]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, final
@@ -11,7 +10,7 @@ import numpy as np
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, freeze
-from apo_bench.geometry.polygon import straightened
+from apo_bench.geometry.polygon import polygons_of, rings_of, straightened
 from apo_bench.geometry.solid import Face
 
 _EDGE_ON = 1e-6
@@ -65,7 +64,7 @@ def overlap(face: Face, T_face: Array, on: Face, T_on: Array) -> Overlap:
     common, pieces = _common(face, T_face, on, T_on)
     if not pieces:
         return NOTHING
-    flat = np.concatenate([_corners(piece) for piece in pieces])
+    flat = np.concatenate([straightened(ring) for piece in pieces for ring in rings_of(piece)])
     corners = pose.apply(T_on @ plane_frame(on), np.column_stack([flat, np.zeros(len(flat))]))
     return Overlap(corners, float(sum(piece.area for piece in pieces)), common)
 
@@ -93,7 +92,7 @@ def _common(face: Face, T_face: Array, on: Face, T_on: Array) -> tuple[Any, list
         return None, []
     upper = face_shape(face, _into_plane(on) @ T_on_face)
     common = upper.intersection(_own_shape(on))
-    return common, [piece for piece in _pieces(common) if piece.area > SLIVER_M2]
+    return common, [piece for piece in polygons_of(common) if piece.area > SLIVER_M2]
 
 
 @lru_cache(maxsize=4096)
@@ -126,17 +125,3 @@ def face_shape(face: Face, T: Array) -> Any:
 
     holes = [linearrings(pose.apply(T, hole)[:, :2]) for hole in face.holes]
     return polygons(pose.apply(T, face.outline)[:, :2], holes or None)
-
-
-def _pieces(shape: Any) -> Iterator[Any]:
-    """The polygons in a shape; points and lines are left out."""
-    if shape.geom_type == "Polygon":
-        yield shape
-    for part in getattr(shape, "geoms", ()):
-        yield from _pieces(part)
-
-
-def _corners(piece: Any) -> Array:
-    """Corners of outline and holes of a polygon, (k, 2)."""
-    rings = (piece.exterior, *piece.interiors)
-    return np.concatenate([straightened(np.asarray(ring.coords)[:-1, :2]) for ring in rings])

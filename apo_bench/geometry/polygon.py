@@ -1,4 +1,7 @@
-"""Closed rings of points in a plane."""
+"""Flat areas: their rings, their corners, and a plane to draw them in."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -8,6 +11,46 @@ _STRAIGHT_M = 1e-9
 """A point this near to the line through its neighbours is no corner."""
 
 
+def across_axis(axis: Array) -> Array:
+    """A unit vector across an axis, (3,): what is across it of the axis of the frame that is the most so."""
+    x = np.eye(3)[int(np.abs(axis).argmin())]
+    x = x - (x @ axis) * axis
+    return np.asarray(x / np.sqrt(x @ x))
+
+
+def plane_across(n: Array) -> Array:
+    """Two directions across a normal, (3,), as columns, (3, 2): with it they make a right-handed frame."""
+    u = across_axis(n)
+    return np.column_stack([u, np.cross(n, u)])
+
+
+def flat_area(outline: Array, holes: Sequence[Array], to_plane: Array) -> Any:
+    """Rings of corners, (k, 3) each, as a shapely polygon in the plane of two directions, (3, 2)."""
+    from shapely import Polygon
+
+    return Polygon(outline @ to_plane, [hole @ to_plane for hole in holes])
+
+
+def polygons_of(shape: Any) -> Iterator[Any]:
+    """The polygons in a shapely geometry; points and lines are left out."""
+    if shape.geom_type == "Polygon":
+        yield shape
+    for part in getattr(shape, "geoms", ()):
+        yield from polygons_of(part)
+
+
+def rings_of(polygon: Any, turned: float | None = None) -> list[Array]:
+    """The outline of a shapely polygon, then its holes, (k, 2) each, every corner once.
+
+    Args:
+        turned: 1: the outline is counter-clockwise, holes are clockwise; -1: the other way round; None: as they are.
+    """
+    from shapely.geometry.polygon import orient
+
+    shape = polygon if turned is None else orient(polygon, turned)
+    return [np.asarray(ring.coords)[:-1, :2] for ring in (shape.exterior, *shape.interiors)]
+
+
 def straightened(ring: Array) -> Array:
     """The corners of a closed ring (k, 2), each once, [m]: points in the middle of straight edges are dropped.
 
@@ -15,6 +58,7 @@ def straightened(ring: Array) -> Array:
     """
     before = ring - np.roll(ring, 1, axis=0)
     after = np.roll(ring, -1, axis=0) - ring
+    # before x after is twice the area of the triangle of three neighbours; over the chord, the height of the middle one
     across = before[:, 0] * after[:, 1] - before[:, 1] * after[:, 0]
     chord = np.maximum(np.linalg.norm(before + after, axis=1), _STRAIGHT_M)
     corners = ring[np.abs(across) > _STRAIGHT_M * chord]

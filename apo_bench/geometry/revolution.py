@@ -8,6 +8,7 @@ import numpy as np
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.exact_turns import carries_faces, fills_the_same
+from apo_bench.geometry.polygon import across_axis
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Solid
 
@@ -94,13 +95,6 @@ def _least_turn(M: Array, axis: Array) -> Array:
     K = pose.hat(axis)
     angle = np.arctan2(np.trace(M @ K), np.trace(M) - axis @ M @ axis)
     return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
-
-
-def across_axis(axis: Array) -> Array:
-    """A unit vector across an axis, (3,)."""
-    x = np.eye(3)[int(np.abs(axis).argmin())]
-    x = x - (x @ axis) * axis
-    return np.asarray(x / np.sqrt(x @ x))
 
 
 def _about(face: RoundFace, point: Array, axis: Array) -> bool:

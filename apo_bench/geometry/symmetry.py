@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.exact_turns import exact_turns
+from apo_bench.geometry.polygon import across_axis
 from apo_bench.geometry.pose import apply
-from apo_bench.geometry.revolution import across_axis, revolution, turn_about, turned_alike
+from apo_bench.geometry.revolution import revolution, turn_about, turned_alike
 from apo_bench.geometry.solid import Solid, all_boxes
 
 _SAME_M = 1e-6

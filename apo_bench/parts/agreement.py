@@ -11,6 +11,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_pieces
 from apo_bench.geometry.hull import SAGITTA_M
+from apo_bench.geometry.polygon import flat_area, plane_across, rings_of
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Face, Piece, Solid
 
@@ -86,10 +87,10 @@ def _check_flat(face: Face, sides: _Sides, place: str) -> None:
     import shapely
 
     n = face.normal
-    to_plane = _plane(face.normal)
+    to_plane = plane_across(face.normal)
     margin = np.full(3, _ABOVE_M)
     sides = _near(sides, face.outline.min(axis=0) - margin, face.outline.max(axis=0) + margin)
-    stated = shapely.Polygon(face.outline @ to_plane, [hole @ to_plane for hole in face.holes])
+    stated = flat_area(face.outline, face.holes, to_plane)
     below = _below(face, sides, to_plane)
     bare = stated.difference(shapely.unary_union(below, grid_size=_SNAP_M).buffer(_BESIDE_M))
     if not bare.is_empty:
@@ -122,8 +123,8 @@ def supported(face: Face, pieces: tuple[Piece, ...]) -> tuple[Face, float] | Non
     """What of a flat face lies on sides of pieces, and its share; None if that is not a single area."""
     import shapely
 
-    to_plane = _plane(face.normal)
-    stated = shapely.make_valid(shapely.Polygon(face.outline @ to_plane, [hole @ to_plane for hole in face.holes]))
+    to_plane = plane_across(face.normal)
+    stated = shapely.make_valid(flat_area(face.outline, face.holes, to_plane))
     lying = stated.intersection(shapely.unary_union(_below(face, _sides(pieces), to_plane), grid_size=_SNAP_M))
     for by in (-_BESIDE_M, 1.5 * _BESIDE_M, -0.5 * _BESIDE_M):
         lying = lying.buffer(by, join_style="mitre")
@@ -131,21 +132,13 @@ def supported(face: Face, pieces: tuple[Piece, ...]) -> tuple[Face, float] | Non
     if lying.geom_type != "Polygon" or lying.is_empty:
         return None
     off = (face.normal @ face.outline[0]) * face.normal
-    rings = [np.asarray(ring.coords)[:-1] @ to_plane.T + off for ring in (lying.exterior, *lying.interiors)]
+    rings = [ring @ to_plane.T + off for ring in rings_of(lying)]
     oriented = [ring if (_winding(ring, face.normal) > 0.0) == (k == 0) else ring[::-1] for k, ring in enumerate(rings)]
     return Face(face.name, oriented[0], tuple(oriented[1:])), float(lying.area / stated.area)
 
 
 def _winding(ring: Array, n: Array) -> float:
     return float(np.cross(ring - ring[0], np.roll(ring, -1, axis=0) - ring[0]).sum(axis=0) @ n)
-
-
-def _plane(n: Array) -> Array:
-    """Two directions across a normal, as columns, (3, 2)."""
-    u = np.eye(3)[int(np.abs(n).argmin())]
-    u = u - (u @ n) * n
-    u /= np.linalg.norm(u)
-    return np.column_stack([u, np.cross(n, u)])
 
 
 def _shadow(piece: Piece, side: Array, to_plane: Array) -> Any:
@@ -158,16 +151,14 @@ def _shadow(piece: Piece, side: Array, to_plane: Array) -> Any:
 
 def _check_once(solid: Solid, path: Path) -> None:
     """Refuse faces that lie on each other."""
-    from shapely import Polygon
-
     by_plane: dict[tuple[float, ...], list[Face]] = {}
     for face in solid.faces.values():
         key = tuple(np.round([*face.normal, 1e-1 * face.plane[3] / _IN_PLANE_M], 4) + 0.0)
         by_plane.setdefault(key, []).append(face)
     for faces in by_plane.values():
         for a, b in combinations(faces, 2):
-            to_plane = _plane(a.normal)
-            areas = [Polygon(f.outline @ to_plane, [hole @ to_plane for hole in f.holes]) for f in (a, b)]
+            to_plane = plane_across(a.normal)
+            areas = [flat_area(f.outline, f.holes, to_plane) for f in (a, b)]
             if areas[0].intersection(areas[1]).buffer(-_BESIDE_M).area > 0.0:
                 _fail(f"{path}, faces, {b.name}", f"the face lies on '{a.name}', so state one of them")
     for r, s in combinations(solid.rounds.values(), 2):

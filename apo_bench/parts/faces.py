@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.polygon import straightened
+from apo_bench.geometry.polygon import polygons_of, rings_of, straightened
 from apo_bench.geometry.solid import Box
 
 _SAME_PLANE_M = 1e-9
@@ -45,13 +45,10 @@ class Surface(NamedTuple):
 
     def rings(self) -> tuple[Array, ...]:
         """Outline, counter-clockwise seen from outside, then holes, clockwise; each (k, 3)."""
-        from shapely.geometry.polygon import orient
+        return tuple(map(self._lifted, rings_of(self.shape, self.sign)))
 
-        shape = orient(self.shape, self.sign)
-        return tuple(self._lifted(ring) for ring in (shape.exterior, *shape.interiors))
-
-    def _lifted(self, ring: Any) -> Array:
-        flat = straightened(np.asarray(ring.coords)[:-1])
+    def _lifted(self, ring: Array) -> Array:
+        flat = straightened(ring)
         first = np.lexsort(flat.T[::-1])[0]
         flat = np.roll(flat, -first, axis=0)
         out = np.empty((len(flat), 3))
@@ -156,5 +153,5 @@ def _surfaces(full: NDArray[np.bool_], grid: Sequence[Array]) -> Iterator[Surfac
             bare = layer & ~layers[beyond] if 0 <= beyond < len(layers) else layer
             low_u, high_u, low_v, high_v = _rectangles(bare)
             joined = shapely.unary_union(shapely.box(u[low_u], v[low_v], u[high_u], v[high_v]))
-            for piece in getattr(joined, "geoms", () if joined.is_empty else (joined,)):
+            for piece in polygons_of(joined):
                 yield Surface(side, float(grid[axis][k + forward]), piece)

@@ -9,6 +9,7 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.polygon import flat_area, plane_across
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Face
 from apo_bench.io.documents import JsonNode, read_toml
@@ -111,12 +112,7 @@ def _plane(name: str, node: JsonNode) -> Face:
 
 def _check_rings(node: JsonNode, n: Array, outline: Array, holes: tuple[Array, ...]) -> None:
     """Refuse rings that cross themselves or each other, and holes that are not clockwise seen from outside."""
-    from shapely import Polygon
-
-    u = np.eye(3)[int(np.abs(n).argmin())]
-    u = u - (u @ n) * n
-    flat = np.column_stack([u, np.cross(n, u)]) / np.linalg.norm(u)
-    if not Polygon(outline @ flat, [hole @ flat for hole in holes]).is_valid:
+    if not flat_area(outline, holes, plane_across(n)).is_valid:
         node.fail("an outline and holes inside it that do not cross are needed")
     for i, hole in enumerate(holes, start=1):
         if _across(hole) @ n >= 0.0:

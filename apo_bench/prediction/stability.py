@@ -16,6 +16,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.mate import mate
 from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry.polygon import across_axis
 from apo_bench.geometry.pose import apply
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, all_boxes
@@ -191,9 +192,7 @@ def _along(n: Array, at: Array, out: float) -> Pushes:
 
 def _around(rests: RoundFace, axis: Array, sine: float) -> tuple[Array, Array]:
     """The directions from the axis to a round wall, and those in which it pushes there, (8, 3) each."""
-    x = np.eye(3)[int(np.abs(axis).argmin())]
-    x = x - (x @ axis) * axis
-    x /= np.sqrt(x @ x)
+    x = across_axis(axis)
     around = np.outer(np.cos(_TURNS), x) + np.outer(np.sin(_TURNS), np.cross(axis, x))
     sign = -1.0 if rests.hole else 1.0
     return around, sign * (np.sqrt(1.0 - sine**2) * around - sine * axis)

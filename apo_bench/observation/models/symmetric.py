@@ -9,7 +9,8 @@ from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.revolution import across_axis, revolution, turn_about
+from apo_bench.geometry.polygon import across_axis
+from apo_bench.geometry.revolution import revolution, turn_about
 from apo_bench.geometry.solid import Solid
 from apo_bench.geometry.symmetry import folds, nearest_alike, symmetries
 from apo_bench.observation.models.isotropic import observe_displaced

@@ -7,10 +7,12 @@ from dataclasses import dataclass, replace
 from typing import Any, final
 
 import numpy as np
+import shapely
 from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.hull import Hull
+from apo_bench.geometry.polygon import flat_area, polygons_of, rings_of, straightened
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Face
 from apo_bench.parts.making.moments import Moments
@@ -102,8 +104,6 @@ def _moved_piece(piece: Hull, R: Array, t: Array) -> Hull:
 
 def _joined_flats(flats: Sequence[Face]) -> Iterable[Face]:
     """Faces by plane: what looks one way less what looks the other way, and neighbours of one name as one."""
-    import shapely
-
     left = list(flats)
     while left:
         n = left[0].normal
@@ -111,8 +111,8 @@ def _joined_flats(flats: Sequence[Face]) -> Iterable[Face]:
         on = [f for f in left if abs(abs(n @ f.normal) - 1.0) < _PARALLEL and abs(n @ f.outline[0] - d) < _SAME_M]
         left = [f for f in left if not any(f is each for each in on)]
         to_plane = _plane(n)
-        same = [(f, _area(f, to_plane)) for f in on if n @ f.normal > 0.0]
-        other = [(f, _area(f, to_plane)) for f in on if n @ f.normal < 0.0]
+        same = [(f, flat_area(f.outline, f.holes, to_plane[:2].T)) for f in on if n @ f.normal > 0.0]
+        other = [(f, flat_area(f.outline, f.holes, to_plane[:2].T)) for f in on if n @ f.normal < 0.0]
         if not other and len(same) == 1:
             yield same[0][0]
             continue
@@ -123,8 +123,8 @@ def _joined_flats(flats: Sequence[Face]) -> Iterable[Face]:
                 by_name.setdefault((face.name, face.fit), []).append(area)
             for (name, fit), areas in by_name.items():
                 rest = shapely.set_precision(shapely.unary_union(areas), 0.0).difference(against)
-                for polygon in getattr(rest, "geoms", (rest,)):
-                    if polygon.geom_type == "Polygon" and not polygon.buffer(-_NARROW_M / 2).is_empty:
+                for polygon in polygons_of(rest):
+                    if not polygon.buffer(-_NARROW_M / 2).is_empty:
                         yield _face(name, fit, polygon, to_plane, d, sign)
 
 
@@ -136,28 +136,10 @@ def _plane(n: Array) -> Array:
     return np.array([u, np.cross(n, u), n])
 
 
-def _area(face: Face, to_plane: Array) -> Any:
-    from shapely import Polygon
-
-    flat = to_plane[:2].T
-    return Polygon(face.outline @ flat, [hole @ flat for hole in face.holes])
-
-
 def _face(name: str, fit: bool, polygon: Any, to_plane: Array, d: float, sign: float) -> Face:
-    from shapely.geometry.polygon import orient
-
-    shape = orient(polygon, sign)
-    outline, *holes = (
-        _lifted(np.asarray(each.coords)[:-1], to_plane, d) for each in (shape.exterior, *shape.interiors)
-    )
+    flat = [straightened(ring) for ring in rings_of(polygon, sign)]
+    outline, *holes = (np.asarray(ring @ to_plane[:2] + d * to_plane[2]) for ring in flat)
     return Face(name, outline, tuple(holes), fit)
-
-
-def _lifted(flat: Array, to_plane: Array, d: float) -> Array:
-    from apo_bench.geometry.polygon import straightened
-
-    kept = straightened(flat)
-    return np.asarray(kept @ to_plane[:2] + d * to_plane[2])
 
 
 def _joined_rounds(rounds: Sequence[RoundFace]) -> list[RoundFace]:

@@ -4,9 +4,10 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from shapely import Polygon, box, unary_union
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.polygon import straightened
+from apo_bench.geometry.polygon import polygons_of, rings_of, straightened
 
 _SAME_MM = 1e-6
 _ON_MM = 1e-9
@@ -25,7 +26,7 @@ def convex_cells(area: Any) -> list[Array]:
     there are at most four times as many as need be.
     """
     cells: list[Array] = []
-    for polygon in getattr(area, "geoms", (area,)):
+    for polygon in polygons_of(area):
         if polygon.area > _SLIVER_MM2:
             cells += _cut(polygon)
     return cells
@@ -33,10 +34,8 @@ def convex_cells(area: Any) -> list[Array]:
 
 def _cut(polygon: Any) -> list[Array]:
     from manifold3d import triangulate
-    from shapely.geometry.polygon import orient
 
-    shape = orient(polygon)
-    rings = [straightened(np.asarray(each.coords)[:-1]) for each in (shape.exterior, *shape.interiors)]
+    rings = [straightened(ring) for ring in rings_of(polygon, 1.0)]
     if len(rings) == 1 and is_convex(rings[0]):
         return rings
     points = np.concatenate(rings)
@@ -88,11 +87,8 @@ def bore_cell(free: Any, at: Array, radius: float, others: list[tuple[Array, flo
         radius: Of the corners of its widest polygon.
         others: Middles and radii of the other bores: between two bores each has its side.
     """
-    from shapely import Polygon, box
-    from shapely.geometry.polygon import orient
-
     for reach in (radius * share for share in _REACHES):
-        square = np.asarray(orient(box(*(at - reach), *(at + reach))).exterior.coords)[:-1]
+        square = rings_of(box(*(at - reach), *(at + reach)), 1.0)[0]
         for middle, r in others:
             gap = np.linalg.norm(middle - at)
             n = (middle - at) / gap
@@ -100,7 +96,7 @@ def bore_cell(free: Any, at: Array, radius: float, others: list[tuple[Array, flo
         cell = Polygon(square).intersection(free)
         if cell.geom_type != "Polygon" or cell.interiors:
             continue
-        corners = straightened(np.asarray(orient(cell).exterior.coords)[:-1])
+        corners = straightened(rings_of(cell, 1.0)[0])
         if is_convex(corners) and _holds(corners, at, radius):
             return corners
     return None
@@ -158,8 +154,6 @@ def bands(area: Any, rings: list[tuple[Array, NDArray[np.bool_]]]) -> list[Array
 
 
 def _band(area: Any, corners: Array, fit: NDArray[np.bool_]) -> list[Array]:
-    from shapely import Polygon, unary_union
-
     for width in _WIDTHS_MM:
         inner = [_inner(corners, fit, i, width) for i in range(len(corners))]
         quads = []

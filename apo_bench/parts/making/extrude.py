@@ -6,6 +6,7 @@ from itertools import combinations, pairwise
 from typing import Any, final
 
 import numpy as np
+from shapely import Polygon, unary_union
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.hull import Hull
@@ -87,8 +88,6 @@ def extrude(
     Raises:
         ValueError: Holes meet each other or the outline, or another bore has no room for wedges.
     """
-    from shapely import Polygon, unary_union
-
     area = Polygon(ring(outline), [ring(hole, hole=True) for hole in holes])
     discs = [Polygon(tangent(b.at, b.widest * np.cos(np.pi / 64), 64)) for b in bores]
     apart = all(not a.intersects(b) for a, b in combinations(discs, 2))
@@ -149,8 +148,6 @@ def _as_hole(each: Bore, low: float, high: float) -> Outline:
 
 def _cells(area: Any, bores: Sequence[Bore]) -> list[Array]:
     """A convex area around each bore, none of which overlap, up to the first one that has no room for one."""
-    from shapely import Polygon
-
     cells: list[Array] = []
     for i, each in enumerate(bores):
         others = [(np.array(b.at), b.widest) for k, b in enumerate(bores) if k != i]

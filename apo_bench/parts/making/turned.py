@@ -4,9 +4,11 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
+from shapely import Polygon
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.hull import Cylinder, Hull, cylinder_hull
+from apo_bench.geometry.polygon import polygons_of, rings_of
 from apo_bench.geometry.solid import Face
 from apo_bench.parts.making.body import Body
 from apo_bench.parts.making.cells import clipped, wedges
@@ -105,8 +107,6 @@ def _ring(radius: float, sides: int, z: float) -> Array:
 
 def _flats(outer: Sequence[Step], inner: Sequence[Step], z: float, name: str, fit: Sequence[str]) -> Iterator[Face]:
     """The rings that look up or down at a height: what is full below and not above, or above and not below."""
-    from shapely import Polygon
-
     areas = []
     for above in (False, True):
         R, n = at_height(outer, z, above)
@@ -116,10 +116,7 @@ def _flats(outer: Sequence[Step], inner: Sequence[Step], z: float, name: str, fi
         areas.append(disc.difference(Polygon(tangent((0.0, 0.0), r, k))) if r else disc)
     below, over = areas
     for rest, up in ((below.difference(over), True), (over.difference(below), False)):
-        for polygon in getattr(rest, "geoms", (rest,)):
-            if polygon.buffer(-_NARROW_MM / 2).is_empty:
-                continue
-            from shapely.geometry.polygon import orient
-
-            rings = [np.asarray(each.coords)[:-1] for each in (orient(polygon).exterior, *orient(polygon).interiors)]
-            yield flat_face(name, rings[0], [hole[::-1] for hole in rings[1:]], z, up, name in fit and bool(name))
+        for polygon in polygons_of(rest):
+            if not polygon.buffer(-_NARROW_MM / 2).is_empty:
+                outline, *holes = rings_of(polygon, 1.0)
+                yield flat_face(name, outline, [hole[::-1] for hole in holes], z, up, name in fit and bool(name))

@@ -10,6 +10,7 @@ import numpy as np
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.hull import Hull
+from apo_bench.geometry.polygon import flat_area
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Box, Face, Piece, Solid, all_boxes
 from apo_bench.parts.allowed import THINNEST_M
@@ -149,11 +150,9 @@ def _geom(piece: Piece) -> dict[str, Any]:
 
 def _inside(face: Face) -> Array:
     """A point of a face, well inside of it."""
-    from shapely import Polygon
-
     axis = int(np.abs(face.normal).argmax())
     plane = [(axis + 1) % 3, (axis + 2) % 3]
-    point = Polygon(face.outline[:, plane], [hole[:, plane] for hole in face.holes]).representative_point()
+    point = flat_area(face.outline, face.holes, np.eye(3)[:, plane]).representative_point()
     inside = np.array(face.outline[0])
     inside[plane] = point.x, point.y
     return inside
