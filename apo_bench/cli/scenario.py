@@ -79,8 +79,7 @@ def scenario_new(
     from apo_bench.drafting.assembly_file import import_assembly
     from apo_bench.drafting.draft import draft
     from apo_bench.drafting.posed import UPS, on_the_table, read_posed
-    from apo_bench.drafting.text import draft_lines
-    from apo_bench.drafting.writing import scenario_text
+    from apo_bench.drafting.writing import draft_lines, scenario_text
     from apo_bench.scenario.file import load_scenario
 
     check_writable(out, "--out", (".toml",))
@@ -113,16 +112,12 @@ def scenario_check(
     fidelity: Annotated[str, typer.Option(help="Of these trials: full, or contact.")] = "full",
 ) -> None:
     """Say whether human and robot can do a scenario, and which line of its file to change if not."""
-    from apo_bench.drafting.checking import Finding, check_file
-    from apo_bench.drafting.text import finding_line
+    from apo_bench.drafting.checking import check_file
     from apo_bench.records.settings import check
 
     if not 0 <= seeds <= 1000:
         raise InputError(f"--seeds {seeds} was given; 0 to 1000 are allowed.")
     check("fidelity", fidelity)
 
-    def say(finding: Finding) -> None:
-        typer.echo(finding_line(finding))
-
-    if not all(finding.ok for finding in check_file(file, seeds, fidelity, say)):
+    if not all(finding.ok for finding in check_file(file, seeds, fidelity, typer.echo)):
         raise typer.Exit(NO_RESULT)

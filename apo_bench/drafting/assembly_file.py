@@ -40,15 +40,15 @@ def import_assembly(file: Path, folder: Path, unit: str | None = None, fewest: i
         raise InputError(f"{file}: the file holds one solid; an assembly of at least two is needed.")
     folder.mkdir(parents=True, exist_ok=True)
     places = dict[str, list[SolidPlace]]()
-    said = list[str]()
+    sentences = list[str]()
     for raw in raws:
-        called = free_name(part_name(raw.name), places)
+        name = free_name(part_name(raw.name), places)
         foot = _foot(raw)
-        done = import_part(_shifted(raw, -foot), called, folder, f"{file.name}, {raw.name}")
-        said.append(f"{called}: {len(done.solid.faces)} flat and {len(done.solid.rounds)} round faces")
-        said += [f"{called}.{face} can make no contact: {why}" for face, why in done.refused.items()]
-        places[called] = [place._replace(T=place.T @ pose.at(foot)) for place in raw.places]
-    return write_places(named_places(places), folder, file.name), tuple(said)
+        part = import_part(_shifted(raw, -foot), name, folder, f"{file.name}, {raw.name}")
+        sentences.append(f"{name}: {len(part.solid.faces)} flat and {len(part.solid.rounds)} round faces")
+        sentences += [f"{name}.{face} can make no contact: {why}" for face, why in part.refused.items()]
+        places[name] = [place._replace(T=place.T @ pose.at(foot)) for place in raw.places]
+    return write_places(named_places(places), folder, file.name), tuple(sentences)
 
 
 def _foot(raw: RawSolid) -> Array:

@@ -2,20 +2,20 @@
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from apo_bench.assembly.goals import Plan, placements
 from apo_bench.assembly.kinds import contact_kind
-from apo_bench.drafting.lines import line_of
+from apo_bench.assembly.topology import Contact
 from apo_bench.drafting.posed import TABLE
-from apo_bench.drafting.standing import stance
 from apo_bench.drafting.touching import walls_without_play
+from apo_bench.drafting.waiting import stance
 from apo_bench.errors import InputError
 from apo_bench.geometry.solid import extent
 from apo_bench.io.reading import read_bytes
@@ -45,6 +45,8 @@ _REMEDIES = {
     "unreachable_start": "parts, {part}, start: let the part wait nearer to the arm, which stands at (-420, 0) mm",
 }
 """Outcome of a trial -> what to change."""
+_NAMED = re.compile(r"operation (\d+)(?:, (\w+))?|parts, (\w+)(?:, (\w+))?|site\b")
+"""What sentences about scenario files begin with."""
 
 
 class Finding(NamedTuple):
@@ -56,9 +58,14 @@ class Finding(NamedTuple):
     line: int | None = None
     """Of the file, from 1: what to change."""
 
+    def __str__(self) -> str:
+        """`wrong  reach    line 41: ...`."""
+        line = f"line {self.line}: " if self.line else ""
+        return f"{'ok' if self.ok else 'wrong':6} {self.what:8} {line}{self.sentence}"
+
 
 def check_file(
-    path: Path, seeds: int = 5, fidelity: str = "full", say: Callable[[Finding], None] = lambda found: None
+    path: Path, seeds: int = 5, fidelity: str = "full", say: Callable[[Finding], None] = lambda finding: None
 ) -> tuple[Finding, ...]:
     """Look at a scenario file from its syntax to trials in which the robot knows the truth.
 
@@ -69,12 +76,35 @@ def check_file(
         InputError: There is no such file.
     """
     text = read_bytes(path, "scenario file (.toml)").decode("utf-8", "replace")
-    found = list[Finding]()
-    for each in _findings(path, seeds, fidelity):
-        line = None if each.ok else line_of(text, each.sentence)
-        found.append(each._replace(line=line))
-        say(found[-1])
-    return tuple(found)
+    findings = list[Finding]()
+    for finding in _findings(path, seeds, fidelity):
+        findings.append(finding if finding.ok else finding._replace(line=line_of(text, finding.sentence)))
+        say(findings[-1])
+    return tuple(findings)
+
+
+def line_of(text: str, sentence: str) -> int | None:
+    """The line, from 1, of `operation 2, grasp` or `parts, pin, start`, with which sentences about files begin.
+
+    Of a key that is not there: the line of its table.
+    """
+    named = _NAMED.match(sentence)
+    if named is None:
+        return None
+    operation, operation_key, part, part_key = named.groups()
+    table = "[[operations]]" if operation else f"[parts.{part}]" if part else "[site]"
+    lines = text.splitlines()
+    heads = [i for i, line in enumerate(lines) if line.startswith(table)]
+    k = int(operation) - 1 if operation else 0
+    if not 0 <= k < len(heads):
+        return None
+    key = operation_key or part_key
+    for i in range(heads[k] + 1, len(lines)):
+        if lines[i].startswith("["):
+            break
+        if key and re.match(rf"{key}\s*=", lines[i]):
+            return i + 1
+    return heads[k] + 1
 
 
 def _findings(path: Path, seeds: int, fidelity: str) -> Iterator[Finding]:
@@ -84,41 +114,41 @@ def _findings(path: Path, seeds: int, fidelity: str) -> Iterator[Finding]:
         yield Finding("file", False, str(error).removeprefix(f"{path}, ").removeprefix(f"{path}: "))
         return
     yield Finding("file", True, _counted(scenario))
-    for what, looked in (("parts", _parts), ("starts", _starts), ("ways", _ways), ("play", _play)):
-        wrong = list(looked(scenario))
-        yield from (Finding(what, False, sentence) for sentence in wrong)
-        if not wrong:
-            yield Finding(what, True, _WELL[what])
+    yield from _looked("parts", _parts(scenario), "no screw, nut or spring by its name")
+    yield from _looked("starts", _starts(scenario), "every part stands where it waits")
+    yield from _looked("ways", _ways(scenario), "a straight way leads every part to its place")
+    yield from _looked("play", _play(scenario), "no part is held between walls without play")
     try:
         scene = build_scene(scenario)
     except InputError as error:
-        yield Finding("gripper", False, _grasp_named(str(error)))
+        # `operation 2: the grasp` names the key `grasp`.
+        sentence = re.sub(r"^(operation \d+): the grasp", r"\1, grasp: that", str(error))
+        yield Finding("gripper", False, sentence)
         return
     yield Finding("gripper", True, "every part can be held and lifted")
-    wrong = list(_reach(scenario, scene))
-    yield from (Finding("reach", False, sentence) for sentence in wrong)
-    if not wrong:
-        yield Finding("reach", True, "the arm reaches every start and goal, wherever the site may be")
+    well = "the arm reaches every start and goal, wherever the site may be"
+    yield from _looked("reach", _reach(scenario, scene), well)
     yield from _trials(path, scenario, scene, seeds, fidelity)
 
 
-_WELL = {
-    "parts": "no screw, nut or spring by its name",
-    "starts": "every part stands where it waits",
-    "ways": "a straight way leads every part to its place",
-    "play": "no part is held between walls without play",
-}
+def _looked(what: str, wrong: Iterable[str], well: str) -> Iterator[Finding]:
+    """What is wrong, or one finding that all is well."""
+    sentences = list(wrong)
+    yield from (Finding(what, False, sentence) for sentence in sentences)
+    if not sentences:
+        yield Finding(what, True, well)
 
 
 def _counted(scenario: Scenario) -> str:
-    kinds = Counter(
-        str(contact_kind(*map(scenario.assembly.face_of, contact)))
-        for operation in scenario.assembly.operations
-        for contact in operation.contacts
-    )
-    said = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))
-    parts = len(scenario.assembly.solids) - (TABLE in scenario.assembly.solids)
-    return f"{parts} parts, {len(scenario.assembly)} operations, {sum(kinds.values())} contacts ({said})"
+    assembly = scenario.assembly
+    kinds = Counter(str(contact_kind(*map(assembly.face_of, contact))) for contact in _contacts(scenario))
+    counts = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))
+    parts = len(assembly.solids) - (TABLE in assembly.solids)
+    return f"{parts} parts, {len(assembly)} operations, {kinds.total()} contacts ({counts})"
+
+
+def _contacts(scenario: Scenario) -> Iterator[Contact]:
+    return (contact for operation in scenario.assembly.operations for contact in operation.contacts)
 
 
 def _parts(scenario: Scenario) -> Iterator[str]:
@@ -150,22 +180,17 @@ def _play(scenario: Scenario) -> Iterator[str]:
     assembly = scenario.assembly
     stages = placements(assembly, scenario.start, scenario.goals)
     for k, (operation, poses) in enumerate(zip(assembly.operations, stages, strict=True), start=1):
-        for one, other in walls_without_play(assembly.solids, poses, operation.contacts):
+        for contact, opposite in walls_without_play(assembly.solids, poses, operation.contacts):
             yield (
-                f"operation {k}, contacts: '{one}' and '{other}' leave no play; say fit = true of the faces of the "
-                "slot in its part file, or make the part thinner"
+                f"operation {k}, contacts: '{contact}' and '{opposite}' leave no play; say fit = true of the faces of "
+                "the slot in its part file, or make the part thinner"
             )
-
-
-def _grasp_named(sentence: str) -> str:
-    """`operation 2: the grasp` names the key `grasp`."""
-    return re.sub(r"^(operation \d+): the grasp", r"\1, grasp: that", sentence)
 
 
 def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
     """In the middle of the site and at its corners, turned to either end."""
     site = scenario.site
-    asked = set[str]()
+    known = set[str]()
     low, high = site.yaw_rad
     places = {(0, 0, (low + high) / 2), *((i, j, low if i == j else high) for i, j in product((-1, 1), (-1, 1)))}
     for i, j, yaw in sorted(places):
@@ -175,8 +200,8 @@ def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
         for move in moves(Plan(scenario.assembly, layout.start, layout.goals), scene, False):
             code = key_angles(move.transfer, scene).code
             part = move.transfer.part
-            if code and code + part not in asked:
-                asked.add(code + part)
+            if code and code + part not in known:
+                known.add(code + part)
                 where = f"with the site at ({1e3 * x:g}, {1e3 * y:g}) mm, turned by {np.degrees(yaw):g} degrees"
                 remedy = _REMEDIES[code].format(k=move.step.operation + 1, part=part)
                 yield f"{remedy}: the arm does not reach '{part}' in operation {move.step.operation + 1} {where}"
@@ -184,27 +209,24 @@ def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
 
 def _trials(path: Path, scenario: Scenario, scene: Scene, seeds: int, fidelity: str) -> Iterator[Finding]:
     right = 0
-    asked = TrialSettings(
+    settings = TrialSettings(
         str(path), level_mm=0.0, level_deg=0.0, clearance_mm=scene.clearance_mm, method="oracle", fidelity=fidelity
     )
     for seed in range(seeds):
-        row = run_trial(replace(asked, seed=seed), scene)
+        row = run_trial(replace(settings, seed=seed), scene)
         right += bool(row["success"])
         if not row["success"]:
             yield Finding("oracle", False, _failed(row, scenario))
     if seeds:
-        yield Finding(
-            "oracle", right == seeds, f"{right} of {seeds} trials in which the robot knows the truth are right"
-        )
+        sentence = f"{right} of {seeds} trials in which the robot knows the truth are right"
+        yield Finding("oracle", right == seeds, sentence)
 
 
-def _failed(row: object, scenario: Scenario) -> str:
-    assert isinstance(row, dict)
+def _failed(row: Mapping[str, Any], scenario: Scenario) -> str:
+    """What went wrong in a trial, after what to change."""
     k = row["failure_operation"]
-    code = str(row["failure_code"])
     part = scenario.assembly.operations[k - 1].main if k else ""
-    remedy = _REMEDIES.get(code, "").format(k=k, part=part)
+    remedy = _REMEDIES.get(row["failure_code"])
+    change = f"{remedy.format(k=k, part=part)}: " if remedy else ""
     who = "the human" if row["failure_stage"] == "demonstrate" else "the robot"
-    told = f"{remedy}: " if remedy else ""
-    ended = str(row["sentence"]).rstrip(".")
-    return f"{told}{who} with seed {row['seed']}: {ended}"
+    return f"{change}{who} with seed {row['seed']}: {row['sentence'].rstrip('.')}"

@@ -1,17 +1,16 @@
 """Posed parts become a draft of a scenario: contacts, an order, starts, grasps, and what is to be said of them."""
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
 
 from apo_bench.assembly.goals import Poses
-from apo_bench.drafting.laying import Site, laid_out, reach_of, site_of
-from apo_bench.drafting.ordering import Placing, Search
+from apo_bench.drafting.ordering import OrderSearch, Placing
 from apo_bench.drafting.posed import TABLE, PosedPart
-from apo_bench.drafting.standing import Stance, stance
 from apo_bench.drafting.touching import clashes, closed, found_contacts, walls_without_play
+from apo_bench.drafting.waiting import Stance, laid_out, reach_of, site_of, stance
 from apo_bench.errors import InputError, unknown
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -19,11 +18,13 @@ from apo_bench.geometry.holds import Hold, holds
 from apo_bench.geometry.intrusion import intrusion_depths
 from apo_bench.geometry.solid import Box, Solid, extent
 from apo_bench.parts import load_part
+from apo_bench.scenario.scenario import Site
 
 _OPENING_M = 0.046
 """How far each finger of the arm that comes with the benchmark opens."""
 _LOW_M = 1e-4
 _GROUP_ROOM_M = 0.05
+_FARTHEST_ASIDE_M = 0.26
 _FINGER_M = (0.013, 0.018, 0.035)
 _MOST_HOLDS = 300
 """Half the size of a finger with room to open and to go down, from 10 mm below its tip up; so many places are looked
@@ -70,39 +71,38 @@ def draft(parts: Sequence[PosedPart], fixed: Sequence[str] = (), clearance_mm: f
     for name in fixed:
         if name not in solids or name == TABLE:
             raise InputError(unknown("part", name, [each.name for each in parts]))
-    base, why_fixed = (tuple(fixed), "as asked") if fixed else _base(parts)
+    base, why_fixed = (tuple(fixed), "as asked") if fixed else (_base(parts), "the largest of those that lie lowest")
     wrong = clashes(solids, poses, clearance_mm)
     if wrong:
-        raise RuntimeError(_all([clash.sentence for clash in wrong]))
+        raise RuntimeError("; ".join(wrong) + ".")
     poses, contacts, dropped = closed(solids, poses, found_contacts(solids, poses), (TABLE, *base))
     notes = [f"'{contact}' touches, but not exactly where the other contacts put it: left out" for contact in dropped]
-    for one, other in walls_without_play(solids, poses, contacts):
+    for contact, opposite in walls_without_play(solids, poses, contacts):
         notes.append(
-            f"'{one}' and '{other}' leave no play between them; give their part room, or say fit = true of its faces"
+            f"'{contact}' and '{opposite}' leave no play between them; give their part room, or say fit = true of its "
+            "faces"
         )
     reach = reach_of(solids, poses, [each.name for each in parts])
-    aside = np.array([-min(2.0 * reach + _GROUP_ROOM_M, 0.26), 0.0, 0.0])
-    search = Search(solids, poses, contacts, aside)
+    aside = np.array([-min(2.0 * reach + _GROUP_ROOM_M, _FARTHEST_ASIDE_M), 0.0, 0.0])
+    search = OrderSearch(solids, poses, contacts, aside)
     order = search.order(frozenset(base))
     if order is None:
-        raise RuntimeError(_no_order(search, base))
-    beside = any(np.linalg.norm(placing.at - poses[placing.moves[0]]) > _LOW_M for placing in order)
-    site = site_of(reach, aside if beside else None)
-    free = [each.name for each in parts if each.name not in base]
-    turns = {part: poses[part][:3, :3] for part in free}
+        stuck = [why for part, why in search.stuck.items() if part not in base]
+        raise RuntimeError("; ".join(["there is no order in which these parts can be put together", *stuck]) + ".")
+    # Where assemblies may stand is kept free: the assembly, and a sub-assembly that is put together beside it.
+    is_beside = any(np.linalg.norm(placing.at - poses[placing.moves[0]]) > _LOW_M for placing in order)
+    site = site_of(reach, is_beside)
+    middles = [site.center_m, site.center_m + aside[:2]] if is_beside else [site.center_m]
+    keep_free = [(np.array(middle), reach + max(site.spread_m)) for middle in middles]
+    turns = {each.name: poses[each.name][:3, :3] for each in parts if each.name not in base}
     stances = {part: stance(solids[part], R) for part, R in turns.items()}
-    keep = [(np.array(site.center_m), reach + max(site.spread_m))]
-    if beside:
-        keep.append((np.array(site.center_m) + aside[:2], reach + max(site.spread_m)))
     starts = {part: poses[part] for part in base}
-    for part, at in laid_out(solids, turns, site, keep).items():
+    for part, at in laid_out(solids, turns, keep_free).items():
         starts[part] = np.array(poses[part])
         starts[part][:3, 3] = (*at, stances[part].height_m)
     grasps, crowded = _holds(solids, poses, order, base)
-    notes += crowded
-    notes += _notes(solids, turns, stances, grasps)
     return Draft(
-        tuple(PosedPart(each.name, each.file, each.solid, poses[each.name], each.color) for each in parts),
+        tuple(replace(each, T=poses[each.name]) for each in parts),
         base,
         why_fixed,
         order,
@@ -111,16 +111,15 @@ def draft(parts: Sequence[PosedPart], fixed: Sequence[str] = (), clearance_mm: f
         grasps,
         site,
         clearance_mm,
-        tuple(notes),
+        (*notes, *crowded, *_notes(solids, turns, stances, grasps)),
     )
 
 
-def _base(parts: Sequence[PosedPart]) -> tuple[tuple[str, ...], str]:
+def _base(parts: Sequence[PosedPart]) -> tuple[str]:
     """The largest of the parts that lie on the table."""
     low = {each.name: extent(each.solid.pieces, each.T[2, :3])[0] + float(each.T[2, 3]) for each in parts}
     lowest = [each for each in parts if low[each.name] < min(low.values()) + _LOW_M]
-    chosen = max(lowest, key=lambda each: each.solid.volume)
-    return (chosen.name,), "the largest of those that lie lowest"
+    return (max(lowest, key=lambda each: each.solid.volume).name,)
 
 
 def _holds(
@@ -130,7 +129,7 @@ def _holds(
 
     And what is to be said of parts that have no such place.
     """
-    found: dict[str, Hold | None] = {}
+    best: dict[str, Hold | None] = {}
     notes = list[str]()
     there = {*base}
     for placing in order:
@@ -138,21 +137,22 @@ def _holds(
         others = [part for part in there if part not in placing.moves]
         up = np.round(poses[main][2, :3], 9)
         offered = holds(solids[main], up, _OPENING_M)
+        # First places within the part; then those with tips over its top, whose fingers need room below, too.
         free = (
             hold
             for over, below in ((0.0, 0.0), (_OVER_M, _ROOM_M))
             for hold in holds(solids[main], up, _OPENING_M, over)[:_MOST_HOLDS]
             if not _struck(hold, below, poses[main], solids, poses, others)
         )
-        found[main] = next(free, None)
-        if offered and found[main] is None:
-            found[main] = offered[0]
+        best[main] = next(free, None)
+        if offered and best[main] is None:
+            best[main] = offered[0]
             notes.append(
                 f"wherever a gripper holds '{main}', fingers that reach 10 mm below their tips meet what stands around "
                 "its place; let it stand out higher, or give it a handle"
             )
         there |= set(placing.moves)
-    return found, notes
+    return best, notes
 
 
 def _struck(
@@ -174,26 +174,16 @@ def _notes(
     turns: Mapping[str, Array],
     stances: Mapping[str, Stance],
     grasps: Mapping[str, Hold | None],
-) -> list[str]:
-    found = list[str]()
+) -> Iterator[str]:
+    """What is to be said of parts that do not stand, roll, or cannot be held."""
     for part, R in turns.items():
         if not stances[part].stands:
-            found.append(f"'{part}' needs turning over: it does not stand on the table as it is in the assembly")
+            yield f"'{part}' needs turning over: it does not stand on the table as it is in the assembly"
         elif stances[part].rolls:
-            found.append(f"'{part}' lies on a round wall at its start and may roll")
+            yield f"'{part}' lies on a round wall at its start and may roll"
         if grasps[part] is None:
             size = " x ".join(f"{1e3 * np.ptp(extent(solids[part].pieces, R[i])):.4g}" for i in range(3))
-            found.append(
+            yield (
                 f"'{part}', {size} mm as it stands, offers no place to a gripper from above that opens to "
                 f"{2e3 * _OPENING_M:g} mm"
             )
-    return found
-
-
-def _no_order(search: Search, base: Sequence[str]) -> str:
-    stuck = [why for part, why in search.stuck.items() if part not in base]
-    return _all(["there is no order in which these parts can be put together", *stuck])
-
-
-def _all(sentences: Sequence[str]) -> str:
-    return "; ".join(sentences) + "."

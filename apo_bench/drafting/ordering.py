@@ -15,8 +15,8 @@ import numpy as np
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.topology import Assembly, Contact, Operation
 from apo_bench.drafting.posed import TABLE
-from apo_bench.drafting.standing import stance
 from apo_bench.drafting.touching import found_contacts
+from apo_bench.drafting.waiting import stance
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.drop import drop
@@ -46,7 +46,7 @@ class Placing(NamedTuple):
 
 @final
 @dataclass
-class Search:
+class OrderSearch:
     """The search for an order, and what it learned on its way."""
 
     solids: Mapping[str, Solid]
@@ -74,12 +74,10 @@ class Search:
         for placing in self._leaving(there, base):
             before = self._without(there - set(placing.moves), base)
             if before is not None:
-                return (*before, *self._together(placing), placing)
+                beside = self._beside(placing.moves) if len(placing.moves) > 1 else None
+                return (*before, *(beside or ()), placing)
         self.failed.add(there)
         return None
-
-    def _together(self, placing: Placing) -> tuple[Placing, ...]:
-        return () if len(placing.moves) == 1 else self._beside(placing.moves) or ()
 
     def _leaving(self, there: frozenset[str], base: frozenset[str]) -> Iterator[Placing]:
         """What can be taken off, what comes straight up from the top first; groups only where no part can."""
@@ -108,33 +106,28 @@ class Search:
     def _leaves(self, moves: Sequence[str], there: frozenset[str]) -> Placing | None:
         """How parts come to their places last of all that are there; None if they cannot."""
         rest = [part for part in self.solids if part in there and part not in moves]
-        return self._placed(moves, rest, self.poses, self.contacts)
-
-    def _placed(
-        self, moves: Sequence[str], rest: Sequence[str], poses: Poses, contacts: tuple[Contact, ...]
-    ) -> Placing | None:
         main = moves[0]
-        made = tuple(_from(contact, moves) for contact in contacts if _between(contact, moves, rest))
-        if not made:
+        closes = tuple(_from(contact, moves) for contact in self.contacts if _between(contact, moves, rest))
+        if not closes:
             self.stuck[main] = f"'{main}' touches nothing that would be there before it"
             return None
-        sub = Assembly({part: self.solids[part] for part in (*moves, *rest)}, (), frozenset())
+        poses = self.poses
         falls = min(drop(self.solids[m], poses[m], self.solids[r], poses[r]) for m in moves for r in rest)
         if falls > _FALLS_M:
             self.stuck[main] = f"nothing is below '{main}' that would carry it"
             return None
-        if imbalance(sub, Operation(main, made, tuple(moves[1:])), poses) > BALANCED:
+        assembly = Assembly({part: self.solids[part] for part in (*moves, *rest)}, (), frozenset())
+        if imbalance(assembly, Operation(main, closes, tuple(moves[1:])), poses) > BALANCED:
             self.stuck[main] = f"'{main}' would not keep its balance on what is there before it"
             return None
-        found = arrive(sub, moves, made, poses)
-        if not found.free:
-            others = ", ".join(dict.fromkeys(of.part for contact in made for of in contact if of.part in rest))
+        arrival = arrive(assembly, moves, closes, poses)
+        others = ", ".join(dict.fromkeys(of.part for contact in closes for of in contact if of.part in rest))
+        if not arrival.free:
             self.stuck[main] = f"no straight way leads '{main}' out of {others}"
             return None
-        way = poses[main][:3, :3] @ found.line.direction
-        words = "from above" if way[2] < -0.9 else "from below" if way[2] > 0.9 else f"along ({_said(way)})"
-        on = ", ".join(dict.fromkeys(of.part for contact in made for of in contact if of.part in rest))
-        return Placing(tuple(moves), made, poses[main], f"comes {words}, onto {on}")
+        way = poses[main][:3, :3] @ arrival.line.direction
+        words = "from above" if way[2] < -0.9 else "from below" if way[2] > 0.9 else f"along ({_numbers(way)})"
+        return Placing(tuple(moves), closes, poses[main], f"comes {words}, onto {others}")
 
     def _beside(self, group: tuple[str, ...]) -> tuple[Placing, ...] | None:
         """How a group is put together beside the assembly, its main part on the table."""
@@ -143,24 +136,24 @@ class Search:
         if not stands.stands or stands.rolls:
             self.stuck[main] = f"'{main}' does not stand alone, so nothing can be put into it beside the assembly"
             return None
+        # The same search for the group alone, on the table, each part at its place in the group.
         shift = pose.at(self.aside + np.array([0.0, 0.0, stands.height_m - float(self.poses[main][2, 3])]))
         poses = {part: shift @ self.poses[part] for part in group} | {TABLE: self.poses[TABLE]}
         solids = {part: self.solids[part] for part in (*group, TABLE)}
-        inner = Search(solids, poses, found_contacts(solids, poses), self.aside)
-        first = inner._placed((main,), (TABLE,), poses, inner.contacts)
+        inner = OrderSearch(solids, poses, found_contacts(solids, poses), self.aside)
+        first = inner._leaves((main,), frozenset((main, TABLE)))
         if first is None:
             return None
         rest = inner._without(frozenset(solids), frozenset((main, TABLE)))
         return None if rest is None else (first, *rest)
 
     def _hangs_together(self, group: Sequence[str]) -> bool:
+        """Whether each part of a group is reached from the first by contacts within the group."""
         known = {group[0]}
         for _ in group:
-            for a, b in (
-                {of.part for of in contact} for contact in self.contacts if len({of.part for of in contact}) == 2
-            ):
-                if {a, b} <= set(group) and known & {a, b}:
-                    known |= {a, b}
+            for a, b in self.contacts:
+                if {a.part, b.part} <= set(group) and known & {a.part, b.part}:
+                    known |= {a.part, b.part}
         return known == set(group)
 
 
@@ -175,5 +168,5 @@ def _from(contact: Contact, moves: Sequence[str]) -> Contact:
     return contact if a.part in moves else Contact(b, a)
 
 
-def _said(way: Array) -> str:
+def _numbers(way: Array) -> str:
     return ", ".join(f"{x:.3g}" for x in np.round(way, 3) + 0.0)

@@ -1,7 +1,7 @@
 """Parts at their final poses, read from a file of poses: one table per copy of a part."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import final
 
@@ -46,33 +46,38 @@ def read_posed(poses: Path, files: Sequence[str] = (), fewest: int = 2) -> tuple
     Raises:
         InputError: A file cannot be read, a part is missing, or has no pose.
     """
-    root = read_toml(poses, "file of poses")
-    nodes = root.fields(("pose",))["pose"].items("pose")
-    given = {part_path(file).stem: part_path(file) for file in files}
+    nodes = read_toml(poses, "file of poses").fields(("pose",))["pose"].items("pose")
+    paths = {part_path(file).stem: part_path(file) for file in files}
     solids: dict[Path, Solid] = {}
-    found: list[PosedPart] = []
+    parts: list[PosedPart] = []
     for node in nodes:
-        found.append(_posed(node, given, poses.parent, solids, {each.name for each in found}))
-    if not fewest <= len(found) <= _MOST:
-        raise InputError(f"{poses}: {len(found)} poses were given; {fewest} to {_MOST} parts make an assembly.")
-    left = [name for name, file in given.items() if file not in solids]
+        parts.append(_posed(node, paths, poses.parent, solids, {each.name for each in parts}))
+    if not fewest <= len(parts) <= _MOST:
+        raise InputError(f"{poses}: {len(parts)} poses were given; {fewest} to {_MOST} parts make an assembly.")
+    left = [name for name, file in paths.items() if file not in solids]
     if left:
         raise InputError(f"{poses}: '{left[0]}' has no pose; add [[pose]] part = \"{left[0]}\", or leave the part out.")
-    return tuple(found)
+    return tuple(parts)
 
 
 def _posed(
-    node: JsonNode, given: dict[str, Path], folder: Path, solids: dict[Path, Solid], used: set[str]
+    node: JsonNode, paths: dict[str, Path], folder: Path, solids: dict[Path, Solid], used: set[str]
 ) -> PosedPart:
+    """One table of the file.
+
+    Args:
+        solids: Those that were read before; is added to.
+        used: Names that other parts have.
+    """
     keys = node.fields(("part", "at_mm"), ("name", "quaternion_wxyz", "color"))
     part = keys["part"].text()
-    name = keys["name"].text() if "name" in keys else part
-    file = given.get(part, folder / f"{part}.xml")
+    file = paths.get(part, folder / f"{part}.xml")
     if file not in solids:
         solids[file] = load_part(file)
-    name = free_name(name, {*used, *_TAKEN})
+    own_name = keys.get("name", keys["part"])
+    name = free_name(own_name.text(), {*used, *_TAKEN})
     if not FACE_OR_PART_NAME.fullmatch(name):
-        keys.get("name", keys["part"]).fail("a letter, then letters, digits and underscores are needed")
+        own_name.fail("a letter, then letters, digits and underscores are needed")
     T = np.eye(4)
     if "quaternion_wxyz" in keys:
         T = pose.unpack(np.concatenate([np.zeros(3), keys["quaternion_wxyz"].quaternion()]))
@@ -94,4 +99,4 @@ def on_the_table(parts: Sequence[PosedPart], up: str = "z") -> tuple[PosedPart, 
     turned = pose.at(np.zeros(3), ((0, -90 * sign, 0), (90 * sign, 0, 0), (0 if sign > 0 else 180, 0, 0))[axis])
     low, high = world_bounds([(each.solid, turned @ each.T) for each in parts])
     shift = pose.at([-(low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2]])
-    return tuple(PosedPart(each.name, each.file, each.solid, shift @ turned @ each.T, each.color) for each in parts)
+    return tuple(replace(each, T=shift @ turned @ each.T) for each in parts)

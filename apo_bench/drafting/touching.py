@@ -4,27 +4,25 @@ Poses are exact but for the digits of a file and of a fit, so a face touches whe
 0.05 mm. Then all parts but the fixed ones are moved, each as little as can be, until every contact is closed.
 """
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
-from itertools import combinations
-from typing import NamedTuple
+from itertools import combinations, product
 
 import numpy as np
 
 from apo_bench.assembly.facing import Facing, facing
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.kinds import contact_kind, geometric_play, play_mm
-from apo_bench.assembly.topology import Contact, PartFace
+from apo_bench.assembly.topology import Assembly, Contact, PartFace
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.intrusion import intrusion
 from apo_bench.geometry.mate import mate
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Face, Solid
+from apo_bench.geometry.solid import Solid
 
-NEAR_M = 5e-5
-NEAR_RAD = 2e-3
+_NEAR_M = 5e-5
+_NEAR_RAD = 2e-3
 _SHARE = 0.02
 """A contact at the poses that were given."""
 _CLOSED_M = 5e-7
@@ -41,19 +39,12 @@ _THREAD_M = 2.5e-3
 """A shaft that is so much thicker than the hole around it is pressed in, or has a thread."""
 
 
-class Clash(NamedTuple):
-    """Two parts that are inside each other, or that fit without play."""
-
-    parts: tuple[str, str]
-    sentence: str
-
-
 def found_contacts(solids: Mapping[str, Solid], poses: Poses) -> tuple[Contact, ...]:
     """Every pair of faces of different parts that touch, in the order of the parts."""
     return tuple(
         Contact(PartFace(a, each.a), PartFace(b, each.b))
         for a, b in combinations(solids, 2)
-        for each in facing(solids[a], poses[a], solids[b], poses[b], gap_m=NEAR_M, angle_rad=NEAR_RAD, share=_SHARE)
+        for each in facing(solids[a], poses[a], solids[b], poses[b], gap_m=_NEAR_M, angle_rad=_NEAR_RAD, share=_SHARE)
     )
 
 
@@ -72,23 +63,20 @@ def closed(
         dropped.append(kept.pop(int(np.argmax(off))))
 
 
-def clashes(solids: Mapping[str, Solid], poses: Poses, clearance_mm: float) -> tuple[Clash, ...]:
-    """Press fits, threads, and other parts that are inside each other."""
-    found = list[Clash]()
+def clashes(solids: Mapping[str, Solid], poses: Poses, clearance_mm: float) -> list[str]:
+    """Press fits, threads, and other parts that are inside each other, one sentence each."""
+    sentences = []
     for a, b in combinations(solids, 2):
-        tight = _tight(solids, poses, a, b, clearance_mm)
+        tight = next(_tight(solids, poses, a, b, clearance_mm), None)
         deep = intrusion(solids[a], poses[a], solids[b], poses[b])
         if tight:
-            found.append(Clash((a, b), tight))
+            sentences.append(tight)
         elif deep > _DEEP_M:
-            found.append(
-                Clash(
-                    (a, b),
-                    f"'{a}' and '{b}' are {1e3 * deep:.3g} mm inside each other, and parts are rigid here: a press "
-                    "fit, a thread, or a pose that is wrong; give them room in the CAD file",
-                )
+            sentences.append(
+                f"'{a}' and '{b}' are {1e3 * deep:.3g} mm inside each other, and parts are rigid here: a press fit, a "
+                "thread, or a pose that is wrong; give them room in the CAD file"
             )
-    return tuple(found)
+    return sentences
 
 
 def walls_without_play(
@@ -97,10 +85,10 @@ def walls_without_play(
     """Opposite flat walls of one part that hold another one between them, none of which recedes."""
     flat = [c for c in contacts if all(of.face in solids[of.part].faces for of in c) and not _fits(solids, c)]
     return tuple(
-        (one, other)
-        for one, other in combinations(flat, 2)
-        if {of.part for of in one} == {of.part for of in other}
-        and _normal(solids, poses, one) @ _normal(solids, poses, other) < -1.0 + 1e-6
+        (contact, opposite)
+        for contact, opposite in combinations(flat, 2)
+        if {of.part for of in contact} == {of.part for of in opposite}
+        and _normal(solids, poses, contact) @ _normal(solids, poses, opposite) < -1.0 + 1e-6
     )
 
 
@@ -114,64 +102,67 @@ def _normal(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> Arra
     return np.asarray(poses[of.part][:3, :3] @ solids[of.part].faces[of.face].normal)
 
 
-def _tight(solids: Mapping[str, Solid], poses: Poses, a: str, b: str, clearance_mm: float) -> str:
-    """What a shaft is that has no play in the hole around it; empty if there is none."""
-    for one in solids[a].rounds.values():
-        for other in solids[b].rounds.values():
-            if contact_kind(one, other) != "shaft in hole":
-                continue
-            play = play_mm(one, other, clearance_mm)
-            if play is None or play > _NO_PLAY_MM or geometric_play(one, other) < -_THREAD_M:
-                continue
-            found = mate(one, poses[a], other, poses[b])
-            if found.gap_m < _COAXIAL_M and found.angle_rad < NEAR_RAD and found.length_m > 1e-4:
-                shaft, hole = (other, one) if one.hole else (one, other)
-                at, around = (
-                    (f"{b}.{other.name}", f"{a}.{one.name}") if one.hole else (f"{a}.{one.name}", f"{b}.{other.name}")
-                )
-                return (
-                    f"'{at}' is {2e3 * shaft.radius:.4g} mm thick in '{around}' of {2e3 * hole.radius:.4g} mm: a press "
-                    "fit or a thread, and parts are neither pressed nor screwed in here; make the hole wider, or say "
-                    f"fit = true under [faces.{hole.name}] of its part"
-                )
-    return ""
+def _tight(solids: Mapping[str, Solid], poses: Poses, a: str, b: str, clearance_mm: float) -> Iterator[str]:
+    """What shafts are that have no play in the holes around them."""
+    for wall, other in product(solids[a].rounds.values(), solids[b].rounds.values()):
+        if contact_kind(wall, other) != "shaft in hole":
+            continue
+        play = play_mm(wall, other, clearance_mm)
+        if play is None or play > _NO_PLAY_MM or geometric_play(wall, other) < -_THREAD_M:
+            continue
+        fit = mate(wall, poses[a], other, poses[b])
+        if fit.gap_m < _COAXIAL_M and fit.angle_rad < _NEAR_RAD and fit.length_m > 1e-4:
+            pair = ((a, wall), (b, other))
+            (inner, shaft), (outer, hole) = reversed(pair) if wall.hole else pair
+            yield (
+                f"'{inner}.{shaft.name}' is {2e3 * shaft.radius:.4g} mm thick in '{outer}.{hole.name}' of "
+                f"{2e3 * hole.radius:.4g} mm: a press fit or a thread, and parts are neither pressed nor screwed in "
+                f"here; make the hole wider, or say fit = true under [faces.{hole.name}] of its part"
+            )
 
 
 def _solved(solids: Mapping[str, Solid], poses: Poses, contacts: list[Contact], free: list[str]) -> Poses:
     """Gauss-Newton with the least motion: residuals of all contacts, twists of all parts that are free to move."""
     now = {part: np.array(T) for part, T in poses.items()}
-    place = {part: 6 * i for i, part in enumerate(free)}
+    first = {part: 6 * i for i, part in enumerate(free)}
     for _ in range(_ROUNDS):
+        # Rows J and values e of all residuals, tilts times an arm, so that all are lengths; moving a by a twist opens a
+        # contact as much as moving b by it closes it.
         rows = list[Array]()
         values = list[float]()
         for contact in contacts:
-            a, b = contact
             each = _facing(solids, now, contact)
             if each is None:
                 continue
             for i, (e, slope) in enumerate(zip(each.residual, each.slope, strict=True)):
                 row = np.zeros(6 * len(free))
                 scale = 1.0 if i < each.lengths else _ARM_M
-                for part, sign in ((a.part, 1.0), (b.part, -1.0)):
-                    if part in place:
-                        row[place[part] : place[part] + 6] += sign * scale * slope
+                for of, sign in zip(contact, (1.0, -1.0), strict=True):
+                    if of.part in first:
+                        row[first[of.part] : first[of.part] + 6] += sign * scale * slope
                 rows.append(row)
                 values.append(scale * float(e))
         if not rows or np.abs(values).max() < 1e-12:
             break
-        weights = np.tile([1.0, 1.0, 1.0, 1 / _ARM_M, 1 / _ARM_M, 1 / _ARM_M], len(free))
-        step = weights * np.linalg.lstsq(np.array(rows) * weights, -np.array(values), rcond=1e-9)[0]
-        for part, at in place.items():
-            now[part] = pose.exp(step[at : at + 6]) @ now[part]
+        # The least |x / W| with J x = -e: x = W y, y the least solution of (J W) y = -e.
+        W = np.tile([1.0, 1.0, 1.0, 1 / _ARM_M, 1 / _ARM_M, 1 / _ARM_M], len(free))
+        x = W * np.linalg.lstsq(np.array(rows) * W, -np.array(values), rcond=1e-9)[0]
+        for part, at in first.items():
+            now[part] = pose.exp(x[at : at + 6]) @ now[part]
     return now
 
 
 def _facing(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> Facing | None:
+    """How the two faces of a contact look at each other; None if they do not."""
     a, b = contact
-    one = _only(solids[a.part], a.face)
-    other = _only(solids[b.part], b.face)
     pairs = facing(
-        one, poses[a.part], other, poses[b.part], gap_m=10 * NEAR_M, angle_rad=10 * NEAR_RAD, share=_SHARE / 2
+        _only(solids[a.part], a.face),
+        poses[a.part],
+        _only(solids[b.part], b.face),
+        poses[b.part],
+        gap_m=10 * _NEAR_M,
+        angle_rad=10 * _NEAR_RAD,
+        share=_SHARE / 2,
     )
     return next(pairs, None)
 
@@ -191,11 +182,6 @@ def _off(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> float:
     each = _facing(solids, poses, contact)
     if each is None:
         return np.inf
-    faces = [_face_of(solids, of) for of in contact]
-    angle = 0.0 if contact_kind(*faces) == "cone on rim" else each.angle_rad
-    return max(abs(each.gap_m) / _CLOSED_M, angle / _CLOSED_RAD)
-
-
-def _face_of(solids: Mapping[str, Solid], of: PartFace) -> Face | RoundFace:
-    solid = solids[of.part]
-    return solid.rounds[of.face] if of.face in solid.rounds else solid.faces[of.face]
+    assembly = Assembly(solids, (), frozenset())
+    is_on_rim = contact_kind(*map(assembly.face_of, contact)) == "cone on rim"
+    return max(abs(each.gap_m) / _CLOSED_M, 0.0 if is_on_rim else each.angle_rad / _CLOSED_RAD)

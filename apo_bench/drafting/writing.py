@@ -1,5 +1,6 @@
-"""A draft as the text of a scenario file, with a comment for each choice."""
+"""A draft as the text of a scenario file, with a comment for each choice; and what was chosen, in lines."""
 
+import json
 import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -44,7 +45,7 @@ def scenario_text(draft: Draft, title: str, source: str, folder: Path) -> str:
         "# frame of the assembly, which [site] puts somewhere on the table; a start is a pose in the world.",
         *(f"# NOTE: {note}." for note in draft.notes),
         "schema = 1",
-        f"title = {_quoted(title)}",
+        f"title = {json.dumps(title, ensure_ascii=False)}",
         'human = "Puts the parts together in this order."',
         'success = "Every part is where the CAD file has it."',
         f"clearance_mm = {draft.clearance_mm:g}  # room per side of faces that part files mark as fit",
@@ -58,14 +59,12 @@ def scenario_text(draft: Draft, title: str, source: str, folder: Path) -> str:
         lines += ["", *_part(draft, each, folder)]
     for placing in draft.order:
         lines += ["", *_operation(draft, placing)]
-    x, y = (1e3 * c for c in draft.site.center_m)
-    a, b = (1e3 * s for s in draft.site.spread_m)
     lines += [
         "",
         "[site]  # each trial puts the assembly elsewhere: in reach, clear of what waits beside it",
-        f"center_mm = [{_n(x)}, {_n(y)}]",
-        f"spread_mm = [{_n(a)}, {_n(b)}]",
-        f"yaw_deg = [{_n(-draft.site.yaw_deg)}, {_n(draft.site.yaw_deg)}]",
+        f"center_mm = {_list(1e3 * np.array(draft.site.center_m))}",
+        f"spread_mm = {_list(1e3 * np.array(draft.site.spread_m))}",
+        f"yaw_deg = {_list(np.degrees(draft.site.yaw_rad))}",
         "",
         "[judge]  # as in the scenarios of the package",
         *(f"{name} = {getattr(Thresholds(), name):g}  # {means}" for name, means in THRESHOLDS.items()),
@@ -73,9 +72,19 @@ def scenario_text(draft: Draft, title: str, source: str, folder: Path) -> str:
     return "\n".join(lines) + "\n"
 
 
+def draft_lines(draft: Draft) -> Iterator[str]:
+    """The choices that were made, and what is to be known."""
+    yield f"fixed: {', '.join(draft.fixed)} ({draft.why_fixed})"
+    for k, placing in enumerate(draft.order, start=1):
+        carried = f" with {', '.join(placing.moves[1:])}" if placing.moves[1:] else ""
+        yield f"{k}. {placing.moves[0]}{carried} {placing.why}: {len(placing.contacts)} contacts"
+    for note in draft.notes:
+        yield f"note: {note}"
+
+
 def _part(draft: Draft, each: PosedPart, folder: Path) -> Iterator[str]:
     yield f"[parts.{each.name}]"
-    yield f"file = {_quoted(_file_key(each.file, folder))}"
+    yield f"file = {json.dumps(_file_key(each.file, folder), ensure_ascii=False)}"
     if each.color is not None:
         yield "color = [" + ", ".join(f"{c:.3g}" for c in each.color) + "]"
     if each.name in draft.fixed:
@@ -118,16 +127,16 @@ def _grasp(hold: Hold | None, main: str, draft: Draft) -> Iterator[str]:
     solid = next(each.solid for each in draft.parts if each.name == main)
     low, high = solid.bounds
     if hold is None:
-        R = draft.starts[main][:3, :3]
-        widths = [float(np.ptp([solid.bounds @ axis for axis in (R.T @ e,)])) for e in np.eye(3)[:2]]
-        across = R.T @ np.eye(3)[int(np.argmin(widths))]
+        # Level directions of the world in the frame of the part: across the narrower one, at the middle.
+        level = draft.starts[main][:2, :3]
+        across = level[int(np.argmin(np.ptp(solid.bounds @ level.T, axis=0)))]
         at = np.clip(solid.centroid, low, high)
         yield f"grasp = {{ at_mm = {_list(1e3 * at)}, across = {_axis(across)} }}  # TOO WIDE for the gripper"
-    else:
-        wide = f"{2e3 * hold.half_width:.4g} mm between the fingers"
-        if ((hold.point < low - _LEVEL) | (hold.point > high + _LEVEL)).any():
-            wide += ", whose tips end above the part"
-        yield f"grasp = {{ at_mm = {_list(1e3 * hold.point)}, across = {_axis(hold.across)} }}  # {wide}"
+        return
+    wide = f"{2e3 * hold.half_width:.4g} mm between the fingers"
+    if ((hold.point < low - _LEVEL) | (hold.point > high + _LEVEL)).any():
+        wide += ", whose tips end above the part"
+    yield f"grasp = {{ at_mm = {_list(1e3 * hold.point)}, across = {_axis(hold.across)} }}  # {wide}"
 
 
 def _file_key(file: Path, folder: Path) -> str:
@@ -145,34 +154,25 @@ def _pose(T: Array) -> str:
 
 def turn_deg(R: Array) -> Array:
     """The turns about the fixed x, then y, then z axis that make a rotation, (3,), [degrees]."""
+    # R = Rz Ry Rx has the first column (cos y cos z, cos y sin z, -sin y), the last row (-sin y, sin x cos y, cos x cos y)
     down = float(np.hypot(R[0, 0], R[1, 0]))
     y = np.arctan2(-R[2, 0], down)
     if down > 1e-9:
         x = np.arctan2(R[2, 1], R[2, 2])
         z = np.arctan2(R[1, 0], R[0, 0])
-    else:
+    else:  # with y at 90 degrees x and z turn about one axis: all of the turn is given to x
         x = np.arctan2(-R[1, 2], R[1, 1])
         z = 0.0
-    found = np.degrees([x, y, z])
-    near = 90.0 * np.round(found / 90.0)
-    return np.where(np.abs(found - near) < 1e-7, near, found) + 0.0
+    turn = np.degrees([x, y, z])
+    near = 90.0 * np.round(turn / 90.0)
+    return np.where(np.abs(turn - near) < 1e-7, near, turn) + 0.0
 
 
 def _axis(axis: Array) -> str:
-    for name, unit in zip("xyz", np.eye(3), strict=True):
-        if abs(axis @ unit) > 1.0 - 1e-12:
-            return f'"{name}"'
-    return _list(axis)
+    along = int(np.abs(axis).argmax())
+    return f'"{"xyz"[along]}"' if abs(axis[along]) > 1.0 - 1e-12 else _list(axis)
 
 
 def _list(values: Array) -> str:
-    return "[" + ", ".join(_n(float(x)) for x in values) + "]"
-
-
-def _n(x: float) -> str:
     """Without digits below a nanometre."""
-    return f"{round(x, 8) + 0.0:.12g}"
-
-
-def _quoted(text: str) -> str:
-    return '"' + text.replace("\\", "\\\\").replace('"', '\\"') + '"'
+    return "[" + ", ".join(f"{round(float(x), 8) + 0.0:.12g}" for x in values) + "]"

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from apo_bench.cli.app import main
+from apo_bench.drafting.checking import line_of
 from apo_bench.drafting.draft import draft
-from apo_bench.drafting.lines import line_of
 from apo_bench.drafting.posed import PosedPart, on_the_table
-from apo_bench.drafting.standing import stance
+from apo_bench.drafting.waiting import stance
 from apo_bench.drafting.writing import scenario_text, turn_deg
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose

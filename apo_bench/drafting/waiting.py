@@ -1,0 +1,174 @@
+"""How parts stand on the table, and where they wait beside the assembly: in reach, with room for fingers between."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.errors import InputError
+from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.hull import Hull
+from apo_bench.geometry.solid import Piece, Solid, extent
+from apo_bench.scenario.scenario import Site
+
+_LOW_M = 2e-5
+"""Corners so near to the lowest one carry."""
+_LEAST_M = 5e-4
+_SLOPE = 0.04
+"""The centre of mass lies at least so far inside of what carries, and so much of its height."""
+_LEVEL = 1e-6
+_BASE_M = (-0.42, 0.0)
+"""Where the arm that comes with the benchmark stands; it reaches the table between two distances."""
+_NEAREST_M = 0.27
+_FARTHEST_M = 0.66
+_LIKED_M = (0.05, 0.27)
+"""Parts wait as near as can be to here, on either side."""
+_ROOMS_M = (0.055, 0.04, 0.03)
+"""Between what waits, for fingers: as much as there is."""
+_GRID_M = 0.01
+_SPREAD_M = (0.04, 0.06)
+_LEAST_SPREAD_M = 0.005
+_YAW_DEG = 28.0
+_YAW_BESIDE_DEG = 8.0
+_LARGE_M = (0.13, 0.16)
+"""An assembly that reaches so far from its middle is moved by no more than the least."""
+
+
+class Stance(NamedTuple):
+    """How a part stands on a level plane."""
+
+    height_m: float
+    """Of its frame over the plane."""
+    stands: bool
+    rolls: bool
+    """It lies on a round wall: nothing but friction keeps it in its place."""
+
+
+def stance(solid: Solid, R: Array) -> Stance:
+    """How a solid stands that is turned like this, (3, 3)."""
+    up = R[2]
+    low = extent(solid.pieces, up)[0]
+    base = (np.concatenate([_lowest(piece, up, low) for piece in solid.pieces]) @ R.T)[:, :2]
+    middle = R @ solid.centroid
+    # It stands if the middle is above the area that carries, with a margin that grows with its height.
+    if _margin(base, middle[:2]) >= max(_LEAST_M, _SLOPE * (middle[2] - low)):
+        return Stance(-low, True, False)
+    rolls = _is_on_line(base, middle[:2])
+    return Stance(-low, rolls, rolls)
+
+
+def _lowest(piece: Piece, up: Array, low: float) -> Array:
+    """The corners of a piece that touch the plane, (k, 3); of a level cylinder the ends of the line that does."""
+    if isinstance(piece, Hull) and piece.cylinder is not None and abs(piece.cylinder.axis @ up) < _LEVEL:
+        c = piece.cylinder
+        if c.center @ up - c.radius > low + _LOW_M:
+            return np.zeros((0, 3))
+        return np.asarray(c.center - c.radius * up + c.half_length * np.outer([-1.0, 1.0], c.axis))
+    return np.asarray(piece.corners[piece.corners @ up < low + _LOW_M])
+
+
+def _margin(base: Array, at: Array) -> float:
+    """How far a point is inside of the hull of others, [m]; negative where that is no area, or it lies outside."""
+    from shapely import MultiPoint, Point
+
+    hull = MultiPoint(base).convex_hull
+    if hull.geom_type != "Polygon" or not hull.contains(Point(at)):
+        return -1.0
+    return float(hull.exterior.distance(Point(at)))
+
+
+def _is_on_line(base: Array, at: Array) -> bool:
+    """Whether what carries is a line below a point: a strip of an area that is a hair's breadth times its length."""
+    from shapely import MultiPoint, Point
+
+    points = MultiPoint(base)
+    if len(base) < 2 or points.minimum_rotated_rectangle.buffer(0.0).area > _LEAST_M * np.ptp(base, axis=0).max():
+        return False
+    return bool(points.convex_hull.distance(Point(at)) < _LEAST_M)
+
+
+def site_of(reach_m: float, is_beside: bool) -> Site:
+    """A place for an assembly that reaches so far from its middle.
+
+    Args:
+        is_beside: Whether a sub-assembly is put together beside it.
+    """
+    x, y = (
+        round(float(np.clip(large - reach_m, _LEAST_SPREAD_M, most)), 3)
+        for large, most in zip(_LARGE_M, _SPREAD_M, strict=True)
+    )
+    yaw = float(np.radians(_YAW_BESIDE_DEG if is_beside else _YAW_DEG))
+    if is_beside:
+        return Site((0.13, 0.0), (min(x, 0.01), min(y, 0.02)), (-yaw, yaw))
+    return Site((0.1, 0.0), (x, y), (-yaw, yaw))
+
+
+def reach_of(solids: Mapping[str, Solid], poses: Poses, parts: Sequence[str]) -> float:
+    """How far parts reach from the origin over the table, [m]."""
+    boxes = [_box(solids[part], poses[part][:3, :3]) + poses[part][:2, 3] for part in parts]
+    return max((float(np.hypot(*np.abs(box).max(axis=0))) for box in boxes), default=0.0)
+
+
+def laid_out(
+    solids: Mapping[str, Solid], turns: Mapping[str, Array], kept_free: Sequence[tuple[Array, float]]
+) -> Mapping[str, Array]:
+    """Where each part waits, (2,), of its frame, [m], the largest first.
+
+    Args:
+        turns: Part -> its orientation, (3, 3).
+        kept_free: Discs that must stay free: middle, (2,), and radius.
+
+    Raises:
+        InputError: There is no room.
+    """
+    boxes = {part: _box(solids[part], R) for part, R in turns.items()}
+    for room in _ROOMS_M:
+        places = _with_room(boxes, kept_free, room)
+        if places is not None:
+            return places
+    raise InputError(
+        f"there is no room for {len(turns)} parts to wait on the table in reach of the arm; assemble fewer or smaller "
+        "parts at once."
+    )
+
+
+def _with_room(
+    boxes: Mapping[str, Array], kept_free: Sequence[tuple[Array, float]], room: float
+) -> Mapping[str, Array] | None:
+    places: dict[str, Array] = {}
+    taken = list[tuple[Array, Array]]()
+    for part in sorted(boxes, key=lambda part: -float(np.prod(boxes[part][1] - boxes[part][0]))):
+        low, high = boxes[part]
+        for middle in _grid():
+            a = middle - (high - low) / 2
+            b = middle + (high - low) / 2
+            if all(_are_apart(a, b, *other, room) for other in taken) and all(
+                np.linalg.norm(np.clip(c, a, b) - c) > r + room for c, r in kept_free
+            ):
+                taken.append((a, b))
+                places[part] = np.round(middle - (low + high) / 2, 4)
+                break
+        else:
+            return None
+    return places
+
+
+def _grid() -> Array:
+    """Places in reach, (k, 2), the best first."""
+    x, y = np.meshgrid(np.arange(-0.2, 0.26, _GRID_M), np.arange(-0.45, 0.451, _GRID_M), indexing="ij")
+    places = np.column_stack([x.ravel(), y.ravel()])
+    far = np.hypot(*(places - _BASE_M).T)
+    places = places[(far > _NEAREST_M) & (far < _FARTHEST_M)]
+    cost = np.hypot(places[:, 0] - _LIKED_M[0], np.abs(places[:, 1]) - _LIKED_M[1])
+    return np.asarray(places[np.lexsort((places[:, 1], np.round(cost, 6)))])
+
+
+def _are_apart(a: Array, b: Array, c: Array, d: Array, room: float) -> bool:
+    """Whether two boxes, each from one corner to the other, have room between them."""
+    return bool(((a > d + room) | (c > b + room)).any())
+
+
+def _box(solid: Solid, R: Array) -> Array:
+    """The box around a turned solid, seen from above: lowest and highest x and y of it, (2, 2), [m]."""
+    return np.array([extent(solid.pieces, R[0]), extent(solid.pieces, R[1])]).T
