@@ -154,7 +154,8 @@ def _pose(T: Array) -> str:
 
 def turn_deg(R: Array) -> Array:
     """The turns about the fixed x, then y, then z axis that make a rotation, (3,), [degrees]."""
-    # R = Rz Ry Rx has the first column (cos y cos z, cos y sin z, -sin y), the last row (-sin y, sin x cos y, cos x cos y)
+    # Of R = Rz Ry Rx the first column is (cos y cos z, cos y sin z, -sin y), the last row (-sin y, sin x cos y,
+    # cos x cos y).
     down = float(np.hypot(R[0, 0], R[1, 0]))
     y = np.arctan2(-R[2, 0], down)
     if down > 1e-9:
