@@ -18,7 +18,7 @@ from apo_bench.simulation.film.track import FilmTrack
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.scene import scene_of
 from apo_bench.trial.stages import observe_demonstration, simulate_demonstration
-from apo_bench.trial.story import Story, told
+from apo_bench.trial.story import Story, trial_story
 from apo_bench.trial.trial import noise_of, run_trial
 
 
@@ -54,7 +54,7 @@ def trial_again(folder: Path, number: int | None, salt_file: Path | None = None)
     if again["sim_seconds"] is None:
         raise RuntimeError(f"in trial {number} nothing was replayed: {again['sentence']}.")
     seen = observe_demonstration(simulated, noise_of(spec, scene, simulated), spec.seed, spec.salt)
-    return again, told(spec, scene, seen, track, again, simulated)
+    return again, trial_story(spec, scene, seen, track, again, simulated)
 
 
 def _chosen(folder: Path, number: int | None) -> tuple[int, Row]:

@@ -15,7 +15,7 @@ from apo_bench.sweeps.grid import Unit
 from apo_bench.sweeps.messages import Message, checked
 from apo_bench.sweeps.stopping import Check
 from apo_bench.sweeps.worker import Emit, timing
-from apo_bench.trial.failed_row import lost
+from apo_bench.trial.row import lost
 
 STARTING_S = 300.0
 """What a worker gets to be ready, and to compile a scene."""

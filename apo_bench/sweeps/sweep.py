@@ -25,8 +25,7 @@ from apo_bench.sweeps.local.pool import spread
 from apo_bench.sweeps.progress import progress
 from apo_bench.sweeps.stopping import Check, listening
 from apo_bench.sweeps.worker import Timing, in_time
-from apo_bench.trial.code_version import code_files
-from apo_bench.trial.fingerprint import content_pieces, spec_hash
+from apo_bench.trial.fingerprint import code_files, content_pieces, spec_hash
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations
 
 _LARGEST_WORKERS = 256

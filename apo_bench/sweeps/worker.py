@@ -21,12 +21,12 @@ from apo_bench.records.settings import TrialSettings
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.sweeps.messages import Message
-from apo_bench.trial.failed_row import trial_row
 from apo_bench.trial.fingerprint import content_hash
-from apo_bench.trial.kept_demonstrations import KeptDemonstrations
+from apo_bench.trial.kept_demonstrations import KeptDemonstrations, demonstration_of
 from apo_bench.trial.row import result
 from apo_bench.trial.scene import scene_key, scene_of
-from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
+from apo_bench.trial.stages import SimulatedDemonstration
+from apo_bench.trial.trial import trial_row
 
 if TYPE_CHECKING:
     from apo_bench.sweeps.environment_lock import EnvironmentLock
@@ -81,7 +81,7 @@ class Worker:
             start = time.perf_counter()
             key = (spec.careless, spec.eye)
             if key not in demonstrations:
-                demonstrations[key] = self._simulated(spec, scene)
+                demonstrations[key] = demonstration_of(spec, scene, self._kept)
             shown = time.perf_counter()
             row = trial_row(spec, scene, demonstrations[key], content, method=method, cache=cache)
             ended = time.perf_counter()
@@ -90,11 +90,6 @@ class Worker:
     def close(self) -> None:
         """End the processes of correctors."""
         self._own.close()
-
-    def _simulated(self, spec: TrialSettings, scene: Scene) -> SimulatedDemonstration:
-        if self._kept is not None:
-            return self._kept.simulated(spec, scene)
-        return simulate_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
 
     def _method(self, name: str) -> Any:
         """The corrector; if it could be imported when the sweep began and cannot now, that is its own failure."""

@@ -1,7 +1,7 @@
-"""The baseline `by-heart`: the assembly as its file says, put where it fits best what was seen.
+"""Nominal goals put to where things were seen; best of all they fit in the baseline `by-heart`.
 
-It reads the nominal goals of the scenario, which no corrector may, and no contact. Whatever the relative goals of a
-layout are, it builds the same assembly.
+`by-heart` reads the nominal goals of the scenario, which no corrector may, and no contact. Whatever the relative
+goals of a layout are, it builds the same assembly.
 """
 
 import numpy as np
@@ -26,6 +26,7 @@ def goals_by_heart(nominal: Array, observation: Observation) -> Array:
         (n, 4, 4), world frame.
     """
     seen = np.flatnonzero(observation.seen)
+    # whitened by L^-1, where S = L L^t, a twist counts in standard deviations
     factors = [np.linalg.inv(np.linalg.cholesky(observation.covariance[k])) for k in seen]
 
     def residuals(place: Array) -> Array:
@@ -37,8 +38,19 @@ def goals_by_heart(nominal: Array, observation: Observation) -> Array:
     return np.asarray(_planar(least_squares(residuals, start, x_scale=[0.01, 0.01, 0.1]).x) @ nominal)
 
 
+def nominal_where_seen(nominal: Array, observation: Observation) -> Array:
+    """The nominal goals (n, 4, 4) shifted and turned on the table to where the first operation was seen."""
+    k = int(np.argmax(observation.seen))
+    # of the whole motion from nominal to seen only the yaw and the shift on the table are taken
+    T = observation.goals[k] @ pose.inverse(nominal[k])
+    flat = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, float(np.degrees(np.arctan2(T[1, 0], T[0, 0])))))
+    flat[:2, 3] = (observation.goals[k] - flat @ nominal[k])[:2, 3]
+    return np.asarray(flat @ nominal)
+
+
 def _rough(nominal: Array, goals: Array) -> Array:
     """(x, y, yaw): the mean turn of the parts, then the mean of what is left."""
+    # the mean yaw maximises the sum of tr(Rz(yaw)^t R_k) over the turns R_k from nominal to seen
     turns = goals[:, :3, :3] @ np.swapaxes(nominal[:, :3, :3], 1, 2)
     sine = (turns[:, 1, 0] - turns[:, 0, 1]).sum()
     cosine = (turns[:, 0, 0] + turns[:, 1, 1]).sum()

@@ -1,18 +1,25 @@
-"""Hashes that say whether two rows were made of the same things."""
+"""Hashes that say whether two rows were made of the same things: files, settings, and the code that shapes a row.
+
+The code is every source file of the package but those of `ROOMS_WITHOUT_TRIALS`.
+"""
 
 import hashlib
 import json
 import sys
+from collections.abc import Iterator, Mapping
 from dataclasses import asdict, fields, is_dataclass
 from functools import cache
 from importlib.machinery import ModuleSpec
+from importlib.resources import files
+from importlib.resources.abc import Traversable
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
 from apo_bench import __version__
-from apo_bench.files import json_forms as files
+from apo_bench.files.json_forms import OBSERVATION, PLAN
 from apo_bench.io.reading import read_bytes
 from apo_bench.names import admit
 from apo_bench.observation.presets import noise_path
@@ -21,9 +28,10 @@ from apo_bench.records.settings import ROW, TrialSettings
 from apo_bench.resources import folder
 from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.trial.code_version import code_files
 
-_SCHEMAS = (ROW, files.OBSERVATION, files.PLAN)
+_SCHEMAS = (ROW, OBSERVATION, PLAN)
+ROOMS_WITHOUT_TRIALS = ("cli", "drafting", "envs", "report", "show", "statistics", "sweeps/local", "sweeps/ray")
+"""Commands, how work is spread, and all that is made of rows afterwards."""
 
 
 def content_hash(scenario: Scenario, given: str | Path | Scenario, arm_files: Path | tuple[Path, ...]) -> str:
@@ -34,8 +42,8 @@ def content_hash(scenario: Scenario, given: str | Path | Scenario, arm_files: Pa
     Args:
         given: What `load_scenario` was given.
     """
-    said = [content_pieces(scenario, given, arm_files), dict(code_files()), __version__, _SCHEMAS]
-    return _hash(json.dumps(said, sort_keys=True).encode())
+    content = [content_pieces(scenario, given, arm_files), dict(code_files()), __version__, _SCHEMAS]
+    return _hash(json.dumps(content, sort_keys=True).encode())
 
 
 def content_pieces(
@@ -55,6 +63,30 @@ def content_pieces(
         "thresholds": json.dumps(asdict(scenario.thresholds), sort_keys=True).encode(),
     }
     return {name: _hash(piece) for name, piece in pieces.items()}
+
+
+@cache
+def code_files() -> Mapping[str, str]:
+    """Source file, relative to the package -> 16 hexadecimal digits over its lines; read once per process."""
+    texts = sorted(sources(files("apo_bench")))
+    return MappingProxyType({path: _hash(text) for path, text in texts if counts(path)})
+
+
+def counts(path: str) -> bool:
+    """Whether a source file of the package shapes rows."""
+    return not path.startswith(tuple(f"{room}/" for room in ROOMS_WITHOUT_TRIALS))
+
+
+def sources(package: Traversable, prefix: str = "") -> Iterator[tuple[str, bytes]]:
+    """Every Python file of a package and what stands in it, wherever it is installed.
+
+    Ends of lines are the same everywhere: they are the version control's.
+    """
+    for entry in package.iterdir():
+        if entry.is_dir() and entry.name != "__pycache__":
+            yield from sources(entry, f"{prefix}{entry.name}/")
+        elif entry.name.endswith(".py"):
+            yield prefix + entry.name, entry.read_bytes().replace(b"\r\n", b"\n")
 
 
 def spec_hash(spec: TrialSettings, content: str, observation: str = "") -> str:
@@ -78,8 +110,8 @@ def spec_hash(spec: TrialSettings, content: str, observation: str = "") -> str:
 
 def noise_content(*names: str) -> dict[str, str]:
     """Of the noise models that are files or of one's own: `noise NAME` -> 16 hexadecimal digits over the file."""
-    files = {f"noise {name}": path for name in names if (path := noise_path(name)) is not None}
-    return {name: _hash(read_bytes(path, "noise file")) for name, path in files.items()} | own_content("noise", *names)
+    paths = {f"noise {name}": path for name in names if (path := noise_path(name)) is not None}
+    return {name: _hash(read_bytes(path, "noise file")) for name, path in paths.items()} | own_content("noise", *names)
 
 
 def own_content(kind: str, *names: str) -> dict[str, str]:
@@ -94,27 +126,27 @@ def own_content(kind: str, *names: str) -> dict[str, str]:
 @cache
 def _module_hash(module: str) -> str | None:
     """Over the source file of a module as it was when it was first asked for; None if it has none."""
-    found = _located(module)
-    path = Path(found.origin) if found is not None and found.has_location and found.origin else None
+    spec = _located(module)
+    path = Path(spec.origin) if spec is not None and spec.has_location and spec.origin else None
     return _hash(path.read_bytes()) if path is not None and path.is_file() else None
 
 
 def _located(module: str) -> ModuleSpec | None:
     """Where a module would be imported from; nothing is imported, nor are the packages that it is in."""
     admit(module)
-    found = None
+    spec = None
     path = None
     for end in range(1, module.count(".") + 2):
         name = ".".join(module.split(".")[:end])
         try:
             specs = (finder.find_spec(name, path) for finder in sys.meta_path)
-            found = next((spec for spec in specs if spec is not None), None)
-            path = None if found is None else found.submodule_search_locations
+            spec = next((each for each in specs if each is not None), None)
+            path = None if spec is None else spec.submodule_search_locations
         except (ImportError, ValueError, KeyError, AttributeError):
             return None
-        if found is None or (path is None and name != module):
+        if spec is None or (path is None and name != module):
             return None
-    return found
+    return spec
 
 
 def _hash(text: bytes) -> str:

@@ -16,24 +16,22 @@ from importlib import metadata
 from pathlib import Path
 from typing import final
 
+import numpy as np
+
 from apo_bench import __version__
 from apo_bench.assembly.goals import Demonstration, Layout
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.pose import is_rigid
-from apo_bench.io.documents import JsonNode, parse_json
+from apo_bench.io.documents import parse_json
 from apo_bench.io.reading import read_text
 from apo_bench.io.writing import write_whole
 from apo_bench.records.settings import RANGE, TrialSettings
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.trial.code_version import code_files
-from apo_bench.trial.fingerprint import content_pieces
+from apo_bench.trial.fingerprint import code_files, content_pieces
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 
 SCHEMA = "apo-bench/kept-demonstration/1"
 _KIND = "kept demonstration"
 _LARGEST_BYTES = 1_000_000
-_CODES = ("ok", "demonstration_failed")
 _PACKAGES = ("dm-control", "mujoco", "numpy", "scipy", "shapely")
 """The packages that a demonstration is made with."""
 _NOT_SHOWN = (
@@ -65,43 +63,51 @@ class KeptDemonstrations:
             raise InputError(f"the cache '{folder}' cannot be written; name a folder that can be.")
 
     def simulated(self, settings: TrialSettings, scene: Scene) -> SimulatedDemonstration:
-        """The demonstration of a trial: read, or made and kept.
+        """The demonstration of a trial: read, or simulated and kept.
 
-        What a range finder records of one is too large to be kept, so it is made again.
+        What a range finder records of one is too large to be kept, so it is simulated again.
 
         Args:
             scene: As compiled for these settings.
         """
         if settings.eye == RANGE:
-            return _made(settings, scene)
+            return demonstration_of(settings, scene)
         key = demonstration_key(settings, scene)
         path = self.folder / f"{key}.json"
-        said = ""
+        complaint = ""
         if os.path.lexists(path):
             try:
                 return _read(path, key, scene)
             except InputError as error:
-                said = f"{str(error).rstrip('.')}; the demonstration is made again"
-        made = _made(settings, scene)
+                complaint = f"{str(error).rstrip('.')}; the demonstration is made again"
+        simulated = demonstration_of(settings, scene)
         try:
-            write_whole(path, _written(key, made))
+            write_whole(path, _written(key, simulated))
         except OSError as error:
-            why = error.strerror or error
-            said = (
-                f"{said}, and cannot be kept ({why})" if said else f"{path}: the demonstration cannot be kept ({why})"
-            )
-        if said:
-            _say(f"{said}.")
-        return made
+            what = f"{complaint}, and" if complaint else f"{path}: the demonstration"
+            complaint = f"{what} cannot be kept ({error.strerror or error})"
+        if complaint:
+            with suppress(OSError, AttributeError):
+                sys.stderr.write(f"apo-bench: {complaint}.\n")
+        return simulated
+
+
+def demonstration_of(
+    settings: TrialSettings, scene: Scene, kept: KeptDemonstrations | None = None
+) -> SimulatedDemonstration:
+    """The demonstration of a trial, from the folder where they are kept if there is one."""
+    if kept is not None:
+        return kept.simulated(settings, scene)
+    return simulate_demonstration(scene, settings.careless, settings.seed, settings.eye, settings.salt)
 
 
 def demonstration_key(settings: TrialSettings, scene: Scene) -> str:
     """64 hexadecimal digits over all that decides a demonstration: code, packages, processor, scenario, settings."""
     pieces = content_pieces(scene.scenario, settings.scenario, scene.arm.files)
     salt = None if settings.salt is None else settings.salt.hash
-    chosen = [scene.clearance_mm, scene.physics.timestep_s, settings.careless, settings.seed, salt]
+    deciding = [scene.clearance_mm, scene.physics.timestep_s, settings.careless, settings.seed, salt]
     del pieces["arm"]
-    return _hash(json.dumps([_made_with(), sorted(pieces.items()), chosen]))
+    return _hash(json.dumps([_made_with(), sorted(pieces.items()), deciding]))
 
 
 def decides(path: str) -> bool:
@@ -117,14 +123,10 @@ def _made_with() -> str:
     return _hash(json.dumps([SCHEMA, __version__, code, versions, platform.machine(), platform.processor()]))
 
 
-def _made(settings: TrialSettings, scene: Scene) -> SimulatedDemonstration:
-    return simulate_demonstration(scene, settings.careless, settings.seed, settings.eye, settings.salt)
-
-
-def _written(key: str, made: SimulatedDemonstration) -> str:
-    human = made.demonstration
-    layout = made.layout
-    said = {
+def _written(key: str, simulated: SimulatedDemonstration) -> str:
+    human = simulated.demonstration
+    layout = simulated.layout
+    content = {
         "truth": layout.goals.tolist(),
         "start": {part: T.tolist() for part, T in layout.start.items()},
         "goals": human.goals.tolist(),
@@ -133,11 +135,11 @@ def _written(key: str, made: SimulatedDemonstration) -> str:
         "code": human.code,
         "why": human.why,
     }
-    return json.dumps({"schema": SCHEMA, "key": key, "digest": _hash(json.dumps(said)), "demonstration": said})
+    return json.dumps({"schema": SCHEMA, "key": key, "digest": _hash(json.dumps(content)), "demonstration": content})
 
 
 def _read(path: Path, key: str, scene: Scene) -> SimulatedDemonstration:
-    """What stands in a file.
+    """What stands in a file; where its digest fits, it is what `_written` wrote.
 
     Raises:
         InputError: It is another user's, damaged, or of something else.
@@ -145,50 +147,29 @@ def _read(path: Path, key: str, scene: Scene) -> SimulatedDemonstration:
     root = parse_json(read_text(path, _KIND, _LARGEST_BYTES, own=True), str(path)).fields(
         ("schema", "key", "digest", "demonstration")
     )
-    digest = _hash(json.dumps(root["demonstration"].value))
+    content = root["demonstration"].value
     for name, wanted, why in (
         ("schema", SCHEMA, f"this is no {_KIND} of this version"),
         ("key", key, "this is another demonstration, renamed"),
-        ("digest", digest, "the file is damaged"),
+        ("digest", _hash(json.dumps(content)), "the file is damaged"),
     ):
         if root[name].text() != wanted:
             raise InputError(f"{path}: {why}.")
-    said = root["demonstration"].fields(("truth", "start", "goals", "final", "careless", "code", "why"))
-    if said["code"].text() not in _CODES:
-        said["code"].fail(f"{' or '.join(_CODES)} is needed")
-    assembly = scene.scenario.assembly
-    n = len(scene.scenario.assembly)
-    layout = Layout(_poses(said["truth"], n), _named(said["start"], scene))
+    start, final = ({part: np.array(T) for part, T in content[name].items()} for name in ("start", "final"))
+    layout = Layout(np.array(content["truth"]), start)
     human = Demonstration(
-        assembly=assembly,
+        assembly=scene.scenario.assembly,
         start=layout.start,
-        goals=_poses(said["goals"], n),
-        final=_named(said["final"], scene),
-        careless=said["careless"].numbers(n, 6, 6),
-        code=said["code"].text(),
-        why=said["why"].text(),
+        goals=np.array(content["goals"]),
+        final=final,
+        careless=np.array(content["careless"]),
+        code=content["code"],
+        why=content["why"],
         gap_m=1e-3 * scene.scenario.gap_mm,
         play_m=1e-3 * scene.clearance_mm,
     )
     return SimulatedDemonstration(layout, human)
 
 
-def _named(node: JsonNode, scene: Scene) -> dict[str, Array]:
-    """Part -> its pose, (4, 4), of every part of the scenario."""
-    return {part: _poses(of) for part, of in node.fields(scene.pieces).items()}
-
-
-def _poses(node: JsonNode, *n: int) -> Array:
-    found = node.numbers(*n, 4, 4)
-    if not is_rigid(found.reshape(-1, 4, 4)).all():
-        node.fail("poses are needed")
-    return found
-
-
 def _hash(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _say(sentence: str) -> None:
-    with suppress(OSError, AttributeError):
-        sys.stderr.write(f"apo-bench: {sentence}\n")

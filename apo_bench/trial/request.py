@@ -16,12 +16,12 @@ from apo_bench.records.setting_columns import in_python
 from apo_bench.records.settings import LEVEL, RANGE, TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene
+from apo_bench.trial.kept_demonstrations import demonstration_of
 from apo_bench.trial.scene import scene_of
 from apo_bench.trial.stages import (
     SimulatedDemonstration,
     demonstration_failure,
     observe_demonstration,
-    simulate_demonstration,
 )
 from apo_bench.trial.trial import noise_of
 
@@ -129,7 +129,7 @@ def watched(request: Request) -> Observation:
     scenario = load_scenario(request.scenario)
     spec = requested_settings(request, scenario.clearance_mm)
     scene = scene_of(spec, scenario)
-    simulated = simulate_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
+    simulated = demonstration_of(spec, scene)
     if simulated.demonstration.code != "ok":
         raise RuntimeError(f"{demonstration_failure(simulated.demonstration).sentence}; try another seed")
     return look(spec, scene, simulated)

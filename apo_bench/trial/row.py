@@ -1,18 +1,26 @@
-"""A row: what was asked for, and how it ended; what only a replay can say is filled in by `trial`."""
+"""A row: what was asked for, and how it ended; what only a replay can say is filled in by `trial`.
 
+A trial always has one: where its corrector misbehaves, its process dies or its time is over, a failed one.
+"""
+
+import re
 from dataclasses import asdict
 from itertools import dropwhile
 from typing import cast
 
 from apo_bench.assembly.reached import Outcome
 from apo_bench.io.plain_text import clean
+from apo_bench.records.outcomes import sentence
 from apo_bench.records.row import LONGEST_SENTENCE, ROW_FIELDS, Row
 from apo_bench.records.setting_columns import setting_columns
 from apo_bench.records.settings import ENV_ID, ROW, TrialSettings
+from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
+from apo_bench.trial.fingerprint import spec_hash
 
-_FOUND = tuple(dropwhile(lambda column: column != "success", ROW_FIELDS))
+_OUTCOME_COLUMNS = tuple(dropwhile(lambda column: column != "success", ROW_FIELDS))
 """Columns of what came out."""
+_ADDRESS = re.compile(r"\b0x[0-9a-fA-F]+")
 
 
 def head(spec: TrialSettings, scenario: Scenario, hashed: str) -> Row:
@@ -37,4 +45,32 @@ def result(end: Outcome, *, success: bool | None) -> Row:
         "failure_operation": None if end.operation is None else end.operation + 1,
         "sentence": clean(end.sentence)[:LONGEST_SENTENCE],
     }
-    return cast(Row, dict.fromkeys(_FOUND)) | known
+    return cast(Row, dict.fromkeys(_OUTCOME_COLUMNS)) | known
+
+
+def lost(spec: TrialSettings, content: str, code: str, what: str = "trial") -> Row:
+    """The failed row of a trial whose process, or that of its corrector, died (`worker_died`) or took too long.
+
+    Nothing is compiled for it, and it says nothing of wall times, so that it is the same wherever it happens.
+
+    Args:
+        content: From the lock of the sweep: `lock.content[spec.scenario]`.
+        code: `worker_died` or `time_limit`.
+        what: Whose process died or whose limit it was: `trial` or `corrector`.
+    """
+    return _failed(spec, content, None, Outcome("worker", code, None, sentence(code, what=what)))
+
+
+def misbehaved(spec: TrialSettings, content: str, demonstration: str, why: str) -> Row:
+    """The failed row of a trial whose corrector raised an error or returned what it must not.
+
+    Args:
+        why: What it did; addresses of objects, which differ from run to run, are left out.
+    """
+    why = _ADDRESS.sub("0x...", why.encode(errors="replace").decode())
+    return _failed(spec, content, demonstration, Outcome("correct", "raised", None, why))
+
+
+def _failed(spec: TrialSettings, content: str, demonstration: str | None, end: Outcome) -> Row:
+    settings = head(spec, load_scenario(spec.scenario), spec_hash(spec, content))
+    return settings | {"demonstration": demonstration} | result(end, success=False)

@@ -21,14 +21,14 @@ from apo_bench.simulation.film.film import write_film
 from apo_bench.simulation.film.track import FilmTrack
 from apo_bench.simulation.scene.graphics import renderer
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.trial.failed_row import lost, trial_row
 from apo_bench.trial.fingerprint import content_hash, spec_hash
-from apo_bench.trial.kept_demonstrations import KeptDemonstrations
+from apo_bench.trial.kept_demonstrations import KeptDemonstrations, demonstration_of
 from apo_bench.trial.request import Request, look, requested_settings
+from apo_bench.trial.row import lost
 from apo_bench.trial.scene import scene_of
-from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
-from apo_bench.trial.story import Story, told
-from apo_bench.trial.trial import MEASURED, run_measured
+from apo_bench.trial.stages import SimulatedDemonstration
+from apo_bench.trial.story import Story, trial_story
+from apo_bench.trial.trial import MEASURED, run_measured, trial_row
 
 Say = Callable[..., None]
 Show = Callable[[Story], None]
@@ -91,14 +91,14 @@ def _run_by(method: Any, request: Request, spec: TrialSettings, say: Say, show: 
         seen = read_stated(request.observation, scene.scenario)
         row = _measured(request.observation, seen, spec, scene, method, watch)
     else:
-        simulated = _simulated(request, spec, scene)
+        simulated = demonstration_of(spec, scene, KeptDemonstrations(request.cache) if request.cache else None)
         row = _drawn(request, spec, scene, simulated, method, watch)
         if track is not None and row["sim_seconds"] is not None:
             seen = look(spec, scene, simulated)
     say("row", row)
     if track is None or seen is None or row["sim_seconds"] is None:
         return
-    story = told(spec, scene, seen, track, row, simulated)
+    story = trial_story(spec, scene, seen, track, row, simulated)
     if request.video:
         write_film(scene.scenario.assembly, story.assembled, story.chapters, request.video)
     if show is not None:
@@ -117,12 +117,6 @@ def lost_request(request: Request, spec: TrialSettings, scenario: Scenario, code
         return row
     text = read_text(request.observation, "observation file")
     return row | {"spec_hash": spec_hash(spec, content, text), **MEASURED}
-
-
-def _simulated(request: Request, spec: TrialSettings, scene: Scene) -> SimulatedDemonstration:
-    if request.cache is None:
-        return simulate_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
-    return KeptDemonstrations(request.cache).simulated(spec, scene)
 
 
 def _drawn(

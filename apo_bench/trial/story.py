@@ -43,7 +43,7 @@ def scenario_story(scene: Scene) -> Story:
     return Story(scene, (chapter,), placements(scene.scenario.assembly, layout.start, layout.goals)[-1])
 
 
-def told(
+def trial_story(
     spec: TrialSettings,
     scene: Scene,
     seen: Observation,

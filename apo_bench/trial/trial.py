@@ -1,37 +1,31 @@
 """One trial as one row: demonstrated, observed, planned by a method, replayed, judged."""
 
-from __future__ import annotations
-
-import math
-from collections.abc import Iterable
 from typing import Any, cast
 
-import numpy as np
-
-from apo_bench.assembly.goals import Observation, Plan
-from apo_bench.assembly.reached import InHand, Snapshot
+from apo_bench.assembly.goals import Observation
+from apo_bench.correction.correctors import CorrectorMisbehaved
+from apo_bench.correction.own_code.own import CorrectorLost
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.observation.relations import make_relations, with_relations
 from apo_bench.records.method import knows_relations, knows_truth, parsed
 from apo_bench.records.relations import RECOGNISED
-from apo_bench.records.row import MovedInHand, Row, finite
+from apo_bench.records.row import Row
+from apo_bench.records.run.checked import unwritable
 from apo_bench.records.settings import RANGE, TrialSettings
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.trial.confidence import confidence
+from apo_bench.trial.by_heart import nominal_where_seen
 from apo_bench.trial.fingerprint import content_hash, spec_hash
+from apo_bench.trial.outcome_columns import confidence_columns, method_columns, replay_columns
 from apo_bench.trial.planning import MethodResult, apply_method
-from apo_bench.trial.pose_error import pose_errors
 from apo_bench.trial.recognised_contacts import count_contacts, with_recognised_contacts
-from apo_bench.trial.row import head, result
+from apo_bench.trial.row import head, lost, misbehaved, result
 from apo_bench.trial.scene import scene_of
 from apo_bench.trial.stages import (
     RELATIONS,
-    Attempt,
     SimulatedDemonstration,
     demonstration_failure,
     draw_robot_error,
@@ -78,16 +72,40 @@ def run_trial(
         scene, settings.careless, settings.seed, settings.eye, settings.salt
     )
     content = content or content_hash(scene.scenario, settings.scenario, scene.arm.files)
-    asked = head(settings, scene.scenario, spec_hash(settings, content))
-    asked |= {"demonstration": simulated.demonstration.code}
+    first = head(settings, scene.scenario, spec_hash(settings, content))
+    first |= {"demonstration": simulated.demonstration.code}
     if simulated.demonstration.code != "ok":
-        return asked | result(demonstration_failure(simulated.demonstration), success=None)
+        return first | result(demonstration_failure(simulated.demonstration), success=None)
     truth = simulated.layout.goals
     noise = noise_of(settings, scene, simulated)
     observation = observe_demonstration(simulated, noise, settings.seed, settings.salt)
-    given = _corrector_input(settings, observation, truth)
-    look = looks_at(simulated, noise, settings.seed, settings.looks, settings.salt, given.assembly)
-    return asked | _row(settings, scene, observation, given, truth, truth, method, watch, cache, look)
+    corrector_input = _corrector_input(settings, observation, truth)
+    look = looks_at(simulated, noise, settings.seed, settings.looks, settings.salt, corrector_input.assembly)
+    return first | _row(settings, scene, observation, corrector_input, truth, truth, method, watch, cache, look)
+
+
+def trial_row(spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration, content: str, **more: Any) -> Row:
+    """The row of a trial, also of one whose corrector misbehaved.
+
+    What code of somebody's own returned may be what no row can hold; that is its failure too.
+
+    Args:
+        more: Further arguments of `run_trial`.
+
+    Raises:
+        InputError: The request cannot be honoured.
+    """
+    try:
+        row = run_trial(spec, scene, simulated=simulated, content=content, **more)
+        wrong = unwritable(row) if ":" in spec.method else ""
+        if not wrong:
+            return row
+        why = f"the corrector '{spec.method}' returned what no row can hold ({wrong})"
+    except CorrectorLost as error:
+        return lost(spec, content, error.code, "corrector")
+    except CorrectorMisbehaved as error:
+        why = str(error)
+    return misbehaved(spec, content, simulated.demonstration.code, why)
 
 
 def noise_of(settings: TrialSettings, scene: Scene, simulated: SimulatedDemonstration) -> Noise:
@@ -124,26 +142,17 @@ def run_measured(
             "or paper."
         )
     content = content_hash(scene.scenario, settings.scenario, scene.arm.files)
-    asked = head(settings, scene.scenario, spec_hash(settings, content, text)) | MEASURED | {"demonstration": "ok"}
+    first = head(settings, scene.scenario, spec_hash(settings, content, text)) | MEASURED | {"demonstration": "ok"}
     reference = nominal_where_seen(scene.scenario.goals, observation)
-    given = _corrector_input(settings, observation, None)
-    return asked | _row(settings, scene, observation, given, reference, None, method, watch, None, None)
-
-
-def nominal_where_seen(nominal: Array, observation: Observation) -> Array:
-    """The nominal goals (n, 4, 4) shifted and turned on the table to where the first operation was seen."""
-    k = int(np.argmax(observation.seen))
-    T = observation.goals[k] @ pose.inverse(nominal[k])
-    flat = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, float(np.degrees(np.arctan2(T[1, 0], T[0, 0])))))
-    flat[:2, 3] = (observation.goals[k] - flat @ nominal[k])[:2, 3]
-    return np.asarray(flat @ nominal)
+    corrector_input = _corrector_input(settings, observation, None)
+    return first | _row(settings, scene, observation, corrector_input, reference, None, method, watch, None, None)
 
 
 def _row(
     settings: TrialSettings,
     scene: Scene,
     observation: Observation,
-    given: Observation,
+    corrector_input: Observation,
     reference: Array,
     truth: Array | None,
     method: Any,
@@ -154,16 +163,17 @@ def _row(
     """What the method made of the observation, and what came of its plan.
 
     Args:
-        given: What a corrector gets in its place.
+        corrector_input: What a corrector gets in place of the observation.
         reference: (n, 4, 4) goals that are right for the judge.
         truth: (n, 4, 4) goals of the layout; None if they are not known.
     """
-    made = apply_method(method or parsed(settings.method).plan, observation, truth, given, look, scene)
-    row = _outcome(settings, scene, made, reference, truth, watch, cache) | confidence(made, observation, given, truth)
-    if made.correction is not None:
+    planned = apply_method(method or parsed(settings.method).plan, observation, truth, corrector_input, look, scene)
+    row = _outcome(settings, scene, planned, reference, truth, watch, cache)
+    row |= confidence_columns(planned, observation, corrector_input, truth)
+    if planned.correction is not None:
         row |= {"seen_again": look.seen_again if look else 0}
     if knows_relations(settings.method):
-        row |= cast(Row, count_contacts(observation.assembly, given.assembly))
+        row |= cast(Row, count_contacts(observation.assembly, corrector_input.assembly))
     return row
 
 
@@ -182,89 +192,20 @@ def _corrector_input(settings: TrialSettings, observation: Observation, truth: A
 def _outcome(
     settings: TrialSettings,
     scene: Scene,
-    made: MethodResult,
+    planned: MethodResult,
     reference: Array,
     truth: Array | None,
     watch: Any,
     cache: ReplayCache | None,
 ) -> Row:
     """Carry out the plan, if there is one."""
-    if made.plan is None:
-        assert made.failure is not None
-        return result(made.failure, success=False) | _correction(made)
+    if planned.plan is None:
+        assert planned.failure is not None
+        return result(planned.failure, success=False) | method_columns(planned)
     searches = parsed(settings.method).searches
-    predicted: Row = {"predicted": predicted_outcome(made.plan, scene, searches)}
+    predicted: Row = {"predicted": predicted_outcome(planned.plan, scene, searches)}
     error = draw_robot_error(settings.robot_error, scene, settings.seed, settings.salt)
-    attempt = replay_and_judge(made.plan, scene, reference, watch, settings.fidelity, cache, searches, error=error)
+    attempt = replay_and_judge(planned.plan, scene, reference, watch, settings.fidelity, cache, searches, error=error)
     end = result(trial_outcome(attempt), success=attempt.verdict.success)
     driven: Row = {"joint_control": scene.arm.control}
-    return end | _correction(made) | predicted | driven | _physics(attempt, made.plan, truth)
-
-
-def _correction(made: MethodResult) -> Row:
-    """What the method did, and what carrying it out would take beyond doing every operation once."""
-    extra = None if made.plan is None else len(made.plan.schedule) - len(made.plan.assembly)
-    moved = None if made.fitting is None else made.fitting.moves
-    freed, tried = ((), ()) if made.correction is None else (made.correction.freed, made.correction.tried)
-    return {
-        "freed": _numbers(freed),
-        "tried": [{"step": int(step) + 1, "free": _numbers(free), "gap_mm": _mm(gap_m)} for step, free, gap_m in tried],
-        "extra_operations": extra,
-        "free_moved": None if moved is None else [{"operation": k + 1, "mm": mm, "deg": deg} for k, mm, deg in moved],
-        "gap_before_mm": _mm(made.gap_before_m),
-        "gap_after_mm": _mm(made.gap_after_m),
-    }
-
-
-def _numbers(operations: Iterable[int]) -> list[int]:
-    """Counted from 1, as whole numbers that JSON can hold."""
-    return [int(k) + 1 for k in operations]
-
-
-def _physics(attempt: Attempt, plan: Plan, truth: Array | None) -> Row:
-    result = attempt.result
-    verdict = attempt.verdict
-    fixed = None
-    free = None
-    if truth is not None:
-        fixed, free = pose_errors(plan.assembly, plan.start, truth, result.reached)
-    found = verdict.rests_on
-    return {
-        "as_demonstrated": verdict.as_demonstrated,
-        "as_demonstrated_code": verdict.demonstrated.code,
-        "loose_success": verdict.loose_success,
-        "conditions": dict(found.conditions),
-        "worst_gap_mm": finite(found.gap_mm),
-        "worst_angle_deg": finite(found.angle_deg),
-        "least_overlap": finite(found.overlap),
-        "penetration_mm": finite(found.penetration_mm),
-        "pushed_mm": finite(found.pushed_mm),
-        "reached": _poses(result.reached.final),
-        "pose_error_fixed_mm": finite(fixed),
-        "pose_error_free_mm": finite(free),
-        "peak_force_n": finite(result.peak_force_n),
-        "moved_in_hand": [_moved(each) for each in result.in_hand],
-        "sim_seconds": result.sim_seconds,
-    }
-
-
-def _moved(each: InHand) -> MovedInHand:
-    return {
-        "operation": each.operation + 1,
-        "carried_mm": 1e3 * each.carried_m,
-        "carried_deg": math.degrees(each.carried_rad),
-        "mm": 1e3 * each.moved_m,
-        "deg": math.degrees(each.moved_rad),
-    }
-
-
-def _poses(final: Snapshot | None) -> dict[str, list[float]] | None:
-    """Part -> [x, y, z in mm, qw, qx, qy, qz], world frame."""
-    if final is None:
-        return None
-    packed = {part: pose.pack(T) for part, T in final.poses.items()}
-    return {part: [*(p[:3] * 1e3).tolist(), *p[3:].tolist()] for part, p in packed.items()}
-
-
-def _mm(metres: float) -> float | None:
-    return finite(metres * 1e3)
+    return end | method_columns(planned) | predicted | driven | replay_columns(attempt, planned.plan, truth)

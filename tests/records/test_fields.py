@@ -14,7 +14,7 @@ from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.sweeps.worker import timing
-from apo_bench.trial.failed_row import lost, misbehaved
+from apo_bench.trial.row import lost, misbehaved
 from apo_bench.trial.trial import run_trial
 
 SPEC = TrialSettings("block_on_block", level_mm=3.0, level_deg=2.0, method="paper", seed=2)
@@ -71,15 +71,15 @@ def test_what_every_row_says_is_needed(name: str, made: list[dict[str, Any]]) ->
 
 
 def test_a_corrector_that_returns_what_no_row_holds_has_failed(monkeypatch: pytest.MonkeyPatch) -> None:
-    from apo_bench.trial import failed_row
+    from apo_bench.trial import trial
     from apo_bench.trial.stages import simulate_demonstration
 
     scene = build_scene(load_scenario("block_on_block"))
     shown = simulate_demonstration(scene, SPEC.careless, SPEC.seed)
     right = run_trial(SPEC, scene, simulated=shown)
-    monkeypatch.setattr(failed_row, "run_trial", lambda *_, **__: right | {"p_value": 7.0})
+    monkeypatch.setattr(trial, "run_trial", lambda *_, **__: right | {"p_value": 7.0})
     mine = TrialSettings("block_on_block", method="mine:correct")
-    row = failed_row.trial_row(mine, scene, shown, "0")
+    row = trial.trial_row(mine, scene, shown, "0")
     assert (row["failure_stage"], row["failure_code"]) == ("correct", "raised")
     assert "returned what no row can hold (field p_value:" in row["sentence"]
 

@@ -10,7 +10,7 @@ from apo_bench.sweeps.dispatch import STARTING_S, Dispatch, Job
 from apo_bench.sweeps.environment_lock import EnvironmentLock, versions
 from apo_bench.sweeps.grid import Unit
 from apo_bench.sweeps.worker import in_time, timing
-from apo_bench.trial.failed_row import lost, misbehaved
+from apo_bench.trial.row import lost, misbehaved
 
 LIMIT_S = 10.0
 TRIAL = TrialSettings("block_on_block", method="none")

@@ -36,8 +36,8 @@ from apo_bench.sweeps.local.pool import FALSE_STARTS, spread
 from apo_bench.sweeps.stopping import Stopped, listening
 from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.sweeps.worker import Worker
-from apo_bench.trial.failed_row import lost, misbehaved
 from apo_bench.trial.fingerprint import content_hash
+from apo_bench.trial.row import lost, misbehaved
 from tests import pages
 
 CODE = """

