@@ -19,11 +19,7 @@ Each card says, under *What it asks for*, how often the [methods](methods.md) su
 and degrees (`by-heart` at 4, too), the same seeds for every method; `apo-bench sweep benchmarks/baselines.toml --out
 FOLDER`, then `python benchmarks/baselines.py FOLDER` and `python docs/cards.py`. `snap` puts each part onto its newest
 contacts: where it is enough, neither loops of contacts nor history matter. `by-heart` builds the assembly of the
-scenario's file: where that is enough, no layout asks for more than one assembly that is right in itself.
-
-*The counts were made with the code of 9fbacb0 and the scenarios as they are, but for a second contact of the roof with
-the fence in `wedge_under_roof`. Since then the rule of how far parts that fit may be apart has changed, and the arm
-feels fixed parts while bodies sleep.*"""
+scenario's file: where that is enough, no layout asks for more than one assembly that is right in itself."""
 
 
 def asks(scenario: Scenario, counts: Mapping[Place, Count]) -> str:
