@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from apo_bench.cli.app import main
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.recording.log import MOST_ROWS
+from apo_bench.recording.log import MOST_POSES
 from benchmarks.recording_demos import Errors, first_places, tracked, watched
 from benchmarks.recording_forms import Tracked, camera_text, known_text, objects_text
 
@@ -194,7 +194,7 @@ def refusals() -> Iterator[tuple[str, str]]:
         yield "bytes that are no text", _refused(right, "bytes", "noise.csv")
         with Path("huge.csv").open("w", encoding="utf-8") as stream:
             stream.write(HEAD + "\n")
-            stream.writelines(f"{i / 1e3:.3f},11,0,0,900,1,0,0,0\n" for i in range(MOST_ROWS + 1))
+            stream.writelines(f"{i / 1e3:.3f},11,0,0,900,1,0,0,0\n" for i in range(MOST_POSES + 1))
         yield "a million rows and one", _refused(right, "huge", "huge.csv")
         yield "another format", _refused(right, "format", form="tum")
 

@@ -23,7 +23,7 @@ from apo_bench.geometry import pose
 from apo_bench.judging.verdict import judge
 from apo_bench.recording.camera_file import read_camera
 from apo_bench.recording.formats import read_log
-from apo_bench.recording.importing import Imported, import_recording
+from apo_bench.recording.importing import ImportedRecording, import_recording
 from apo_bench.recording.objects_file import part_tracks, read_objects
 from apo_bench.recording.ordering import Stated
 from apo_bench.simulation.execution.controller import replay
@@ -75,7 +75,7 @@ class Result(NamedTuple):
     ended: str
 
 
-def imported(truth: Truth, form: Form, errors: Errors, seed: int) -> Imported:
+def imported(truth: Truth, form: Form, errors: Errors, seed: int) -> ImportedRecording:
     """What `recording import` makes of the files of one recording."""
     _, found = tracked(truth, errors, np.random.default_rng([seed, 9]))
     with tempfile.TemporaryDirectory() as name:
@@ -87,7 +87,7 @@ def imported(truth: Truth, form: Form, errors: Errors, seed: int) -> Imported:
     return import_recording(tracks, camera, truth.scene.scenario, Stated(), "log", objects.models)
 
 
-def carried_out(truth: Truth, found: Imported, method: str) -> tuple[bool, str]:
+def carried_out(truth: Truth, found: ImportedRecording, method: str) -> tuple[bool, str]:
     """Whether the corrected plan of one recording succeeds, and what ended it."""
     made = apply_method(method, found.observation, None, where=truth.scene)
     if made.plan is None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.recording.log import Track
+from apo_bench.recording.log import PoseTrack
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import layout_at
 
@@ -39,13 +39,13 @@ def motion(name: str) -> tuple[Array, Mapping[str, Array]]:
     return t, {part: np.array([frame[part] for frame in frames]) for part in now}
 
 
-def seen(name: str, level: float, seed: int = 0) -> dict[str, Track]:
+def seen(name: str, level: float, seed: int = 0) -> dict[str, PoseTrack]:
     """The tracks of a camera with this noise of each frame, mm and degrees, camera from part."""
     t, T = motion(name)
     rng = np.random.default_rng(seed)
     size = level * np.repeat([1e-3, np.radians(1.0)], 3)
     return {
-        part: Track(t, pose.inverse(CAMERA) @ x @ pose.exp(size * rng.standard_normal((len(t), 6))))
+        part: PoseTrack(t, pose.inverse(CAMERA) @ x @ pose.exp(size * rng.standard_normal((len(t), 6))))
         for part, x in T.items()
     }
 

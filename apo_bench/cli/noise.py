@@ -120,7 +120,7 @@ def noise_still(
     from apo_bench.observation.fitting import fit
     from apo_bench.recording.camera_file import read_camera
     from apo_bench.recording.formats import read_log
-    from apo_bench.recording.still import still_residuals
+    from apo_bench.recording.still_noise import still_residuals
     from apo_bench.show.fit_text import fit_lines
 
     check_outputs([(out, "--out", (".toml",)), (picture, "--picture", (".png",))], (camera,))

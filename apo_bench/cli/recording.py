@@ -46,19 +46,18 @@ def recording_import(
     tracks = part_tracks(read, named)
     print_lines(reading_lines(read, named))
     if scenario is None:
-        _import_bare(read, named, stated, tracks, out, picture)
+        _import_unplanned(read, named, stated, tracks, out, picture)
     else:
         _import(read, named, stated, tracks, scenario, (ends, unseen), (out, picture, paths))
 
 
 def _import(
-    log: Any, objects: Any, camera: Any, tracks: Any, scenario: str, said: tuple[str | None, str | None], files: Any
+    log: Any, objects: Any, camera: Any, tracks: Any, scenario: str, order: tuple[str | None, str | None], files: Any
 ) -> None:
     from apo_bench.io.tables import write_csv
-    from apo_bench.recording.bare import deviations
     from apo_bench.recording.importing import import_recording
     from apo_bench.recording.show.drawing import draw_recording
-    from apo_bench.recording.show.drawn import drawing_of, unfit_drawing
+    from apo_bench.recording.show.drawing_content import drawing_of, unfit_drawing
     from apo_bench.recording.show.text import (
         PATH_HEAD,
         camera_lines,
@@ -67,62 +66,61 @@ def _import(
         path_rows,
         rest_lines,
     )
+    from apo_bench.recording.without_scenario import deviations
     from apo_bench.scenario.file import load_scenario
 
     out, picture, paths = files
     loaded = load_scenario(scenario)
-    stated = _stated(*said, len(loaded.assembly))
+    stated = _stated(*order, len(loaded.assembly))
     try:
-        found = import_recording(tracks, camera, loaded, stated, log.file, objects.models)
+        imported = import_recording(tracks, camera, loaded, stated, log.file, objects.models)
     except InputError:
         if picture is not None:
             draw_recording(unfit_drawing(log, tracks, camera, loaded), picture)
             typer.echo(f"Wrote {picture}, as it was read")
         raise
     mains = [operation.main for operation in loaded.assembly.operations]
-    rests = [one.rest for one in found.operations]
-    X = found.camera.T_world_camera
+    rests = [operation.rest for operation in imported.operations]
+    X = imported.camera.T_world_camera
     times = {part: track.t for part, track in tracks.items()}
-    print_lines(camera_lines(found.camera))
+    print_lines(camera_lines(imported.camera))
     typer.echo("\n" + "\n".join(rest_lines(list(zip(mains, rests, strict=True)), X, times)) + "\n")
-    print_lines(imported_lines(found))
+    print_lines(imported_lines(imported))
     if out.suffix.lower() == ".json":
         from apo_bench.files.json_forms import observation_form, write_form
 
         name = scenario if scenario == loaded.name else str(Path(scenario).resolve())
-        write_form(observation_form(found.observation, name), out)
+        write_form(observation_form(imported.observation, name), out)
     else:
         off = [(1.0, 1.0) if rest is None else deviations(rest, camera) for rest in rests]
-        _write(out, observation_table(mains, found.observation.goals, off, [rest is not None for rest in rests]))
+        _write(out, observation_table(mains, imported.observation.goals, off, [rest is not None for rest in rests]))
     typer.echo(f"\nWrote {out}")
     if paths is not None:
-        write_csv(paths, PATH_HEAD, path_rows(found))
+        write_csv(paths, PATH_HEAD, path_rows(imported))
         typer.echo(f"Wrote {paths}")
     if picture is not None:
-        draw_recording(drawing_of(found, log, tracks, camera), picture)
+        draw_recording(drawing_of(imported, log, tracks, camera), picture)
         typer.echo(f"Wrote {picture}")
 
 
-def _import_bare(log: Any, objects: Any, camera: Any, tracks: Any, out: Path, picture: Path | None) -> None:
-    from apo_bench.recording.bare import bare_recording, deviations, goals_of
+def _import_unplanned(log: Any, objects: Any, camera: Any, tracks: Any, out: Path, picture: Path | None) -> None:
     from apo_bench.recording.show.drawing import draw_recording
-    from apo_bench.recording.show.drawn import bare_drawing
+    from apo_bench.recording.show.drawing_content import unplanned_drawing
     from apo_bench.recording.show.text import camera_lines, observation_table, put_lines, rest_lines
+    from apo_bench.recording.without_scenario import deviations, goals_of, unplanned_recording
 
-    found = bare_recording(tracks, camera, log.file)
-    parts = [put.part for put in found.puts]
-    rests = [put.rest for put in found.puts]
-    X = found.camera.T_world_camera
+    recording = unplanned_recording(tracks, camera, log.file)
+    parts = [put.part for put in recording.puts]
+    rests = [put.rest for put in recording.puts]
+    X = recording.camera.T_world_camera
     times = {part: track.t for part, track in tracks.items()}
-    print_lines(camera_lines(found.camera))
-    typer.echo("\n" + "\n".join([*rest_lines(list(zip(parts, rests, strict=True)), X, times), *put_lines(found)]))
-    _write(
-        out,
-        observation_table(parts, goals_of(found), [deviations(rest, camera) for rest in rests], [True] * len(rests)),
-    )
+    print_lines(camera_lines(recording.camera))
+    typer.echo("\n" + "\n".join([*rest_lines(list(zip(parts, rests, strict=True)), X, times), *put_lines(recording)]))
+    off = [deviations(rest, camera) for rest in rests]
+    _write(out, observation_table(parts, goals_of(recording), off, [True] * len(rests)))
     typer.echo(f"\nWrote {out}")
     if picture is not None:
-        draw_recording(bare_drawing(found, log, tracks), picture)
+        draw_recording(unplanned_drawing(recording, log, tracks), picture)
         typer.echo(f"Wrote {picture}")
 
 

@@ -120,6 +120,15 @@ def unpack(pose: ArrayLike) -> Array:
     return T
 
 
+def nearest_rotations(R: Array) -> Array:
+    """The matrices of orthonormal columns that are nearest to matrices (n, 3, 3), in the sense of least squares.
+
+    With R = U S V^t, U V^t minimises the sum of squared differences among all orthonormal matrices (Schoenemann, 1966).
+    """
+    U, _, Vt = np.linalg.svd(R)
+    return np.asarray(U @ Vt)
+
+
 def is_rigid(T: ArrayLike) -> NDArray[np.bool_]:
     """Whether each matrix, (n, 4, 4), is a proper rigid displacement, -> (n,); numbers that are not finite are not."""
     T = np.asarray(T, dtype=np.float64)

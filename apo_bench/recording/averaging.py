@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
-FLOOR = np.repeat([2e-5, 2e-4], 3)
+_FRAME_FLOOR = np.repeat([2e-5, 2e-4], 3)
 """No axis of one frame is surer than this, [m, rad]: what a file with rounded numbers can say."""
-FLOOR.flags.writeable = False
+_FRAME_FLOOR.flags.writeable = False
 _FAR = 5.0
 """A frame that is farther off, in standard deviations of any axis, is an outlier: 1 in 300,000 by chance."""
 _ROUNDS = 12
@@ -47,6 +47,7 @@ def average(T: Array) -> Mean:
     """
     middle = _middle(T)
     inlier = np.ones(len(T), dtype=np.bool_)
+    # The mean on SE(3) by Gauss-Newton: go by the mean of the twists to all inliers until it is zero.
     for _ in range(_ROUNDS):
         xi = pose.log(pose.inverse(middle) @ T)
         inlier = _near(xi)
@@ -55,19 +56,20 @@ def average(T: Array) -> Mean:
         if np.abs(step).max() < 1e-10:
             break
     xi = pose.log(pose.inverse(middle) @ T)[inlier]
-    return Mean(middle, _scatter(xi), inlier, _independent(xi))
+    return Mean(middle, xi.T @ xi / max(len(xi) - 1, 1), inlier, _independent(xi))
 
 
-def pooled(mean: Mean, others: Array) -> Mean:
+def pooled_mean(mean: Mean, others: Array) -> Mean:
     """The mean with a covariance that also knows the frames of other rests.
 
     Args:
         others: (6, 6), covariance of one frame there, in the axes of the camera, as few frames say little.
     """
+    # The mean of two covariances, weighted by degrees of freedom: that of an inverse Wishart prior of _PRIOR frames.
     n = float(mean.inlier.sum())
     A = _axes(mean.T)
     scatter = ((n - 1.0) * mean.scatter + _PRIOR * A.T @ others @ A) / (n - 1.0 + _PRIOR)
-    return Mean(mean.T, scatter + np.diag(FLOOR**2), mean.inlier, mean.independent)
+    return Mean(mean.T, scatter + np.diag(_FRAME_FLOOR**2), mean.inlier, mean.independent)
 
 
 def common_scatter(means: list[Mean]) -> Array:
@@ -79,7 +81,7 @@ def common_scatter(means: list[Mean]) -> Array:
         A = _axes(mean.T)
         total += n * A @ mean.scatter @ A.T
         frames += n
-    return total / max(frames, 1.0) + np.diag(FLOOR**2)
+    return total / max(frames, 1.0) + np.diag(_FRAME_FLOOR**2)
 
 
 def _axes(T: Array) -> Array:
@@ -103,13 +105,9 @@ def _middle(T: Array) -> Array:
 def _near(xi: Array) -> NDArray[np.bool_]:
     """Which frames are no outliers: at least half of them, since few frames say little of their spread."""
     off = np.abs(xi - np.median(xi, axis=0))
-    spread = np.maximum(_MAD * np.median(off, axis=0), FLOOR)
-    worst = (off / spread).max(axis=1)
+    deviation = np.maximum(_MAD * np.median(off, axis=0), _FRAME_FLOOR)
+    worst = (off / deviation).max(axis=1)
     return np.asarray(worst <= max(_FAR, float(np.median(worst))))
-
-
-def _scatter(xi: Array) -> Array:
-    return np.asarray(xi.T @ xi / max(len(xi) - 1, 1))
 
 
 def _independent(xi: Array) -> float:

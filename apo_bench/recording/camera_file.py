@@ -1,10 +1,10 @@
 """CAMERA.toml: how a log is written, where its camera stands, and what of its error stays while a part rests."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Literal, final
+from typing import Any, Literal, final
 
 import numpy as np
 
@@ -14,9 +14,9 @@ from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.scenario.keys import read_any_pose, refuse
 
 _SCHEMA = "apo-bench/camera/1"
-LENGTHS = MappingProxyType({"mm": 1e-3, "cm": 1e-2, "m": 1.0})
-ANGLES = MappingProxyType({"deg": np.pi / 180.0, "rad": 1.0})
-TIMES = MappingProxyType({"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9})
+LENGTH_UNITS = MappingProxyType({"mm": 1e-3, "cm": 1e-2, "m": 1.0})
+ANGLE_UNITS = MappingProxyType({"deg": np.pi / 180.0, "rad": 1.0})
+TIME_UNITS = MappingProxyType({"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9})
 
 
 @final
@@ -75,44 +75,40 @@ def read_camera(path: str | Path) -> CameraFile:
 
 
 def _conventions(node: JsonNode) -> Conventions:
-    texts = {
-        "length": tuple(LENGTHS),
-        "angle": tuple(ANGLES),
-        "time": tuple(TIMES),
-        "quaternion": ("wxyz", "xyzw"),
-        "mirror": ("x", "y", "z"),
+    readers: Mapping[str, Callable[[JsonNode], Any]] = {
+        "length": _one_of(LENGTH_UNITS),
+        "angle": _one_of(ANGLE_UNITS),
+        "time": _one_of(TIME_UNITS),
+        "quaternion": _one_of(("wxyz", "xyzw")),
+        "mirror": _one_of("xyz"),
+        "euler": _euler,
+        "rate_hz": lambda rate: rate.number(0.0, 1e6, above=True),
+        "scene": JsonNode.integer,
+        "inverted": JsonNode.flag,
+        "columns": _columns,
     }
-    keys = node.fields((), (*texts, "euler", "rate_hz", "scene", "inverted", "columns"))
-    found: dict[str, object] = {}
-    for key, allowed in texts.items():
-        if key in keys:
-            if keys[key].text() not in allowed:
-                keys[key].fail(f"{' or '.join(allowed)} is needed")
-            found[key] = keys[key].text()
-    if "euler" in keys:
-        found["euler"] = _euler(keys["euler"])
-    if "rate_hz" in keys:
-        found["rate_hz"] = keys["rate_hz"].number(0.0, 1e6, above=True)
-    if "scene" in keys:
-        found["scene"] = keys["scene"].integer()
-    if "inverted" in keys:
-        found["inverted"] = keys["inverted"].flag()
-    if "columns" in keys:
-        if not isinstance(keys["columns"].value, dict):
-            keys["columns"].fail('a table is needed, such as { id = "body" }')
-        names = keys["columns"].value
-        found["columns"] = {keys["columns"].child(theirs, ours).text().lower(): ours for ours, theirs in names.items()}
-    return Conventions(**found)  # type: ignore[arg-type]
+    return Conventions(**{key: readers[key](value) for key, value in node.fields((), readers).items()})
+
+
+def _one_of(allowed: Iterable[str]) -> Callable[[JsonNode], str]:
+    def read(node: JsonNode) -> str:
+        if node.text() not in tuple(allowed):
+            node.fail(f"{' or '.join(allowed)} is needed")
+        return node.text()
+
+    return read
+
+
+def _columns(node: JsonNode) -> Mapping[str, str]:
+    if not isinstance(node.value, dict):
+        node.fail('a table is needed, such as { id = "body" }')
+    return {node.child(theirs, ours).text().lower(): ours for ours, theirs in node.value.items()}
 
 
 def _euler(node: JsonNode) -> str:
     text = node.text()
-    if (
-        len(text) != 3
-        or not (set(text) <= set("xyz") or set(text) <= set("XYZ"))
-        or text[0] == text[1]
-        or text[1] == text[2]
-    ):
+    one_frame = set(text) <= set("xyz") or set(text) <= set("XYZ")
+    if len(text) != 3 or not one_frame or text[0] == text[1] or text[1] == text[2]:
         node.fail("three axes are needed: small letters about fixed axes, such as xyz, capitals about moving ones")
     return text
 
@@ -120,16 +116,15 @@ def _euler(node: JsonNode) -> str:
 def _known(node: JsonNode) -> Mapping[str, Array | None]:
     if not isinstance(node.value, dict) or not node.value:
         node.fail('parts that stand still are needed, such as castle1 = "start"')
-    found: dict[str, Array | None] = {}
-    for part, value in node.value.items():
-        child = node.child(value, part)
-        if isinstance(value, str):
-            if value != "start":
-                child.fail(unknown("place", value, ("start",)).rstrip(".") + '; "start" or a pose is needed')
-            found[part] = None
-        else:
-            found[part] = read_any_pose(child)
-    return found
+    return {part: _place(node.child(value, part)) for part, value in node.value.items()}
+
+
+def _place(node: JsonNode) -> Array | None:
+    if not isinstance(node.value, str):
+        return read_any_pose(node)
+    if node.value != "start":
+        node.fail(unknown("place", node.value, ("start",)).rstrip(".") + '; "start" or a pose is needed')
+    return None
 
 
 def _stays(node: JsonNode) -> Array:

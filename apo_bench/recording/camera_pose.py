@@ -54,10 +54,11 @@ def solve_camera(known: Mapping[str, Array], seen: Mapping[str, Mean], stays: Ar
     K = np.array([known[p] for p in parts])
     M = np.array([seen[p].T for p in parts])
     W = np.array([np.linalg.inv(seen[p].covariance + stays + np.diag(_PLACED**2)) for p in parts])
+    # Normal equations of r + A d = 0, the sum of A^t W A over parts; A hardly depends on X.
     A = pose.adjoint(pose.inverse(M))
     normal = np.einsum("kji,kjl,klm->im", A, W, A)
-    start = min((K @ pose.inverse(M)), key=lambda X: _cost(_residuals(X, K, M), W))
-    X = start
+    # Each part alone says X = K M^-1; the one that fits all of them best is where Gauss-Newton begins.
+    X = min((K @ pose.inverse(M)), key=lambda X: _cost(_residuals(X, K, M), W))
     for _ in range(_ROUNDS):
         r = _residuals(X, K, M)
         step = -np.linalg.solve(normal, np.einsum("kji,kjl,kl->i", A, W, r))
@@ -65,6 +66,7 @@ def solve_camera(known: Mapping[str, Array], seen: Mapping[str, Mean], stays: Ar
         if np.abs(step).max() < 1e-12:
             break
     r = _residuals(X, K, M)
+    # Where residuals are larger than stated, chi-square over its degrees of freedom says how much too sure that was.
     excess = max(1.0, _cost(r, W) / max(6 * len(parts) - 6, 1)) if len(parts) > 1 else 1.0
     return CameraPose(X, MappingProxyType(dict(zip(parts, r, strict=True))), excess * np.linalg.inv(normal))
 

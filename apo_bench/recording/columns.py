@@ -1,16 +1,16 @@
 """Columns of numbers become poses: positions, quaternions, rotation vectors, Euler angles, matrices."""
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 
 from apo_bench.errors import InputError, one_line, unknown
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.recording.camera_file import ANGLES, LENGTHS, TIMES, Conventions
+from apo_bench.recording.camera_file import ANGLE_UNITS, LENGTH_UNITS, TIME_UNITS, Conventions
 
-_UNITS = {**LENGTHS, **ANGLES, **TIMES}
+_UNITS = {**LENGTH_UNITS, **ANGLE_UNITS, **TIME_UNITS}
 _SAME = {
     **dict.fromkeys(("id", "object", "object_id", "part", "name", "track", "track_id", "body", "child_frame_id"), "id"),
     **dict.fromkeys(("t", "time", "timestamp", "stamp"), "t"),
@@ -31,7 +31,7 @@ _ROTATIONS: Mapping[str, tuple[str, ...]] = {
     "Euler angles by number": ("e1", "e2", "e3"),
     "matrix": _MATRIX,
 }
-KNOWN = {"id", "t", "frame", *_POSITION, *(name for names in _ROTATIONS.values() for name in names)}
+_KNOWN = {"id", "t", "frame", *_POSITION, *(name for names in _ROTATIONS.values() for name in names)}
 _LENGTH_ONE = 0.02
 """A quaternion, an axis or a row may differ from length 1 by so much."""
 
@@ -39,14 +39,14 @@ _MOST_RAD = 4.0 * np.pi
 """Larger angles are none in radians."""
 
 
-class Column(NamedTuple):
+class LogColumn(NamedTuple):
     """What a column is, and the unit in its name."""
 
     meaning: str
     unit: str
 
 
-def column(name: str) -> Column | None:
+def column(name: str) -> LogColumn | None:
     """What a column of this name is; None if it is nobody's business."""
     name = name.strip().lower()
     stem, _, unit = name.rpartition("_")
@@ -54,7 +54,7 @@ def column(name: str) -> Column | None:
         stem = name
         unit = ""
     meaning = _SAME.get(stem, stem)
-    return Column(meaning, unit) if meaning in KNOWN else None
+    return LogColumn(meaning, unit) if meaning in _KNOWN else None
 
 
 def check_renamed(names: Sequence[str], renamed: Mapping[str, str], known: Callable[[str], bool], file: str) -> None:
@@ -75,10 +75,10 @@ def check_renamed(names: Sequence[str], renamed: Mapping[str, str], known: Calla
             )
 
 
-def times(cells: Mapping[str, Array], units: Mapping[str, str], how: Conventions, file: str) -> Array:
+def row_times(cells: Mapping[str, Array], units: Mapping[str, str], how: Conventions, file: str) -> Array:
     """The time of every row, (n,), [s]."""
     if "t" in cells:
-        return cells["t"] * TIMES[units["t"] or how.time]
+        return cells["t"] * TIME_UNITS[units["t"] or how.time]
     if "frame" in cells:
         if how.rate_hz is None:
             raise InputError(f"{file}: images are numbered and have no time; state `rate_hz` in the camera file.")
@@ -102,15 +102,10 @@ def poses(
         if name not in cells:
             raise InputError(f"{file}: the column '{name}_mm' is missing; name it in `columns` of the camera file.")
     T = np.tile(np.eye(4), (len(cells["x"]), 1, 1))
-    said = set[str]()
-    for i, name in enumerate(_POSITION):
-        unit = _unit(name, units, how.length, "length", file)
-        T[:, i, 3] = cells[name] * LENGTHS[unit]
-        said.add(unit)
-    if len(said) > 1:
-        raise InputError(f"{file}: positions are in {' and '.join(sorted(said))}; give all three in one unit.")
+    unit = _one_unit(_POSITION, units, how.length, "length", file)
+    T[:, :3, 3] = np.column_stack([cells[name] for name in _POSITION]) * LENGTH_UNITS[unit]
     T[:, :3, :3], rotation = _rotations(cells, units, how, file, places)
-    return T, [f"lengths in {said.pop()}", rotation]
+    return T, [f"lengths in {unit}", rotation]
 
 
 def oriented(T: Array, how: Conventions) -> tuple[Array, list[str]]:
@@ -127,9 +122,24 @@ def oriented(T: Array, how: Conventions) -> tuple[Array, list[str]]:
     return T, notes
 
 
+def _one_unit(
+    names: Sequence[str], units: Mapping[str, str], stated: str | None, kind: Literal["length", "angle"], file: str
+) -> str:
+    """The unit that all of these columns have."""
+    different = {_unit(name, units, stated, kind, file) for name in names}
+    if len(different) > 1:
+        each = (
+            "positions are in {}; give all three in one unit"
+            if kind == "length"
+            else "angles are in {}; give all in one unit"
+        )
+        raise InputError(f"{file}: {each.format(' and '.join(sorted(different)))}.")
+    return different.pop()
+
+
 def _unit(name: str, units: Mapping[str, str], stated: str | None, kind: str, file: str) -> str:
     unit = units.get(name, "") or stated
-    allowed = LENGTHS if kind == "length" else ANGLES
+    allowed = LENGTH_UNITS if kind == "length" else ANGLE_UNITS
     if unit is None:
         example = " or ".join(f"{name}_{unit}" for unit in ("mm", "m")) if kind == "length" else f"{name}_deg"
         raise InputError(
@@ -146,14 +156,14 @@ def _rotations(
 ) -> tuple[Array, str]:
     from scipy.spatial.transform import Rotation
 
-    given = [kind for kind, names in _ROTATIONS.items() if all(name in cells for name in names)]
-    if len(given) != 1:
-        found = f"{len(given)} ({' and '.join(given)}) are there" if given else _lacking(cells)
+    kinds = [kind for kind, names in _ROTATIONS.items() if all(name in cells for name in names)]
+    if len(kinds) != 1:
+        there = f"{len(kinds)} ({' and '.join(kinds)}) are there" if kinds else _lacking(cells)
         raise InputError(
-            f"{file}: columns of one rotation are needed, {found}; allowed are qw to qz, q0 to q3, rx to rz, ax to az "
+            f"{file}: columns of one rotation are needed, {there}; allowed are qw to qz, q0 to q3, rx to rz, ax to az "
             "with angle, roll, pitch and yaw, e1 to e3, or r11 to r33, or other names by `columns` of the camera file."
         )
-    kind = given[0]
+    kind = kinds[0]
     numbers = np.column_stack([cells[name] for name in _ROTATIONS[kind]])
     if kind.startswith("quaternion"):
         order = "wxyz" if kind == "quaternion" else how.quaternion
@@ -161,33 +171,30 @@ def _rotations(
             raise InputError(
                 f'{file}: q0 to q3 do not say their order; state `quaternion = "wxyz"` or "xyzw" in the camera file.'
             )
-        _check_length(np.linalg.norm(numbers, axis=1), "a quaternion", places)
+        check_length(numbers, "a quaternion", places)
         by = "by the names of the columns" if kind == "quaternion" else f"in the order {order}, as stated"
         return Rotation.from_quat(numbers, scalar_first=order == "wxyz").as_matrix(), f"quaternions {by}"
     if kind == "matrix":
         return _matrices(numbers.reshape(-1, 3, 3), places), "rotation matrices, row by row"
-    angular = {"axis and angle": ("angle",)}.get(kind, _ROTATIONS[kind])
-    unit = {_unit(name, units, how.angle, "angle", file) for name in angular}
-    if len(unit) > 1:
-        raise InputError(f"{file}: angles are in {' and '.join(sorted(unit))}; give all in one unit.")
-    (called,) = unit
+    angular = ("angle",) if kind == "axis and angle" else _ROTATIONS[kind]
+    unit = _one_unit(angular, units, how.angle, "angle", file)
     largest = float(np.abs(np.column_stack([cells[name] for name in angular])).max(initial=0.0))
-    if called == "rad" and largest > _MOST_RAD:
+    if unit == "rad" and largest > _MOST_RAD:
         raise InputError(
             f"{file}: angles of up to {largest:.4g} rad were given, so these seem to be degrees that were read as "
             "radians; state the unit: columns such as rx_deg, or `angle` in the camera file."
         )
     if kind == "axis and angle":
-        _check_length(np.linalg.norm(numbers[:, :3], axis=1), "an axis", places)
-        vectors = numbers[:, :3] * numbers[:, 3:] * ANGLES[called]
-        return Rotation.from_rotvec(vectors).as_matrix(), f"axis and angle in {called}"
+        check_length(numbers[:, :3], "an axis", places)
+        vectors = numbers[:, :3] * numbers[:, 3:] * ANGLE_UNITS[unit]
+        return Rotation.from_rotvec(vectors).as_matrix(), f"axis and angle in {unit}"
     if kind == "rotation vector":
-        return Rotation.from_rotvec(numbers * ANGLES[called]).as_matrix(), f"rotation vectors in {called}"
+        return Rotation.from_rotvec(numbers * ANGLE_UNITS[unit]).as_matrix(), f"rotation vectors in {unit}"
     if how.euler is None:
         raise InputError(f'{file}: Euler angles do not say their order; state `euler = "xyz"` in the camera file.')
     about = "fixed" if how.euler.islower() else "moving"
-    R = Rotation.from_euler(how.euler, numbers * ANGLES[called]).as_matrix()
-    return R, f"Euler angles in {called}, {how.euler} about {about} axes, as stated"
+    R = Rotation.from_euler(how.euler, numbers * ANGLE_UNITS[unit]).as_matrix()
+    return R, f"Euler angles in {unit}, {how.euler} about {about} axes, as stated"
 
 
 def _lacking(cells: Mapping[str, Array]) -> str:
@@ -205,11 +212,12 @@ def _matrices(R: Array, places: Sequence[str]) -> Array:
         k = int(np.argmax(wrong))
         fault = f"R R^t differs from the identity by {square[k]:.3g}" if square[k] > _LENGTH_ONE else "it mirrors"
         raise InputError(f"{places[k]}: a rotation matrix, row by row, is needed; {fault}.")
-    U, _, Vt = np.linalg.svd(R)
-    return np.asarray(U @ Vt)
+    return pose.nearest_rotations(R)
 
 
-def _check_length(length: Array, what: str, places: Sequence[str]) -> None:
+def check_length(vectors: Array, what: str, places: Sequence[str]) -> None:
+    """Refuse vectors (n, k) that are not of length 1; the first one is named."""
+    length = np.linalg.norm(vectors, axis=1)
     wrong = np.abs(length - 1.0) > _LENGTH_ONE
     if wrong.any():
         k = int(np.argmax(wrong))

@@ -28,15 +28,16 @@ class ContactFit(NamedTuple):
 
 def contact_fit(assembly: Assembly, k: int, poses: Poses) -> ContactFit:
     """How far the contacts that operation k makes are open, if it ended with these poses, world, [m]."""
-    found = [_fit(assembly, contact, poses) for contact in assembly.operations[k].contacts]
-    return ContactFit(max((f.gap_m for f in found), default=0.0), max((f.angle_rad for f in found), default=0.0))
+    fits = [_fit(assembly, contact, poses) for contact in assembly.operations[k].contacts]
+    return ContactFit(max((fit.gap_m for fit in fits), default=0.0), max((fit.angle_rad for fit in fits), default=0.0))
 
 
 def _fit(assembly: Assembly, contact: Contact, poses: Poses) -> ContactFit:
     (a, T_a), (b, T_b) = ((assembly.face_of(of), poses[of.part]) for of in contact)
     if isinstance(a, RoundFace) or isinstance(b, RoundFace):
-        m = measure_round(a, T_a, b, T_b)
-        return ContactFit(abs(m.gap_m), m.angle_rad)
+        measured = measure_round(a, T_a, b, T_b)
+        return ContactFit(abs(measured.gap_m), measured.angle_rad)
+    # The middle of the smaller face is held against the larger one: how high above its plane, how far beside it.
     if face_area(a) > face_area(b):
         (a, T_a), (b, T_b) = (b, T_b), (a, T_a)
     cosine = float((T_a[:3, :3] @ a.normal) @ (T_b[:3, :3] @ b.normal))

@@ -2,7 +2,9 @@
 
 import csv
 from array import array
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import NamedTuple
 
@@ -13,8 +15,8 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.io.reading import opened
 from apo_bench.io.strict_csv import check_separator
 from apo_bench.recording.camera_file import Conventions
-from apo_bench.recording.columns import Column, check_renamed, column, poses, times
-from apo_bench.recording.log import LARGEST_BYTES, MOST_ROWS, Rows
+from apo_bench.recording.columns import LogColumn, check_renamed, column, poses, row_times
+from apo_bench.recording.log import LARGEST_LOG_BYTES, MOST_POSES, LogRows
 
 _LONGEST_LINE = 16384
 _LARGEST = 1e20
@@ -29,60 +31,54 @@ class Numbers(NamedTuple):
     lines: Sequence[int]
 
 
-def read_csv_log(path: Path, how: Conventions) -> tuple[Rows, list[str]]:
+def read_csv_log(path: Path, how: Conventions) -> tuple[LogRows, list[str]]:
     """The rows of a file whose columns name what they are; without a column of ids, its name is the id of all."""
     table = read_numbers(path, column, how.columns)
     places = [f"{path}, line {line}" for line in table.lines]
     T, notes = poses(table.cells, table.units, how, str(path), places)
-    return Rows(table.ids, times(table.cells, table.units, how, str(path)), T, places), notes
+    return LogRows(table.ids, row_times(table.cells, table.units, how, str(path)), T, places), notes
 
 
-def read_numbers(path: Path, meaning: Callable[[str], Column | None], renamed: Mapping[str, str]) -> Numbers:
+def read_numbers(path: Path, meaning: Callable[[str], LogColumn | None], renamed: Mapping[str, str]) -> Numbers:
     """The columns of a file that mean something.
 
     Args:
         renamed: Column of the file -> a name that means something.
     """
     lines = text_lines(path)
-    line, names = next(lines, (0, []))
+    first, names = next(lines, (0, []))
     if not names:
         raise InputError(f"{path}: the file is empty; its first line names the columns, such as t_s,id,x_mm,y_mm,z_mm.")
-    check_separator(f"{path}, line {line}", names)
+    place = f"{path}, line {first}"
+    check_separator(place, names)
     check_renamed(names, renamed, lambda name: meaning(name) is not None, str(path))
-    found = [meaning(renamed.get(name.strip().lower(), name)) for name in names]
-    used = [(i, one) for i, one in enumerate(found) if one is not None]
-    meanings = [one.meaning for _, one in used]
-    for name in meanings:
-        if meanings.count(name) > 1:
-            raise InputError(
-                f"{path}, line {line}: two columns say '{name}'; keep one, or name the other one otherwise."
-            )
-    numeric = [(i, one) for i, one in used if one.meaning != "id"]
-    of_id = next((i for i, one in used if one.meaning == "id"), None)
-    cells = [array("d") for _ in numeric]
+    known = [meaning(renamed.get(name.strip().lower(), name)) for name in names]
+    columns = {i: each for i, each in enumerate(known) if each is not None}
+    for name, count in Counter(each.meaning for each in columns.values()).items():
+        if count > 1:
+            raise InputError(f"{place}: two columns say '{name}'; keep one, or name the other one otherwise.")
+    of_id = next((i for i, each in columns.items() if each.meaning == "id"), None)
+    cells = {i: array("d") for i in columns if i != of_id}
     ids = list[str]()
     at = array("q")
     for line, texts in lines:
         if len(texts) != len(names):
             raise InputError(f"{path}, line {line}: {len(names)} cells are needed, {len(texts)} were given.")
-        if len(at) == MOST_ROWS:
-            raise InputError(f"{path}, line {line}: a log of at most {MOST_ROWS:,} rows is needed; cut it.")
-        for (i, _), into in zip(numeric, cells, strict=True):
-            into.append(number(texts[i], f"{path}, line {line}, column {one_line(names[i], 40)}"))
+        if len(at) == MOST_POSES:
+            raise InputError(f"{path}, line {line}: a log of at most {MOST_POSES:,} rows is needed; cut it.")
+        for i, column_cells in cells.items():
+            column_cells.append(finite_number(texts[i], f"{path}, line {line}, column {one_line(names[i], 40)}"))
         ids.append(path.stem if of_id is None else texts[of_id])
         at.append(line)
     return Numbers(
-        {
-            one.meaning: np.frombuffer(x, dtype=np.float64) if len(x) else np.zeros(0)
-            for (_, one), x in zip(numeric, cells, strict=True)
-        },
-        {one.meaning: one.unit for _, one in used},
+        {columns[i].meaning: np.array(column_cells) for i, column_cells in cells.items()},
+        {each.meaning: each.unit for each in columns.values()},
         ids,
         at,
     )
 
 
-def number(text: str, place: str) -> float:
+def finite_number(text: str, place: str) -> float:
     """A finite number."""
     try:
         x = float(text) if "_" not in text else np.nan
@@ -102,8 +98,8 @@ def text_lines(path: Path, separator: str | None = ",") -> Iterator[tuple[int, l
             size += len(raw)
             if len(raw) > _LONGEST_LINE:
                 raise InputError(f"{path}, line {line}: a line of at most {_LONGEST_LINE} characters is needed.")
-            if size > LARGEST_BYTES:
-                raise InputError(f"{path}: the file is larger than {LARGEST_BYTES / 1e6:g} MB; cut the log.")
+            if size > LARGEST_LOG_BYTES:
+                raise InputError(f"{path}: the file is larger than {LARGEST_LOG_BYTES / 1e6:g} MB; cut the log.")
             try:
                 text = raw.decode("utf-8-sig" if line == 1 else "utf-8")
             except UnicodeDecodeError as error:
@@ -118,9 +114,9 @@ def _cells(text: str) -> list[str]:
     return [cell.strip() for cell in next(csv.reader([text]))]
 
 
-def several(
-    path: Path, endings: Iterable[str], read: Callable[[Path], tuple[Rows, list[str]]]
-) -> tuple[Rows, list[str]]:
+def rows_of_files(
+    path: Path, endings: Iterable[str], read: Callable[[Path], tuple[LogRows, list[str]]]
+) -> tuple[LogRows, list[str]]:
     """The rows of a file, or of all files of a folder, one an object."""
     if not path.is_dir():
         return read(path)
@@ -130,10 +126,5 @@ def several(
             f"{path}: the folder holds no file that ends in {' or '.join(endings)}; give a folder of logs."
         )
     parts = [read(file) for file in files]
-    rows = [part for part, _ in parts]
-    return Rows(
-        [name for one in rows for name in one.ids],
-        np.concatenate([one.t for one in rows]),
-        np.concatenate([one.T for one in rows]),
-        [place for one in rows for place in one.places],
-    ), parts[0][1]
+    ids, t, T, places = zip(*(rows for rows, _ in parts), strict=True)
+    return LogRows([*chain(*ids)], np.concatenate(t), np.concatenate(T), [*chain(*places)]), parts[0][1]

@@ -1,21 +1,31 @@
-"""What is wrong with a recording that does not fit: each usual mistake is tried, and the one that mends it is named."""
+"""What is wrong with a recording that does not fit, and what stays unclear of one that does, so that it can be stated.
 
-from collections.abc import Mapping
+Of a recording that does not fit each usual mistake is undone, and the one whose undoing mends it is named.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
+from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.recording.arranging import Arrange, Arrangement
 from apo_bench.recording.camera_file import CameraFile
 from apo_bench.recording.mistakes import mistakes, reversed_in_time
-from apo_bench.recording.ordering import NoOrder
+from apo_bench.recording.operations import SeenOperation
+from apo_bench.recording.ordering import NoOrder, moves_text
 from apo_bench.recording.stays import Stays
 
 _FITS_MM = 20.0
 """A contact that is open by more, or a known place that is missed by more, is no noise; degrees count like mm."""
 _MENDS = 0.4
 """What mends a recording leaves at most this part of what was wrong."""
+_MOVED_MM = 10.0
+"""A part that moves by more during an operation of another one was not only adjusted."""
+_OPEN_MM = 3.0
+_OPEN = 5.0
+"""Contacts are open if by more than this, and more than so many deviations; a degree counts like a millimetre."""
 _HELPLESS = (
     "neither another order of the quaternions or of Euler angles, mirrored axes, inverted poses, another unit nor "
     "reversed time mends it, so check the frames of the parts in the objects file, the ids, the pose of the camera, "
@@ -24,7 +34,12 @@ _HELPLESS = (
 
 
 def check_arrangement(
-    found: Arrangement, arrange: Arrange, stays: Stays, models: Mapping[str, Array], camera: CameraFile, file: str
+    arrangement: Arrangement,
+    arrange: Arrange,
+    stays: Stays,
+    models: Mapping[str, Array],
+    camera: CameraFile,
+    file: str,
 ) -> None:
     """Refuse a recording in which no contact fits, with what would mend it.
 
@@ -35,19 +50,24 @@ def check_arrangement(
     Raises:
         InputError: It does not fit.
     """
-    if found.wrong_mm <= _FITS_MM:
+    if arrangement.wrong_mm <= _FITS_MM:
         return
-    best = found.wrong_mm * _MENDS
-    said = ""
-    for sentence, other in mistakes(stays, models, camera):
+    best = arrangement.wrong_mm * _MENDS
+    remedy = _HELPLESS
+    for sentence, mended in mistakes(stays, models, camera):
         try:
-            wrong = arrange(other).wrong_mm
+            wrong = arrange(mended).wrong_mm
         except (NoOrder, np.linalg.LinAlgError):
             continue
         if wrong < min(best, _FITS_MM):
             best = wrong
-            said = f"{sentence}; then all is within {wrong:.1f} mm"
-    raise InputError(f"{file}: no contact fits as it is stated ({_wrong(found)}); {said or _HELPLESS}.")
+            remedy = f"{sentence}; then all is within {wrong:.1f} mm"
+    fit = arrangement.fit
+    how = f"they are open by up to {1e3 * fit.gap_m:.0f} mm and {np.degrees(fit.angle_rad):.0f} deg"
+    pose = arrangement.camera
+    if pose.residuals:
+        how += f", known places are missed by up to {pose.off_mm:.0f} mm and {pose.off_deg:.0f} deg"
+    raise InputError(f"{file}: no contact fits as it is stated ({how}); {remedy}.")
 
 
 def check_direction(arrange: Arrange, stays: Stays, file: str) -> None:
@@ -67,8 +87,76 @@ def check_direction(arrange: Arrange, stays: Stays, file: str) -> None:
         )
 
 
-def _wrong(found: Arrangement) -> str:
-    said = [f"they are open by up to {1e3 * found.fit.gap_m:.0f} mm and {np.degrees(found.fit.angle_rad):.0f} deg"]
-    if found.camera.residuals:
-        said.append(f"known places are missed by up to {found.camera.off_mm:.0f} mm and {found.camera.off_deg:.0f} deg")
-    return ", ".join(said)
+def unclear(
+    stays: Stays,
+    arrangement: Arrangement,
+    operations: Sequence[SeenOperation],
+    covariance: Array,
+    assembly: Assembly,
+) -> tuple[str, ...]:
+    """One sentence for each doubt.
+
+    Args:
+        operations: As the log shows them.
+        covariance: Of each goal, (n, 6, 6), [m, rad].
+    """
+    return (
+        *_rivals(arrangement),
+        *_open(arrangement, covariance, assembly),
+        *_moved_too(stays, operations),
+        *(
+            f"'{part}' stood otherwise at the start than in the scenario; its start is as it was seen"
+            for part in stays
+            if arrangement.whence[part] == "otherwise"
+        ),
+        *_pauses(stays, arrangement, assembly),
+    )
+
+
+def _rivals(arrangement: Arrangement) -> Iterator[str]:
+    order = arrangement.order
+    for k, (mine, other) in enumerate(zip(order.stays, order.rival or order.stays, strict=True)):
+        if mine is not None and other is not None and mine is not other:
+            yield (
+                f"operation {k + 1} ({mine.part}) ended at {mine.begins:.2f} s, or at {other.begins:.2f} s: both "
+                "are about as likely; state the right ones by --ends"
+            )
+
+
+def _open(arrangement: Arrangement, covariance: Array, assembly: Assembly) -> Iterator[str]:
+    for k, fit in arrangement.fits.items():
+        mm = 1e3 * np.sqrt(np.trace(covariance[k, :3, :3]) / 3.0)
+        deg = np.degrees(np.sqrt(np.trace(covariance[k, 3:, 3:]) / 3.0))
+        if fit.wrong_mm > _OPEN_MM + _OPEN * (mm + deg):
+            yield (
+                f"operation {k + 1} ({assembly.operations[k].main}) leaves a contact open by {1e3 * fit.gap_m:.1f} mm "
+                f"and {np.degrees(fit.angle_rad):.1f} deg, more than frames that are off by {mm:.1f} mm and "
+                f"{deg:.1f} deg explain; check the frames in the objects file, and that the part was put down"
+            )
+
+
+def _moved_too(stays: Stays, operations: Sequence[SeenOperation]) -> Iterator[str]:
+    for k, operation in enumerate(operations):
+        for part, twist in operation.adjusted.items():
+            far = float(np.linalg.norm(twist[:3])) * 1e3
+            if far > _MOVED_MM:
+                yield (
+                    f"operation {k + 1}: '{part}' moved too, by {far:.0f} mm, which the scenario does not say; "
+                    f"moves in the log: {moves_text(stays)}"
+                )
+
+
+def _pauses(stays: Stays, arrangement: Arrangement, assembly: Assembly) -> Iterator[str]:
+    used = {id(stay) for stay in arrangement.order.stays}
+    mains = {operation.main for operation in assembly.operations}
+    carried = {part for operation in assembly.operations for part in operation.carries}
+    for part, known in stays.items():
+        if part in carried:
+            continue
+        if part in mains:
+            pauses = [f"{stay.begins:.2f} s" for stay in known[1:] if id(stay) not in used]
+            if pauses:
+                at = ", ".join(pauses)
+                yield f"'{part}' also rested at {at}, on its way: taken as a pause; state --ends if it was put down"
+        elif len(known) > 1:
+            yield f"'{part}' moved at {known[1].begins:.2f} s, although no operation of the scenario moves it"

@@ -9,14 +9,13 @@ import numpy as np
 from apo_bench.errors import InputError, unknown
 from apo_bench.files.bop import read_results
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
 from apo_bench.recording.camera_file import Conventions
-from apo_bench.recording.columns import oriented
-from apo_bench.recording.csv_log import number, read_csv_log, several, text_lines
-from apo_bench.recording.log import Log, Rows, made_log
+from apo_bench.recording.columns import check_length, oriented
+from apo_bench.recording.csv_log import finite_number, read_csv_log, rows_of_files, text_lines
+from apo_bench.recording.log import Log, LogRows, checked_log
 from apo_bench.recording.ros_log import read_ros_csv, read_ros_json
 
-Reader = Callable[[Path, Conventions], tuple[Rows, list[str]]]
+Reader = Callable[[Path, Conventions], tuple[LogRows, list[str]]]
 
 
 def read_log(path: str | Path, form: str, how: Conventions) -> Log:
@@ -31,38 +30,38 @@ def read_log(path: str | Path, form: str, how: Conventions) -> Log:
     read, endings = FORMATS[form]
     if path.is_dir() and not endings:
         raise InputError(f"{path}: a folder was given; a log of the format {form} is one file.")
-    rows, notes = several(path, endings, lambda file: read(file, how))
+    rows, notes = rows_of_files(path, endings, lambda file: read(file, how))
     T, more = oriented(rows.T, how)
-    return made_log(str(path), rows._replace(T=T), [*notes, *more])
+    return checked_log(str(path), rows._replace(T=T), [*notes, *more])
 
 
-def _bop(path: Path, how: Conventions) -> tuple[Rows, list[str]]:
+def _bop(path: Path, how: Conventions) -> tuple[LogRows, list[str]]:
     """BOP results: mm, rotation matrices, images by number; of several estimates of one object the best score."""
-    found = read_results(path)
-    scenes = np.unique(found.where[:, 0])
+    results = read_results(path)
+    scenes = np.unique(results.where[:, 0])
     scene = scenes[0] if how.scene is None and len(scenes) == 1 else how.scene
     if scene is None or scene not in scenes:
-        said = ", ".join(map(str, scenes[:6].tolist()))
+        first_few = ", ".join(map(str, scenes[:6].tolist()))
         raise InputError(
-            f"{path}: a recording is one scene, and the file holds {said}; state `scene` in the camera file."
+            f"{path}: a recording is one scene, and the file holds {first_few}; state `scene` in the camera file."
         )
     if how.rate_hz is None:
         raise InputError(f"{path}: images are numbered and have no time; state `rate_hz` in the camera file.")
-    at = np.flatnonzero(found.where[:, 0] == scene)
-    at = at[np.lexsort((-found.score[at], found.where[at, 2], found.where[at, 1]))]
-    same = (found.where[at[1:], 1:] == found.where[at[:-1], 1:]).all(axis=1)
-    at = at[np.concatenate([[True], ~same])]
-    U, _, Vt = np.linalg.svd(found.R[at])
+    # Rows of the scene by image and object, the best score first; of rows of one image and object the first is kept.
+    at = np.flatnonzero(results.where[:, 0] == scene)
+    at = at[np.lexsort((-results.score[at], results.where[at, 2], results.where[at, 1]))]
+    again = (results.where[at[1:], 1:] == results.where[at[:-1], 1:]).all(axis=1)
+    at = at[np.concatenate([[True], ~again])]
     T = np.tile(np.eye(4), (len(at), 1, 1))
-    T[:, :3, :3] = U @ Vt
-    T[:, :3, 3] = found.t_mm[at] * 1e-3
-    ids = [str(k) for k in found.where[at, 2]]
-    left = f"; {int(same.sum())} estimates of lower score left out" if same.any() else ""
+    T[:, :3, :3] = pose.nearest_rotations(results.R[at])
+    T[:, :3, 3] = results.t_mm[at] * 1e-3
+    ids = [str(k) for k in results.where[at, 2]]
+    left = f"; {int(again.sum())} estimates of lower score left out" if again.any() else ""
     notes = ["lengths in mm, as in BOP", f"rotation matrices, row by row, at {how.rate_hz:g} images a second{left}"]
-    return Rows(ids, found.where[at, 1] / how.rate_hz, T, [found.said(int(i)) for i in at]), notes
+    return LogRows(ids, results.where[at, 1] / how.rate_hz, T, [results.said(int(i)) for i in at]), notes
 
 
-def _tum(path: Path, how: Conventions) -> tuple[Rows, list[str]]:
+def _tum(path: Path, how: Conventions) -> tuple[LogRows, list[str]]:
     """`timestamp tx ty tz qx qy qz qw` with spaces between, m; the name of the file is the id."""
     numbers = list[list[float]]()
     places = list[str]()
@@ -72,24 +71,17 @@ def _tum(path: Path, how: Conventions) -> tuple[Rows, list[str]]:
         place = f"{path}, line {line}"
         if len(words) != 8:
             raise InputError(f"{place}: timestamp tx ty tz qx qy qz qw are needed, {len(words)} words were given.")
-        numbers.append([number(word, place) for word in words])
+        numbers.append([finite_number(word, place) for word in words])
         places.append(place)
     if not numbers:
         raise InputError(f"{path}: no pose stands in the file; lines of timestamp tx ty tz qx qy qz qw are needed.")
     cells = np.array(numbers)
-    _check_quaternions(cells[:, 4:], places)
+    check_length(cells[:, 4:], "a quaternion", places)
     T = pose.unpack(np.concatenate([cells[:, 1:4], cells[:, 7:], cells[:, 4:7]], axis=1))
-    return Rows([path.stem] * len(cells), cells[:, 0], T, places), [
+    return LogRows([path.stem] * len(cells), cells[:, 0], T, places), [
         "lengths in m, as in TUM",
         "quaternions x, y, z, w, as in TUM",
     ]
-
-
-def _check_quaternions(q: Array, places: list[str]) -> None:
-    length = np.linalg.norm(q, axis=1)
-    if (np.abs(length - 1.0) > 0.02).any():
-        k = int(np.argmax(np.abs(length - 1.0)))
-        raise InputError(f"{places[k]}: a quaternion of length 1 is needed, one of length {length[k]:.4g} was given.")
 
 
 FORMATS: Mapping[str, tuple[Reader, tuple[str, ...]]] = MappingProxyType(

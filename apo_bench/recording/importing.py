@@ -14,17 +14,16 @@ from apo_bench.errors import InputError, unknown
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.isotropic import floored, with_shared
 from apo_bench.observation.models.outliers import UNSEEN_DEVIATION, last_seen
-from apo_bench.recording.arranging import Arrangement, arrange, staying
+from apo_bench.recording.arranging import Arrangement, arrangement_of, staying
 from apo_bench.recording.camera_file import CameraFile
 from apo_bench.recording.camera_pose import CameraPose
 from apo_bench.recording.contact_fit import ContactFit
-from apo_bench.recording.doubts import check_arrangement, check_direction
-from apo_bench.recording.log import Track
-from apo_bench.recording.operations import Seen, seen_operation
+from apo_bench.recording.doubts import check_arrangement, check_direction, unclear
+from apo_bench.recording.log import PoseTrack
+from apo_bench.recording.operations import SeenOperation, seen_operation
 from apo_bench.recording.ordering import NoOrder, Stated
-from apo_bench.recording.rests import least_rest_s, rests_of
-from apo_bench.recording.stays import Stay, Stays, stays_of
-from apo_bench.recording.unclear import unclear
+from apo_bench.recording.rests import Rest, least_rest_s
+from apo_bench.recording.stays import Stay, Stays, all_stays
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario
 
@@ -34,14 +33,14 @@ _SLOW_S = 0.5
 
 @final
 @dataclass(frozen=True, eq=False)
-class Imported:
+class ImportedRecording:
     """A recording, understood."""
 
     scenario: Scenario
     observation: Observation
     camera: CameraPose
     stays: Mapping[str, tuple[Stay, ...]]
-    operations: tuple[Seen, ...]
+    operations: tuple[SeenOperation, ...]
     stood: Mapping[str, str]
     """Part -> where its start is from: `known`, `seen`, `scenario`, `otherwise`."""
     fit: ContactFit
@@ -52,13 +51,13 @@ class Imported:
 
 
 def import_recording(
-    tracks: Mapping[str, Track],
+    tracks: Mapping[str, PoseTrack],
     camera: CameraFile,
     scenario: Scenario,
     stated: Stated,
     file: str,
     models: Mapping[str, Array] | None = None,
-) -> Imported:
+) -> ImportedRecording:
     """The observation that a log of one demonstration gives.
 
     Args:
@@ -71,35 +70,18 @@ def import_recording(
     """
     assembly = scenario.assembly
     _check_parts(tracks, assembly, file)
-    stays = rested(tracks, file)
-    fitted = partial(arrange, camera=camera, assembly=assembly, planned=planned_starts(scenario), stated=stated)
+    stays = all_stays(tracks)
+    _check_rests(tracks, stays, file)
+    arrange = partial(arrangement_of, camera=camera, assembly=assembly, planned=planned_starts(scenario), stated=stated)
     try:
-        arranged = fitted(stays)
+        arrangement = arrange(stays)
     except NoOrder as error:
-        check_direction(fitted, stays, file)
+        check_direction(arrange, stays, file)
         least = max(map(least_rest_s, tracks.values()))
         slow = f" At this rate of frames a rest is seen from {least:.1f} s on." if least > _SLOW_S else ""
         raise InputError(f"{file}: {error}{slow}") from error
-    check_arrangement(arranged, fitted, stays, models or {}, camera, file)
-    return _made(tracks, stays, arranged, camera, scenario)
-
-
-def rested(tracks: Mapping[str, Track], file: str) -> Stays:
-    """Where every part stayed.
-
-    Raises:
-        InputError: One never rests.
-    """
-    stays = {part: stays_of(part, rests_of(track)) for part, track in tracks.items()}
-    for part, found in stays.items():
-        if not found:
-            track = tracks[part]
-            raise InputError(
-                f"{file}: '{part}' never rests, so nothing is known of it (frames: {len(track.t)}, in "
-                f"{track.t[-1] - track.t[0]:.2f} s); give a log in which it lies still for "
-                f"{least_rest_s(track):.1f} s and more."
-            )
-    return stays
+    check_arrangement(arrangement, arrange, stays, models or {}, camera, file)
+    return _imported(tracks, stays, arrangement, camera, scenario)
 
 
 def planned_starts(scenario: Scenario) -> Poses:
@@ -107,7 +89,7 @@ def planned_starts(scenario: Scenario) -> Poses:
     return layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start
 
 
-def _check_parts(tracks: Mapping[str, Track], assembly: Assembly, file: str) -> None:
+def _check_parts(tracks: Mapping[str, PoseTrack], assembly: Assembly, file: str) -> None:
     """Refuse parts that the scenario does not have, and operations of parts that were not tracked."""
     for part in tracks:
         if part not in assembly.solids:
@@ -120,18 +102,29 @@ def _check_parts(tracks: Mapping[str, Track], assembly: Assembly, file: str) -> 
             )
 
 
-def _made(
-    tracks: Mapping[str, Track], stays: Stays, arranged: Arrangement, camera: CameraFile, scenario: Scenario
-) -> Imported:
+def _check_rests(tracks: Mapping[str, PoseTrack], stays: Stays, file: str) -> None:
+    """Refuse parts that never rest."""
+    for part, track in tracks.items():
+        if not stays[part]:
+            raise InputError(
+                f"{file}: '{part}' never rests, so nothing is known of it (frames: {len(track.t)}, in "
+                f"{track.t[-1] - track.t[0]:.2f} s); give a log in which it lies still for "
+                f"{least_rest_s(track):.1f} s and more."
+            )
+
+
+def _imported(
+    tracks: Mapping[str, PoseTrack], stays: Stays, arrangement: Arrangement, camera: CameraFile, scenario: Scenario
+) -> ImportedRecording:
     assembly = scenario.assembly
-    found = arranged.camera
-    X = found.T_world_camera
-    start = arranged.start
-    chosen = arranged.order.stays
+    solved = arrangement.camera
+    X = solved.T_world_camera
+    start = arrangement.start
+    chosen = arrangement.order.stays
     operations = tuple(seen_operation(tracks, stays, chosen, assembly, X, k) for k in range(len(assembly)))
-    seen = np.array([one.rest is not None for one in operations])
-    goals = np.array([np.eye(4) if one.rest is None else X @ one.rest.T for one in operations])
-    covariance = np.array([_covariance(one, camera) for one in operations])
+    seen = np.array([operation.rest is not None for operation in operations])
+    goals = np.array([np.eye(4) if operation.rest is None else X @ operation.rest.T for operation in operations])
+    covariance = np.array([_covariance(operation.rest, camera) for operation in operations])
     observation = Observation(
         assembly=assembly,
         start=start,
@@ -141,34 +134,36 @@ def _made(
         gap_m=scenario.gap_mm * 1e-3,
         play_m=scenario.clearance_mm * 1e-3,
     )
-    if found.covariance is not None and seen.any():
-        shown = tuple(int(k) for k in np.flatnonzero(seen))
-        observation = with_shared(observation, SharedError("camera", shown, found.covariance, X))
-    return Imported(
+    if solved.covariance is not None and seen.any():
+        # All goals were seen from one camera: they share the error of its pose.
+        sharing = tuple(int(k) for k in np.flatnonzero(seen))
+        observation = with_shared(observation, SharedError("camera", sharing, solved.covariance, X))
+    return ImportedRecording(
         scenario=scenario,
         observation=observation,
-        camera=found,
+        camera=solved,
         stays=stays,
         operations=operations,
-        stood=arranged.whence,
-        fit=arranged.fit,
+        stood=arrangement.whence,
+        fit=arrangement.fit,
         stays_stated=camera.stays is not None,
-        unclear=unclear(stays, arranged, operations, covariance, assembly),
+        unclear=unclear(stays, arrangement, operations, covariance, assembly),
     )
 
 
-def _covariance(one: Seen, camera: CameraFile) -> Array:
-    if one.rest is None:
+def _covariance(rest: Rest | None, camera: CameraFile) -> Array:
+    """(6, 6), of the goal that a rest shows: what frames differ by averages out, what stays does not."""
+    if rest is None:
         return np.diag(UNSEEN_DEVIATION**2)
-    return one.rest.mean.covariance + staying(camera, one.rest.mean)
+    return rest.mean.covariance + staying(camera, rest.mean)
 
 
-def _adjustments(operations: Sequence[Seen], assembly: Assembly) -> Array:
+def _adjustments(operations: Sequence[SeenOperation], assembly: Assembly) -> Array:
     """The square of what later operations moved unasked, at the operation that had placed it, (n, 6, 6)."""
     C = np.zeros((len(assembly), 6, 6))
-    for k, one in enumerate(operations):
-        for part, moved in one.adjusted.items():
+    for k, operation in enumerate(operations):
+        for part, twist in operation.adjusted.items():
             placed = [j for j in range(k) if assembly.operations[j].main == part]
             if placed:
-                C[placed[-1]] += np.outer(moved, moved)
+                C[placed[-1]] += np.outer(twist, twist)
     return C

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from apo_bench.errors import InputError, one_line
 from apo_bench.geometry.arrays import Array
 
-MOST_ROWS = 1_000_000
-LARGEST_BYTES = 200_000_000
+MOST_POSES = 1_000_000
+LARGEST_LOG_BYTES = 200_000_000
 _NEAR_M = 0.02
 _FAR_M = 20.0
 """Models whose median distance to the camera is less or more were given in another unit."""
@@ -21,7 +21,7 @@ _SLOW_S = 2.0
 """Frames whose median distance in time is less or more have times in another unit."""
 
 
-class Track(NamedTuple):
+class PoseTrack(NamedTuple):
     """One model over time."""
 
     t: Array
@@ -36,7 +36,7 @@ class Log:
     """A whole log."""
 
     file: str
-    tracks: Mapping[str, Track]
+    tracks: Mapping[str, PoseTrack]
     notes: tuple[str, ...]
     """How its numbers were read: units, order of the quaternion, direction."""
 
@@ -45,7 +45,7 @@ class Log:
         return max(float(track.t[-1]) for track in self.tracks.values())
 
 
-class Rows(NamedTuple):
+class LogRows(NamedTuple):
     """Poses as they stand in a file, in its order."""
 
     ids: Sequence[str]
@@ -57,7 +57,7 @@ class Rows(NamedTuple):
     """Where each stands: `file, line 3`."""
 
 
-def made_log(file: str, rows: Rows, notes: Sequence[str]) -> Log:
+def checked_log(file: str, rows: LogRows, notes: Sequence[str]) -> Log:
     """The tracks of a log, each with increasing times.
 
     Raises:
@@ -71,22 +71,21 @@ def made_log(file: str, rows: Rows, notes: Sequence[str]) -> Log:
     for i, name in enumerate(names.tolist()):
         at = np.flatnonzero(which == i)
         _check_times(rows, name, at)
-        tracks[name] = Track(rows.t[at] - first, rows.T[at])
+        tracks[name] = PoseTrack(rows.t[at] - first, rows.T[at])
     _check_unit(file, rows.T)
     _check_rate(file, tracks)
     return Log(file, MappingProxyType(tracks), tuple(notes))
 
 
-def _check_times(rows: Rows, name: str, at: NDArray[np.intp]) -> None:
+def _check_times(rows: LogRows, name: str, at: NDArray[np.intp]) -> None:
     steps = np.diff(rows.t[at])
     if len(steps) and (steps < 0.0).all():
         raise InputError(
             f"{rows.places[at[1]]}: the times of '{one_line(name, 60)}' run backwards from the first row to the last; "
             "give the log in the order in which it was recorded."
         )
-    wrong = np.flatnonzero(steps <= 0.0)
-    if wrong.size:
-        k = int(wrong[0])
+    if (steps <= 0.0).any():
+        k = int(np.argmax(steps <= 0.0))
         what = "stands twice" if steps[k] == 0.0 else f"is {-steps[k]:.6g} s before the one above it"
         raise InputError(
             f"{rows.places[at[k + 1]]}: a time of '{one_line(name, 60)}' {what}; give one pose for each time, sorted."
@@ -105,12 +104,13 @@ def _check_unit(file: str, T: Array) -> None:
     )
 
 
-def _check_rate(file: str, tracks: Mapping[str, Track]) -> None:
+def _check_rate(file: str, tracks: Mapping[str, PoseTrack]) -> None:
     """Refuse milliseconds read as seconds, and the other way round."""
     steps = np.concatenate([np.diff(track.t) for track in tracks.values()])
-    if not len(steps) or _FAST_S <= float(np.median(steps)) <= _SLOW_S:
+    usual = float(np.median(steps)) if len(steps) else _SLOW_S
+    if _FAST_S <= usual <= _SLOW_S:
         return
     raise InputError(
-        f"{file}: the median time between two frames of a track is {float(np.median(steps)):.3g} s, so its times seem "
+        f"{file}: the median time between two frames of a track is {usual:.3g} s, so its times seem "
         "to be in another unit; state it: a column such as t_ms or t_s, or `time` in the camera file."
     )

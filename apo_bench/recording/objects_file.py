@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench.errors import InputError, one_line, unknown
 from apo_bench.geometry.arrays import Array
 from apo_bench.io.documents import JsonNode, read_toml
-from apo_bench.recording.log import Log, Track
+from apo_bench.recording.log import Log, PoseTrack
 from apo_bench.scenario.keys import read_any_pose, refuse
 
 _SCHEMA = "apo-bench/objects/1"
@@ -39,7 +39,7 @@ class ObjectsFile:
     @property
     def models(self) -> Mapping[str, Array]:
         """Part -> where its frame lies in the tracker's model, (4, 4), [m]."""
-        return {part: one.T_model_part for part, one in self.parts.items()}
+        return {part: tracked.T_model_part for part, tracked in self.parts.items()}
 
 
 def read_objects(path: str | Path) -> ObjectsFile:
@@ -52,46 +52,40 @@ def read_objects(path: str | Path) -> ObjectsFile:
     if not isinstance(top["objects"].value, dict) or not top["objects"].value:
         top["objects"].fail('parts with ids are needed, such as castle1 = { id = "7" }')
     parts: dict[str, TrackedPart] = {}
-    owner: dict[str, str] = {}
+    owners: dict[str, str] = {}
     for part, value in top["objects"].value.items():
         node = top["objects"].child(value, part)
-        parts[part] = _tracked(node)
-        if parts[part].id in owner:
-            refuse(
-                node, f"the id '{parts[part].id}' is that of '{owner[parts[part].id]}' already; give each part its own"
-            )
-        owner[parts[part].id] = part
+        tracked = _tracked(node)
+        if tracked.id in owners:
+            refuse(node, f"the id '{tracked.id}' is that of '{owners[tracked.id]}' already; give each part its own")
+        parts[part] = tracked
+        owners[tracked.id] = part
     ignored = frozenset(_id(node) for node in top["ignore"].items("ignored id")) if "ignore" in top else frozenset()
     return ObjectsFile(str(path), parts, ignored)
 
 
-def part_tracks(log: Log, objects: ObjectsFile) -> Mapping[str, Track]:
+def part_tracks(log: Log, objects: ObjectsFile) -> Mapping[str, PoseTrack]:
     """The tracks of parts, camera from part.
 
     Raises:
         InputError: An id of the log is no part, or a part is not in the log.
     """
-    known = {one.id for one in objects.parts.values()} | objects.ignored
+    known = {tracked.id for tracked in objects.parts.values()} | objects.ignored
     strange = [name for name in log.tracks if name not in known]
     if strange:
-        are = f"the id {_quoted(strange)}{_of_file(strange[0], log)} is no part; name its part"
-        them = "it"
+        file = objects.file
+        which = f"the id {_quoted(strange)}{_of_file(strange[0], log)} is no part; name its part in {file}, or add it"
         if len(strange) > 1:
-            are = f"the ids {_quoted(strange)} are no parts; name their parts"
-            them = "them"
-        raise InputError(
-            f"{log.file}: {are} in {objects.file}, or add {them} to its key `ignore`. Known: "
-            f"{', '.join(sorted(known))}."
-        )
-    found: dict[str, Track] = {}
-    for part, one in objects.parts.items():
-        if one.id not in log.tracks:
-            raise InputError(
-                f"{objects.file}, {part}: {unknown('id', one.id, log.tracks).replace('Known', 'In the log')}"
-            )
-        track = log.tracks[one.id]
-        found[part] = Track(track.t, track.T @ one.T_model_part)
-    return found
+            which = f"the ids {_quoted(strange)} are no parts; name their parts in {file}, or add them"
+        raise InputError(f"{log.file}: {which} to its key `ignore`. Known: {', '.join(sorted(known))}.")
+    tracks: dict[str, PoseTrack] = {}
+    for part, tracked in objects.parts.items():
+        if tracked.id not in log.tracks:
+            sentence = unknown("id", tracked.id, log.tracks).replace("Known", "In the log")
+            raise InputError(f"{objects.file}, {part}: {sentence}")
+        track = log.tracks[tracked.id]
+        tracks[part] = PoseTrack(track.t, track.T @ tracked.T_model_part)
+    return tracks
 
 
 def _quoted(names: list[str]) -> str:

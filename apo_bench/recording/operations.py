@@ -1,31 +1,46 @@
-"""What a log shows of one operation: where its part went, by which way, and what moved with it."""
+"""What a log shows of one operation: where its part went, by which path, and what moved with it.
+
+The last straight piece of the path says from where a part came to its goal, to be held beside how the plan brings it
+there.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.recording.log import Track
+from apo_bench.recording.log import PoseTrack
 from apo_bench.recording.ordering import quiet, taken
-from apo_bench.recording.paths import Path, path_of
 from apo_bench.recording.rests import Rest
 from apo_bench.recording.stays import Stay, Stays, poses_at
+from apo_bench.scenario.nominal import nominal_operations
+from apo_bench.scenario.scenario import Scenario
+
+_STRAIGHT = 4.0
+"""Frames may be so many standard deviations of their noise beside the line."""
+_LEAST_M = 5e-3
+"""A line that is shorter says no direction."""
+_FEWEST = 4
+_SPIKE_M = 0.015
+"""A frame that is so far from the median of its neighbours is wrong: no hand turns off so fast."""
+_ALIKE_DEG = 20.0
+"""Directions within this are the same."""
 
 
 @final
 @dataclass(frozen=True, eq=False)
-class Seen:
+class SeenOperation:
     """One operation as the log shows it."""
 
     stay: Stay | None
     """Where its main part stayed; None if it was not seen."""
     rest: Rest | None
     """The rest of it that is the goal: that at which the next operation began."""
-    path: Path | None
+    path: PoseTrack | None
     """Of the main part, from its stay before to this one, world."""
     carried: Mapping[str, Array]
     """Carried part -> the body twist by which it moved in the hand, (6,), [m, rad]."""
@@ -33,14 +48,39 @@ class Seen:
     """Part that the operation does not move -> the body twist by which it was moved all the same, (6,)."""
 
 
+class StraightEnd(NamedTuple):
+    """The last straight piece of a path."""
+
+    direction: Array
+    """Unit vector of the motion, (3,), in the frame of the part at its goal."""
+    length_m: float
+
+
+class Approach(NamedTuple):
+    """How a part came to its goal, beside the plan."""
+
+    operation: int
+    """Counted from 0."""
+    end: StraightEnd | None
+    """None: too short, or too few frames."""
+    macro: str
+    """The motion of the plan that is nearest in direction."""
+    off_deg: float
+    """Between the two."""
+
+    @property
+    def alike(self) -> bool:
+        return self.off_deg <= _ALIKE_DEG
+
+
 def seen_operation(
-    tracks: Mapping[str, Track],
+    tracks: Mapping[str, PoseTrack],
     stays: Stays,
     chosen: Sequence[Stay | None],
     assembly: Assembly,
     T_world_camera: Array,
     k: int,
-) -> Seen:
+) -> SeenOperation:
     """Operation k, counted from 0.
 
     Args:
@@ -50,23 +90,90 @@ def seen_operation(
     operation = assembly.operations[k]
     stay = chosen[k]
     if stay is None:
-        return Seen(None, None, None, {}, {})
+        return SeenOperation(None, None, None, {}, {})
     over = quiet(assembly, stays, chosen, k)
     rest = stay.at(over)
     begins = taken(assembly, stays, chosen[:k], stay)
-    path = path_of(tracks[operation.main], begins, rest.begins, T_world_camera)
+    track = tracks[operation.main]
+    among = (track.t >= begins) & (track.t <= rest.begins)
+    path = PoseTrack(track.t[among], T_world_camera @ track.T[among])
     before = poses_at(stays, begins)
     after = poses_at(stays, over)
-    moved = pose.inverse(before[operation.main]) @ after[operation.main]
+    # What the main part did, as a displacement in the frame of the camera, takes along what stands fast in the hand.
+    displacement = after[operation.main] @ pose.inverse(before[operation.main])
     carried = {}
     adjusted = {}
     for part in stays:
         if part == operation.main:
             continue
-        own = pose.inverse(before[part]) @ after[part]
+        twist = pose.log(pose.inverse(before[part]) @ after[part])
         if part in operation.carries:
-            together = before[operation.main] @ moved @ pose.inverse(before[operation.main]) @ before[part]
-            carried[part] = pose.log(pose.inverse(together) @ after[part])
-        elif np.abs(pose.log(own)).max() > 0.0:
-            adjusted[part] = pose.log(own)
-    return Seen(stay, rest, path, carried, adjusted)
+            carried[part] = pose.log(pose.inverse(displacement @ before[part]) @ after[part])
+        elif np.abs(twist).max() > 0.0:
+            adjusted[part] = twist
+    return SeenOperation(stay, rest, path, carried, adjusted)
+
+
+def approaches(scenario: Scenario, operations: Sequence[SeenOperation], T_world_camera: Array) -> Sequence[Approach]:
+    """Every operation that was seen."""
+    found = list[Approach]()
+    for k, (operation, nominal) in enumerate(zip(operations, nominal_operations(scenario), strict=True)):
+        if operation.path is None or operation.rest is None:
+            continue
+        end = last_straight(operation.path, T_world_camera @ operation.rest.T)
+        if end is None:
+            found.append(Approach(k, None, "", 0.0))
+            continue
+        arrival = nominal.after
+        ways: dict[str, Array] = {macro.name: arrival.own(macro.direction) for macro in arrival.macros}
+        ways.setdefault("put down", arrival.line.direction)
+        angles = {
+            name: float(np.degrees(np.arccos(np.clip(end.direction @ way, -1.0, 1.0)))) for name, way in ways.items()
+        }
+        nearest = min(angles, key=lambda name: angles[name])
+        found.append(Approach(k, end, nearest, angles[nearest]))
+    return found
+
+
+def last_straight(path: PoseTrack, goal: Array) -> StraightEnd | None:
+    """The longest last piece that is straight within its noise; None if it is too short to have a direction.
+
+    Noise is that of the frames themselves: what neighbours differ by beside their common motion.
+
+    Args:
+        path: Poses between two rests, world, [m].
+        goal: (4, 4), where it ends.
+    """
+    points = _without_spikes(pose.apply(pose.inverse(goal), path.T[:, :3, 3]))
+    if len(points) < _FEWEST:
+        return None
+    # Third differences of independent errors have 1 + 9 + 9 + 1 = 20 times their variance, those of a smooth motion
+    # are hardly anything.
+    jerks = np.diff(points, 3, axis=0)
+    noise = max(2e-4, 1.4826 * float(np.median(np.abs(jerks))) / np.sqrt(20.0)) if len(jerks) else 2e-4
+    goal_point = np.zeros(3)
+    longest = None
+    for first in range(len(points) - _FEWEST, -1, -1):
+        piece = points[first:]
+        away = np.linalg.norm(piece[:1] - goal_point)
+        # The line of least squares through the piece and the goal: the first right singular vector about their middle.
+        centre = piece.mean(axis=0)
+        _, _, Vt = np.linalg.svd(np.concatenate([piece, goal_point[None]]) - centre, full_matrices=False)
+        off = np.linalg.norm((piece - centre) - np.outer((piece - centre) @ Vt[0], Vt[0]), axis=1)
+        # It bends where the 90 % quantile of the distances is too large, or the point that is farthest from the goal.
+        if away > _LEAST_M and (
+            np.sort(off)[int(0.9 * (len(off) - 1))] > _STRAIGHT * noise or off[0] > 2.0 * _STRAIGHT * noise
+        ):
+            break
+        if away > max(_LEAST_M, 3.0 * noise):
+            way = goal_point - piece[0]
+            longest = StraightEnd(Vt[0] if Vt[0] @ way > 0.0 else -Vt[0], float(away))
+    return longest
+
+
+def _without_spikes(points: Array) -> Array:
+    """Points (n, 3) without frames that are far from the median of the five about them, which the next two are not."""
+    if len(points) < 5:
+        return points
+    five = np.pad(points, ((2, 2), (0, 0)), mode="edge")[np.arange(len(points))[:, None] + np.arange(5)]
+    return np.asarray(points[np.linalg.norm(points - np.median(five, axis=1), axis=1) < _SPIKE_M])

@@ -4,7 +4,7 @@ The last operation that moves a part ends with its last stay. Before, a hand may
 choices in the order of the operations, the one is taken whose stays are long and whose contacts are nearly closed.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import NamedTuple, final
@@ -36,6 +36,10 @@ class Stated(NamedTuple):
     """Times at which the operations ended, [s]."""
     unseen: tuple[int, ...] = ()
     """Operations that the log does not show, counted from 0."""
+
+
+_Choice = tuple[int | None, ...]
+"""The number of the stay of each of the first operations; None of one that was not seen."""
 
 
 class NoOrder(InputError):
@@ -71,21 +75,17 @@ def order_of(
     def worth(k: int, i: int) -> float:
         stay = stays[assembly.operations[k].main][i]
         wrong_mm = contact_fit(assembly, k, world_poses(stays, stay.ends, start, T_world_camera)).wrong_mm
-        found = min(stay.seconds, _LONG_S) - min(wrong_mm, _WIDE_MM) / 10.0
         part = assembly.operations[k].main
-        moved_on = any(part in other.carries for other in assembly.operations[k + 1 :])
-        left = 0 if moved_on or last[part] != k else len(stays[part]) - 1 - i
-        return found - _LEFT_OVER * left
+        carried_on = any(part in other.carries for other in assembly.operations[k + 1 :])
+        left = 0 if carried_on or last[part] != k else len(stays[part]) - 1 - i
+        return min(stay.seconds, _LONG_S) - min(wrong_mm, _WIDE_MM) / 10.0 - _LEFT_OVER * left
 
     best = _choices(assembly, stays, worth, unseen)
     if not best:
         raise NoOrder(_no_order(assembly, stays))
-    rival = best[1][1] if len(best) > 1 and best[0][0] - best[1][0] < _CLOSE else None
-    picked = [
-        [None if i is None else stays[op.main][i] for op, i in zip(assembly.operations, choice, strict=True)]
-        for choice in (best[0][1], *([] if rival is None else [rival]))
-    ]
-    return Order(tuple(picked[0]), tuple(picked[1]) if rival is not None else None)
+    picked = [_picked(assembly, stays, choice) for _, choice in best]
+    close = len(best) > 1 and best[0][0] - best[1][0] < _CLOSE
+    return Order(picked[0], picked[1] if close else None)
 
 
 def stated_order(assembly: Assembly, stays: Mapping[str, Sequence[Stay]], ends: Sequence[float]) -> Order:
@@ -96,16 +96,16 @@ def stated_order(assembly: Assembly, stays: Mapping[str, Sequence[Stay]], ends: 
     """
     if len(ends) != len(assembly):
         raise InputError(f"--ends: {len(assembly)} times are needed, one for each operation, {len(ends)} were given.")
-    found = []
+    chosen = list[Stay]()
     for k, (operation, t) in enumerate(zip(assembly.operations, ends, strict=True)):
-        there = [stay for stay in stays[operation.main] if stay.begins <= t <= stay.ends]
-        if not there:
+        there = next((stay for stay in stays[operation.main] if stay.begins <= t <= stay.ends), None)
+        if there is None:
             raise InputError(
                 f"--ends: '{operation.main}' does not rest at {t:g} s, where operation {k + 1} is to have ended; "
                 f"it rests {_spans(stays[operation.main])}."
             )
-        found.append(there[0])
-    return Order(tuple(found), None)
+        chosen.append(there)
+    return Order(tuple(chosen), None)
 
 
 def world_poses(stays: Mapping[str, Sequence[Stay]], t: float, start: Poses, T_world_camera: Array) -> Poses:
@@ -116,28 +116,43 @@ def world_poses(stays: Mapping[str, Sequence[Stay]], t: float, start: Poses, T_w
 def moves_text(stays: Mapping[str, Sequence[Stay]]) -> str:
     """What moved when, in a sentence."""
     arrivals = sorted((stay.begins, part) for part, known in stays.items() for stay in known[1:])
-    shown = [f"{part} {t:.1f} s" for t, part in arrivals[:12]]
-    return ", ".join(shown) + (", ..." if len(arrivals) > 12 else "") if shown else "nothing moves"
+    first_few = [f"{part} {t:.1f} s" for t, part in arrivals[:12]]
+    return ", ".join(first_few) + (", ..." if len(arrivals) > 12 else "") if first_few else "nothing moves"
 
 
 def _choices(
-    assembly: Assembly, stays: Mapping[str, Sequence[Stay]], worth: object, unseen: Sequence[int]
-) -> list[tuple[float, tuple[int | None, ...]]]:
-    """The two best choices of stays whose arrivals have the order of the operations, the best first."""
-    open_ones: list[tuple[float, float, tuple[int | None, ...]]] = [(0.0, -np.inf, ())]
+    assembly: Assembly,
+    stays: Mapping[str, Sequence[Stay]],
+    worth: Callable[[int, int], float],
+    unseen: Sequence[int],
+) -> list[tuple[float, _Choice]]:
+    """The two best choices of stays whose arrivals have the order of the operations, with their worth, the best first.
+
+    Dynamic programming over operations: what follows depends on a choice so far by its last stay only, but for what was
+    carried; so of the choices that end with the same stay the two best are followed.
+    """
+    followed: list[tuple[float, float, _Choice]] = [(0.0, -np.inf, ())]
     for k, operation in enumerate(assembly.operations):
         if k in unseen:
-            open_ones = [(value, t, (*choice, None)) for value, t, choice in open_ones]
+            followed = [(value, t, (*choice, None)) for value, t, choice in followed]
             continue
-        by_end: dict[int, list[tuple[float, float, tuple[int | None, ...]]]] = {}
-        for value, t, choice in open_ones:
+        by_end: dict[int, list[tuple[float, float, _Choice]]] = {}
+        for value, t, choice in followed:
             for i, stay in enumerate(stays[operation.main]):
                 moved_on = _between(assembly, stays, choice, i) if i and stay.begins > t else None
                 if moved_on is not None:
-                    more = (value + worth(k, i) - _LEFT_OVER * moved_on, stay.begins, (*choice, i))  # type: ignore[operator]
-                    by_end.setdefault(i, []).append(more)
-        open_ones = [one for found in by_end.values() for one in sorted(found, key=lambda x: -x[0])[:2]]
-    return sorted(((value, choice) for value, _, choice in open_ones), key=lambda x: -x[0])[:2]
+                    longer = (value + worth(k, i) - _LEFT_OVER * moved_on, stay.begins, (*choice, i))
+                    by_end.setdefault(i, []).append(longer)
+        followed = [each for ending in by_end.values() for each in sorted(ending, key=lambda x: -x[0])[:2]]
+    return sorted(((value, choice) for value, _, choice in followed), key=lambda x: -x[0])[:2]
+
+
+def _picked(assembly: Assembly, stays: Mapping[str, Sequence[Stay]], choice: _Choice) -> tuple[Stay | None, ...]:
+    """The stays that a choice numbers, of the first operations."""
+    return tuple(
+        None if i is None else stays[operation.main][i]
+        for operation, i in zip(assembly.operations, choice, strict=False)
+    )
 
 
 def taken(assembly: Assembly, stays: Mapping[str, Sequence[Stay]], before: Sequence[Stay | None], stay: Stay) -> float:
@@ -148,7 +163,7 @@ def taken(assembly: Assembly, stays: Mapping[str, Sequence[Stay]], before: Seque
         stay: Where it was put.
     """
     part = stay.part
-    own = [k for k, one in enumerate(before) if one is not None and assembly.operations[k].main == part]
+    own = [k for k, earlier in enumerate(before) if earlier is not None and assembly.operations[k].main == part]
     since = own[-1] + 1 if own else 0
     carried = any(part in operation.carries for operation in assembly.operations[since : len(before)])
     if own and not carried:
@@ -163,21 +178,19 @@ def quiet(assembly: Assembly, stays: Mapping[str, Sequence[Stay]], chosen: Seque
     """When operation k, which was seen, was over: when the next one took its part, else the end of its stay, [s]."""
     stay = chosen[k]
     assert stay is not None
-    for j, one in enumerate(chosen):
-        if j > k and one is not None:
-            return float(np.clip(taken(assembly, stays, chosen[:j], one), stay.begins, stay.ends))
+    for j, later in enumerate(chosen):
+        if j > k and later is not None:
+            return float(np.clip(taken(assembly, stays, chosen[:j], later), stay.begins, stay.ends))
     return stay.ends
 
 
-def _between(
-    assembly: Assembly, stays: Mapping[str, Sequence[Stay]], choice: Sequence[int | None], i: int
-) -> int | None:
+def _between(assembly: Assembly, stays: Mapping[str, Sequence[Stay]], choice: _Choice, i: int) -> int | None:
     """How often the part of the last chosen operation still moved before the next part was taken, which goes to stay i.
 
     None if that was taken before the other was there: what is carried arrives with what carries it.
     """
     k = len(choice)
-    before = [None if j is None else stays[assembly.operations[n].main][j] for n, j in enumerate(choice)]
+    before = _picked(assembly, stays, choice)
     last = before[-1] if before else None
     if last is None:
         return 0

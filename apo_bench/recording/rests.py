@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.recording.averaging import Mean, average, common_scatter, pooled
-from apo_bench.recording.log import Track
+from apo_bench.recording.averaging import Mean, average, common_scatter, pooled_mean
+from apo_bench.recording.log import PoseTrack
 
-REST_S = 0.3
+LEAST_REST_S = 0.3
 """Least duration of a rest."""
 _FEWEST = 4
 """Frames of a rest."""
@@ -36,6 +36,10 @@ _SAME_RAD = 5e-3
 """Rests that differ by less are one."""
 _EDGE = 16.8
 """The 99 % quantile of chi-square with 6 degrees of freedom: frames at the ends of a rest that are farther off move."""
+
+
+_Span = tuple[int, int]
+"""First and last frame."""
 
 
 @final
@@ -60,35 +64,39 @@ class Rest:
         return self.mean.T
 
 
-def rests_of(track: Track, rest_s: float = REST_S) -> tuple[Rest, ...]:
+def rests_of(track: PoseTrack) -> tuple[Rest, ...]:
     """The rests of a track, in order of time: looked for in frames that are new, averaged over all."""
-    each = _stride(track)
-    t = track.t[::each]
-    T = track.T[::each]
+    stride = _stride(track)
+    t = track.t[::stride]
+    T = track.T[::stride]
     if len(t) < _FEWEST:
         return ()
     noise = np.maximum(_noise(T), _LEAST)
-    m = _half_window(t, rest_s)
-    spans: list[tuple[int, int]] = []
-    for a, b in _still_spans(T, noise, m):
-        a, b = _trimmed(T, a, b, noise)
-        if b - a + 1 >= _FEWEST and t[b] - t[a] >= 0.5 * rest_s:
+    half_window = max(3, round(0.5 * LEAST_REST_S / max(float(np.median(np.diff(t))), 1e-6)))
+    spans = list[_Span]()
+    for span in _still_spans(T, noise, half_window):
+        a, b = _trimmed(T, *span, noise)
+        if b - a + 1 >= _FEWEST and t[b] - t[a] >= 0.5 * LEAST_REST_S:
             spans += _split(T, a, b, noise)
-    spans = [(each * a, each * b) for a, b in _merged(T, spans, noise, m) if t[b] - t[a] >= 0.5 * rest_s]
-    found = [(a, b, average(track.T[a : b + 1])) for a, b in spans]
-    common = common_scatter([mean for _, _, mean in found]) if found else np.zeros((6, 6))
-    return tuple(Rest(a, b, float(track.t[a]), float(track.t[b]), pooled(mean, common)) for a, b, mean in found)
+    merged = [(a, b) for a, b in _merged(T, spans, noise, half_window) if t[b] - t[a] >= 0.5 * LEAST_REST_S]
+    spans = [(stride * a, stride * b) for a, b in merged]
+    means = [average(track.T[a : b + 1]) for a, b in spans]
+    common = common_scatter(means)
+    return tuple(
+        Rest(a, b, float(track.t[a]), float(track.t[b]), pooled_mean(mean, common))
+        for (a, b), mean in zip(spans, means, strict=True)
+    )
 
 
-def least_rest_s(track: Track) -> float:
+def least_rest_s(track: PoseTrack) -> float:
     """How long a part has to rest to be seen resting, [s]."""
-    each = _stride(track)
-    if len(track.t) <= each:
-        return REST_S
-    return float(max(REST_S, (2 * _FEWEST - 1) * np.median(np.diff(track.t[::each]))))
+    stride = _stride(track)
+    if len(track.t) <= stride:
+        return LEAST_REST_S
+    return float(max(LEAST_REST_S, (2 * _FEWEST - 1) * np.median(np.diff(track.t[::stride]))))
 
 
-def _stride(track: Track) -> int:
+def _stride(track: PoseTrack) -> int:
     """Every how many frames one is new: trackers repeat a pose until there is another, or smooth over many a second."""
     if len(track.t) < 2:
         return 1
@@ -103,39 +111,35 @@ def _noise(T: Array) -> Array:
 
     Parts rest most of the time, so the median of the differences is that of a part that rests.
     """
+    # 1.4826 times the median of |x| is the deviation of a Gaussian; a difference of two frames has sqrt(2) times it.
     d = pose.log(pose.inverse(T[:-1]) @ T[1:])
     return np.asarray(1.4826 * np.median(np.abs(d), axis=0) / np.sqrt(2.0))
 
 
-def _half_window(t: Array, rest_s: float) -> int:
-    """Frames in half of the least rest."""
-    return max(3, round(0.5 * rest_s / max(float(np.median(np.diff(t))), 1e-6)))
-
-
-def _still_spans(T: Array, noise: Array, m: int) -> list[tuple[int, int]]:
+def _still_spans(T: Array, noise: Array, m: int) -> list[_Span]:
     """First and last frame of each stretch of still frames, with the half windows at its ends."""
     n = len(T)
     if n <= 2 * m:
         return [(0, n - 1)]
+    # Twists of the m frames before each frame and of the m after it, from its own pose: (n - 2 m, 2 m + 1, 6).
     window = np.arange(n - 2 * m)[:, None] + np.arange(2 * m + 1)
-    middle = pose.inverse(T[m : n - m])
-    xi = pose.log(middle[:, None] @ T[window])
+    xi = pose.log(pose.inverse(T[m : n - m])[:, None] @ T[window])
     change = np.median(xi[:, m + 1 :], axis=1) - np.median(xi[:, :m], axis=1)
     still = np.linalg.norm(change / noise, axis=1) < _STILL * _MEDIAN / np.sqrt(m)
-    spans: list[tuple[int, int]] = []
+    spans: list[_Span] = []
     for a, b in _runs(still):
         begin = a
-        end = b + 2 * m
         if spans and begin <= spans[-1][1]:
-            before, was = spans.pop()
-            half = (begin + was) // 2
-            spans.append((before, half))
+            # The half windows of two stretches overlap: each gets half of what they share.
+            first, last = spans.pop()
+            half = (begin + last) // 2
+            spans.append((first, half))
             begin = half + 1
-        spans.append((begin, end))
+        spans.append((begin, b + 2 * m))
     return spans
 
 
-def _runs(flags: NDArray[np.bool_]) -> list[tuple[int, int]]:
+def _runs(flags: NDArray[np.bool_]) -> list[_Span]:
     """First and last index of each run of True."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
     return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
@@ -153,7 +157,7 @@ def _trimmed(T: Array, a: int, b: int, noise: Array) -> tuple[int, int]:
     return a + int(np.argmax(good)), b - int(np.argmax(good[::-1]))
 
 
-def _split(T: Array, a: int, b: int, noise: Array) -> list[tuple[int, int]]:
+def _split(T: Array, a: int, b: int, noise: Array) -> list[_Span]:
     """The stretch, or its parts between small shifts."""
     n = b - a + 1
     if n < 2 * _FEWEST:
@@ -161,6 +165,8 @@ def _split(T: Array, a: int, b: int, noise: Array) -> list[tuple[int, int]]:
     mean = average(T[a : b + 1])
     xi = np.clip(pose.log(pose.inverse(mean.T) @ T[a : b + 1]) / noise, -4.0, 4.0)
     sums = np.cumsum(xi, axis=0)
+    # With the frame before which it is cut after k of n: the squared difference of the two means in units of its
+    # variance 1/k + 1/(n - k) is chi-square with 6 degrees of freedom if there is no shift.
     k = np.arange(1, n)
     gap = sums[:-1] / k[:, None] - (sums[-1] - sums[:-1]) / (n - k)[:, None]
     chi = (gap**2).sum(axis=1) * k * (n - k) / n / _alike(xi)
@@ -178,6 +184,8 @@ def _alike(xi: Array) -> float:
 
     Told by differences, which a shift of the mean does not touch: their mean square is 2 (1 - r) times the variance.
     """
+    # Neighbours differ by 2 (1 - r) v in the mean square, frames that are far apart by 2 v. The variance of a mean of
+    # errors with correlation r from frame to frame is (1 + r) / (1 - r) times that of independent ones.
     far = max(1, min(len(xi) // 4, 8))
     near = float(np.median(np.abs(np.diff(xi, axis=0))))
     wide = float(np.median(np.abs(xi[far:] - xi[:-far])))
@@ -185,25 +193,26 @@ def _alike(xi: Array) -> float:
     return (1.0 + r) / (1.0 - min(r, 0.99))
 
 
-def _merged(T: Array, spans: list[tuple[int, int]], noise: Array, m: int) -> list[tuple[int, int]]:
+def _merged(T: Array, spans: list[_Span], noise: Array, m: int) -> list[_Span]:
     """Neighbouring stretches of one pose become one, unless the part went away and came back."""
-    found: list[tuple[int, int]] = []
-    for a, b in spans:
-        if found and _one_rest(T, found[-1], (a, b), noise, m):
-            a = found.pop()[0]
-        found.append((a, b))
-    return found
+    merged: list[_Span] = []
+    for first, last in spans:
+        if merged and _one_rest(T, merged[-1], (first, last), noise, m):
+            merged[-1] = (merged[-1][0], last)
+        else:
+            merged.append((first, last))
+    return merged
 
 
-def _one_rest(T: Array, before: tuple[int, int], after: tuple[int, int], noise: Array, m: int) -> bool:
-    one, two = (average(T[a : b + 1]) for a, b in (before, after))
-    off = pose.log(pose.inverse(one.T) @ two.T)
-    spread = noise * np.sqrt(1.0 / one.independent + 1.0 / two.independent)
-    apart = float(((off / spread) ** 2).sum())
-    if apart > _SHIFTED and (np.abs(off[:3]).max() > _SAME_M or np.abs(off[3:]).max() > _SAME_RAD):
+def _one_rest(T: Array, before: _Span, after: _Span, noise: Array, m: int) -> bool:
+    mean, mean_after = (average(T[a : b + 1]) for a, b in (before, after))
+    off = pose.log(pose.inverse(mean.T) @ mean_after.T)
+    deviation = noise * np.sqrt(1.0 / mean.independent + 1.0 / mean_after.independent)
+    chi = float(((off / deviation) ** 2).sum())
+    if chi > _SHIFTED and (np.abs(off[:3]).max() > _SAME_M or np.abs(off[3:]).max() > _SAME_RAD):
         return False
     between = T[before[1] + 1 : after[0]]
     if len(between) <= m:
         return True
-    away = np.abs(np.median(pose.log(pose.inverse(one.T) @ between), axis=0) / noise)
+    away = np.abs(np.median(pose.log(pose.inverse(mean.T) @ between), axis=0) / noise)
     return bool((away < 3.0).all())

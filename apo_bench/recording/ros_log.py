@@ -12,23 +12,23 @@ from apo_bench.errors import InputError, one_line
 from apo_bench.geometry import pose
 from apo_bench.io.reading import decoded, read_bytes
 from apo_bench.recording.camera_file import Conventions
-from apo_bench.recording.columns import Column, poses
+from apo_bench.recording.columns import LogColumn, check_length, poses
 from apo_bench.recording.csv_log import read_numbers
-from apo_bench.recording.log import LARGEST_BYTES, MOST_ROWS, Rows
+from apo_bench.recording.log import LARGEST_LOG_BYTES, MOST_POSES, LogRows
 
 _FIELDS = {
-    **{f"{kind}.{axis}": Column(axis, "m") for kind in ("position", "translation") for axis in "xyz"},
-    **{f"{kind}.{axis}": Column(f"q{axis}", "") for kind in ("orientation", "rotation") for axis in "wxyz"},
-    **{name: Column("seconds", "s") for name in ("stamp.sec", "stamp.secs")},
-    **{name: Column("nanoseconds", "ns") for name in ("stamp.nanosec", "stamp.nsecs")},
-    "stamp": Column("stamp", "ns"),
-    "time": Column("time", ""),
-    "child_frame_id": Column("id", ""),
+    **{f"{kind}.{axis}": LogColumn(axis, "m") for kind in ("position", "translation") for axis in "xyz"},
+    **{f"{kind}.{axis}": LogColumn(f"q{axis}", "") for kind in ("orientation", "rotation") for axis in "wxyz"},
+    **{name: LogColumn("seconds", "s") for name in ("stamp.sec", "stamp.secs")},
+    **{name: LogColumn("nanoseconds", "ns") for name in ("stamp.nanosec", "stamp.nsecs")},
+    "stamp": LogColumn("stamp", "ns"),
+    "time": LogColumn("time", ""),
+    "child_frame_id": LogColumn("id", ""),
 }
 _NOTES = ["lengths in m, as in ROS", "quaternions by the names of the fields, as in ROS"]
 
 
-def read_ros_csv(path: Path, how: Conventions) -> tuple[Rows, list[str]]:
+def read_ros_csv(path: Path, how: Conventions) -> tuple[LogRows, list[str]]:
     """Columns such as `field.header.stamp`, `pose.position.x`; without child_frame_id one file is one object.
 
     A stamp in one column is in nanoseconds if it is whole, as ROS writes it, else in seconds.
@@ -44,44 +44,40 @@ def read_ros_csv(path: Path, how: Conventions) -> tuple[Rows, list[str]]:
         raise InputError(f"{path}: the column of the time is missing, such as header.stamp.sec; export the header too.")
     places = [f"{path}, line {line}" for line in table.lines]
     T, _ = poses(cells, table.units, how, str(path), places)
-    return Rows(table.ids, t, T, places), _NOTES
+    return LogRows(table.ids, t, T, places), _NOTES
 
 
-def read_ros_json(path: Path, how: Conventions) -> tuple[Rows, list[str]]:
+def read_ros_json(path: Path, how: Conventions) -> tuple[LogRows, list[str]]:
     """A list of messages, or one message per line; a topic names the object where there is no child_frame_id."""
     ids = list[str]()
     t = list[float]()
     packed = list[list[float]]()
     places = list[str]()
     for place, message in _messages(path):
-        for one in _stamped(message):
-            if len(ids) == MOST_ROWS:
-                raise InputError(f"{place}: a log of at most {MOST_ROWS:,} poses is needed; cut it.")
-            ids.append(one.get("child_frame_id") or message.get("topic") or path.stem)
-            t.append(_stamp(one, place))
-            packed.append(_pose(one, place))
+        for stamped in _stamped(message):
+            if len(ids) == MOST_POSES:
+                raise InputError(f"{place}: a log of at most {MOST_POSES:,} poses is needed; cut it.")
+            ids.append(stamped.get("child_frame_id") or message.get("topic") or path.stem)
+            t.append(_stamp(stamped, place))
+            packed.append(_pose(stamped, place))
             places.append(place)
     numbers = np.array(packed).reshape(-1, 7)
-    length = np.linalg.norm(numbers[:, 3:], axis=1)
-    if (np.abs(length - 1.0) > 0.02).any():
-        k = int(np.argmax(np.abs(length - 1.0)))
-        raise InputError(f"{places[k]}: a quaternion of length 1 is needed, one of length {length[k]:.4g} was given.")
-    return Rows([str(name).strip("/") for name in ids], np.array(t), pose.unpack(numbers), places), _NOTES
+    check_length(numbers[:, 3:], "a quaternion", places)
+    return LogRows([str(name).strip("/") for name in ids], np.array(t), pose.unpack(numbers), places), _NOTES
 
 
-def _field(name: str) -> Column | None:
+def _field(name: str) -> LogColumn | None:
     """What a column is, by the last names in it: `field.pose.position.x`, `/vision/pose/position/x`."""
     words = re.split(r"[./]", name.strip().lower().lstrip("%"))
     return _FIELDS.get(".".join(words[-2:])) or _FIELDS.get(words[-1])
 
 
 def _messages(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
-    text = decoded(read_bytes(path, "log", LARGEST_BYTES), str(path), "log")
+    text = decoded(read_bytes(path, "log", LARGEST_LOG_BYTES), str(path), "log")
     if not text.strip():
         raise InputError(f"{path}: the file is empty; a list of messages is needed, or one message per line.")
     by_line = not text.lstrip().startswith("[")
-    found = text.splitlines() if by_line else [text]
-    for line, part in enumerate(found, start=1):
+    for line, part in enumerate(text.splitlines() if by_line else [text], start=1):
         if not part.strip():
             continue
         try:
@@ -101,8 +97,10 @@ def _stamped(message: dict[str, Any]) -> Iterator[dict[str, Any]]:
         if isinstance(message.get(key), dict):
             yield from _stamped(message[key])
             return
-    inside = message.get("transforms")
-    yield from (one for one in inside if isinstance(one, dict)) if isinstance(inside, list) else [message]
+    transforms = message.get("transforms")
+    yield from (
+        (stamped for stamped in transforms if isinstance(stamped, dict)) if isinstance(transforms, list) else [message]
+    )
 
 
 def _stamp(message: dict[str, Any], place: str) -> float:

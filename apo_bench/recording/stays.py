@@ -8,7 +8,8 @@ import numpy as np
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.recording.rests import Rest
+from apo_bench.recording.log import PoseTrack
+from apo_bench.recording.rests import Rest, rests_of
 
 _ADJUSTED_M = 0.01
 _ADJUSTED_RAD = np.radians(10.0)
@@ -39,33 +40,37 @@ class Stay:
 
     def at(self, t: float) -> Rest:
         """The rest at a time, else the last one before it."""
-        before = [rest for rest in self.rests if rest.begins <= t]
-        return before[-1] if before else self.rests[0]
+        return next((rest for rest in reversed(self.rests) if rest.begins <= t), self.rests[0])
 
 
 Stays = Mapping[str, tuple[Stay, ...]]
 """Part -> where it stayed, in order of time."""
 
 
+def all_stays(tracks: Mapping[str, PoseTrack]) -> Stays:
+    """Where every part of a log stayed; nowhere, if it never rests."""
+    return {part: stays_of(part, rests_of(track)) for part, track in tracks.items()}
+
+
 def stays_of(part: str, rests: Sequence[Rest]) -> tuple[Stay, ...]:
     """The stays of a part, in order of time."""
-    found: list[list[Rest]] = []
+    groups: list[list[Rest]] = []
     for rest in rests:
-        if found and _is_adjusted(found[-1][-1], rest):
-            found[-1].append(rest)
+        if groups and _is_adjusted(groups[-1][-1], rest):
+            groups[-1].append(rest)
         else:
-            found.append([rest])
-    return tuple(Stay(part, tuple(together)) for together in found)
+            groups.append([rest])
+    return tuple(Stay(part, tuple(together)) for together in groups)
 
 
 def poses_at(stays: Mapping[str, Sequence[Stay]], t: float) -> Mapping[str, Array]:
     """Where every part is at a time, in the frame of the camera: of one that moves, where it was last; (4, 4), [m]."""
-    found: dict[str, Array] = {}
-    for part, known in stays.items():
-        before = [stay for stay in known if stay.begins <= t]
-        if before or known:
-            found[part] = (before[-1] if before else known[0]).at(t).T
-    return found
+    latest = {
+        part: next((stay for stay in reversed(known) if stay.begins <= t), known[0])
+        for part, known in stays.items()
+        if known
+    }
+    return {part: stay.at(t).T for part, stay in latest.items()}
 
 
 def _is_adjusted(before: Rest, after: Rest) -> bool:

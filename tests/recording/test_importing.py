@@ -11,12 +11,12 @@ from scipy.spatial.transform import Rotation
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.recording.averaging import average
-from apo_bench.recording.bare import bare_recording
 from apo_bench.recording.camera_file import CameraFile, Conventions
-from apo_bench.recording.importing import Imported, import_recording
-from apo_bench.recording.log import Track
+from apo_bench.recording.importing import ImportedRecording, import_recording
+from apo_bench.recording.log import PoseTrack
+from apo_bench.recording.operations import last_straight
 from apo_bench.recording.ordering import Stated
-from apo_bench.recording.paths import Path, last_straight
+from apo_bench.recording.without_scenario import unplanned_recording
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import layout_at
 from tests.recorded import CAMERA, motion, seen
@@ -28,8 +28,8 @@ KNOWN = replace(GIVEN, T_world_camera=None, known=dict.fromkeys(("castle1", "cas
 
 
 def imported(
-    tracks: dict[str, Track], camera: CameraFile = GIVEN, name: str = NAME, stated: Stated = NOTHING
-) -> Imported:
+    tracks: dict[str, PoseTrack], camera: CameraFile = GIVEN, name: str = NAME, stated: Stated = NOTHING
+) -> ImportedRecording:
     return import_recording(tracks, camera, load_scenario(name), stated, "log.csv")
 
 
@@ -58,7 +58,7 @@ def test_frames_that_are_wrong_and_frames_that_are_missing_change_nothing() -> N
         wrong = T.copy()
         wrong[::17] = wrong[::17] @ pose.at((0.05, 0.0, 0.0), (0.0, 120.0, 0.0))
         kept = rng.random(len(t)) > 0.2
-        tracks[part] = Track(t[kept], wrong[kept])
+        tracks[part] = PoseTrack(t[kept], wrong[kept])
     found = imported(tracks)
     off = pose.log(pose.inverse(goals(NAME)) @ found.observation.goals)
     assert np.abs(off[:, :3]).max() < 1e-3
@@ -68,7 +68,7 @@ def test_frames_that_are_wrong_and_frames_that_are_missing_change_nothing() -> N
 def test_frames_that_a_tracker_repeats_make_nothing_surer() -> None:
     tracks = seen(NAME, 0.5)
     often = {
-        part: Track((t[:, None] + np.arange(3) / 90.0).ravel(), np.repeat(T, 3, axis=0))
+        part: PoseTrack((t[:, None] + np.arange(3) / 90.0).ravel(), np.repeat(T, 3, axis=0))
         for part, (t, T) in tracks.items()
     }
     found = imported(often)
@@ -105,14 +105,14 @@ def test_the_last_straight_piece_of_a_bent_path_is_found_with_its_length() -> No
     T = np.tile(np.eye(4), (60, 1, 1))
     T[:, :3, 3] = np.concatenate([bent, down]) + noise
     T[50, :3, 3] += [0.0, 0.08, 0.0]  # a frame that is wrong
-    found = last_straight(Path(np.arange(60.0), T), np.eye(4))
+    found = last_straight(PoseTrack(np.arange(60.0), T), np.eye(4))
     assert found is not None
     assert found.direction @ [0.0, 0.0, -1.0] > np.cos(np.radians(5.0))
     assert 0.05 < found.length_m < 0.09
 
 
 def test_without_a_scenario_the_order_is_found_all_the_same() -> None:
-    puts = bare_recording(seen("carried_bridge", 0.5), GIVEN, "log.csv").puts
+    puts = unplanned_recording(seen("carried_bridge", 0.5), GIVEN, "log.csv").puts
     operations = load_scenario("carried_bridge").assembly.operations
     assert [(put.part, *put.carries) for put in puts[:4]] == [operation.moves for operation in operations[:4]]
     assert {puts[4].part, *puts[4].carries} == set(operations[4].moves)
@@ -157,7 +157,7 @@ MISTAKES = {
 @pytest.mark.parametrize("camera", [GIVEN, KNOWN], ids=["given", "solved"])
 def test_a_usual_mistake_is_named_with_what_mends_it(mistake: str, camera: CameraFile) -> None:
     change, sentence = MISTAKES[mistake]
-    tracks = {part: Track(t, change(T @ pose.inverse(MODEL)) @ MODEL) for part, (t, T) in seen(NAME, 0.3).items()}
+    tracks = {part: PoseTrack(t, change(T @ pose.inverse(MODEL)) @ MODEL) for part, (t, T) in seen(NAME, 0.3).items()}
     with pytest.raises(InputError, match=sentence) as found:
         import_recording(tracks, camera, load_scenario(NAME), NOTHING, "log.csv", dict.fromkeys(tracks, MODEL))
     assert str(found.value).endswith(".")
@@ -166,7 +166,7 @@ def test_a_usual_mistake_is_named_with_what_mends_it(mistake: str, camera: Camer
 
 def test_a_contact_that_is_open_by_more_than_noise_is_unclear() -> None:
     tracks = seen(NAME, 0.3)
-    aside = Track(tracks["stick"].t, tracks["stick"].T @ pose.at((-0.155, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    aside = PoseTrack(tracks["stick"].t, tracks["stick"].T @ pose.at((-0.155, 0.0, 0.0), (0.0, 0.0, 0.0)))
     assert imported(tracks).unclear == ()
     assert "operation 3 (stick) leaves a contact open by 1" in imported({**tracks, "stick": aside}).unclear[0]
 
@@ -180,7 +180,7 @@ def test_euler_angles_about_other_axes_and_in_radians_are_named() -> None:
             wrong = T.copy()
             angles = np.radians(R.as_euler("xyz")) if other == "radians" else R.as_euler(other)
             wrong[:, :3, :3] = Rotation.from_euler("xyz", angles).as_matrix()
-            tracks[part] = Track(t, wrong)
+            tracks[part] = PoseTrack(t, wrong)
         with pytest.raises(InputError, match=sentence):
             imported(tracks, stated)
 
@@ -191,7 +191,7 @@ def test_a_pose_of_the_world_in_the_camera_is_named() -> None:
 
 
 def test_time_that_runs_backwards_is_named() -> None:
-    tracks = {part: Track(t[-1] - t[::-1], T[::-1]) for part, (t, T) in seen(NAME, 0.3).items()}
+    tracks = {part: PoseTrack(t[-1] - t[::-1], T[::-1]) for part, (t, T) in seen(NAME, 0.3).items()}
     with pytest.raises(InputError, match=r"log\.csv: time seems to run backwards"):
         imported(tracks)
 

@@ -7,8 +7,8 @@ import pytest
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.recording.log import Track
-from apo_bench.recording.rests import REST_S, rests_of
+from apo_bench.recording.log import PoseTrack
+from apo_bench.recording.rests import LEAST_REST_S, rests_of
 from apo_bench.recording.stays import poses_at, stays_of
 from tests.recorded import RATE_HZ, seen
 
@@ -20,12 +20,12 @@ def at_rest(T: Array, n: int, rng: np.random.Generator) -> Array:
     return T @ pose.exp(rng.standard_normal((n, 6)) * np.repeat([2e-5, 1.7e-4], 3))
 
 
-def adjusted(mm: float, first: int, last: int) -> Track:
+def adjusted(mm: float, first: int, last: int) -> PoseTrack:
     """A part that rests for some frames, and for some more where it was pushed to along x and y."""
     rng = np.random.default_rng(0)
     after = BEFORE @ pose.at((mm * 1e-3, mm * 1e-3, 0.0))
     T = np.concatenate([at_rest(BEFORE, first, rng), at_rest(after, last, rng)])
-    return Track(np.arange(len(T)) / RATE_HZ, T)
+    return PoseTrack(np.arange(len(T)) / RATE_HZ, T)
 
 
 def test_rests_last_as_long_as_they_did() -> None:
@@ -45,7 +45,7 @@ def test_a_few_frames_beside_a_rest_are_no_rest(frames: int, rests: int) -> None
     """Pushed by 0.55 mm along two axes, which no single frame shows."""
     found = rests_of(adjusted(0.55, 120, frames))
     assert len(found) == rests
-    assert all(rest.seconds >= REST_S / 2 for rest in found)
+    assert all(rest.seconds >= LEAST_REST_S / 2 for rest in found)
 
 
 def test_an_adjusted_part_stays_and_is_where_it_was_last() -> None:

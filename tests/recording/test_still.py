@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from apo_bench.observation.fitting.fit import fit_noise
-from apo_bench.recording.log import Log, Track
-from apo_bench.recording.still import still_residuals
+from apo_bench.recording.log import Log, PoseTrack
+from apo_bench.recording.still_noise import still_residuals
 from tests.recorded import seen
 
 
@@ -15,7 +15,7 @@ def test_scatter_and_missing_frames_are_those_that_were_made() -> None:
     tracks = {}
     for part, (t, T) in seen("stick_in_tower", 0.8, seed=5).items():
         kept = rng.random(len(t)) > 0.1
-        tracks[part] = Track(t[kept], T[kept])
+        tracks[part] = PoseTrack(t[kept], T[kept])
     found = still_residuals(Log("log", tracks, ()))
     measured = fit_noise(found, "still")
     # some 400 frames: a scale is known within 5 %, four of those

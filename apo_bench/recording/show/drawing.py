@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import combinations, product
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
@@ -11,16 +12,15 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid
 from apo_bench.io.figures import default_looks, save_figure
-from apo_bench.recording.log import Track
+from apo_bench.recording.log import PoseTrack
 from apo_bench.recording.stays import Stays
 
 _AXES = ("#c0392b", "#2e8b57", "#2456a6")
 _PARTS = ("#cc5c45", "#4588c7", "#b8a02a", "#6b8e23", "#8e5ea2", "#3cba9f", "#777777")
 _AXIS_M = 0.03
-_EDGES = [(i, j) for i in range(8) for j in range(i + 1, 8) if bin(i ^ j).count("1") == 1]
 
 
-class Straight(NamedTuple):
+class DrawnEnd(NamedTuple):
     """The last straight piece of a path."""
 
     part: str
@@ -32,11 +32,11 @@ class Straight(NamedTuple):
 
 @final
 @dataclass(frozen=True, eq=False)
-class Drawing:
+class RecordingDrawing:
     """What is drawn of a recording."""
 
     title: str
-    tracks: Mapping[str, Track]
+    tracks: Mapping[str, PoseTrack]
     """Of parts, camera from part."""
     stays: Stays
     T_world_camera: Array | None
@@ -47,11 +47,11 @@ class Drawing:
     """For the box around each part."""
     places: Mapping[str, Array] = field(default_factory=dict)
     """Part -> the known place on which it should start, (4, 4), world, [m]."""
-    straight: Sequence[Straight] = ()
+    path_ends: Sequence[DrawnEnd] = ()
 
 
 @default_looks()
-def draw_recording(drawing: Drawing, out: Path) -> None:
+def draw_recording(drawing: RecordingDrawing, out: Path) -> None:
     """Write the picture as PNG: all frames, the parts from near, and when each part rested."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -64,8 +64,8 @@ def draw_recording(drawing: Drawing, out: Path) -> None:
     if drawing.T_world_camera is not None:
         _draw_frame(room, np.eye(4), 0.12, "world")
     _draw_frame(room, X, 0.12, "camera")
-    for axes, reach in ((room, 0.05), (near, _AXIS_M)):
-        _draw_parts(axes, drawing, X, reach, axes is near)
+    _draw_parts(room, drawing, X, 0.05, False)
+    _draw_parts(near, drawing, X, _AXIS_M, True)
     ends = [(X @ track.T)[i] for track in drawing.tracks.values() for i in (0, -1)]
     rests = [X @ known[i].rests[-1].T for known in drawing.stays.values() if known for i in (0, -1)]
     places = np.array([T[:3, 3] for T in (*(rests or ends), *drawing.places.values())])
@@ -79,10 +79,10 @@ def draw_recording(drawing: Drawing, out: Path) -> None:
     save_figure(figure, out, given="--picture ")
 
 
-def _draw_parts(axes: Any, drawing: Drawing, X: Array, reach: float, close: bool) -> None:
-    for color, (part, track) in zip(_colors(len(drawing.tracks)), drawing.tracks.items(), strict=True):
-        path = (X @ track.T)[:, :3, 3]
-        axes.plot(*path.T, color=color, linewidth=0.8, alpha=0.7, label=part)
+def _draw_parts(axes: Any, drawing: RecordingDrawing, X: Array, reach: float, close: bool) -> None:
+    for i, (part, track) in enumerate(drawing.tracks.items()):
+        color = _color(i)
+        axes.plot(*(X @ track.T)[:, :3, 3].T, color=color, linewidth=0.8, alpha=0.7, label=part)
         known = drawing.stays[part]
         for stay, name in zip((known[0], known[-1]) if known else (), (part, ""), strict=False):
             T = X @ stay.rests[-1].T
@@ -91,23 +91,24 @@ def _draw_parts(axes: Any, drawing: Drawing, X: Array, reach: float, close: bool
                 _draw_box(axes, drawing.solids[part], T, color, "-")
         if close and part in drawing.places and part in drawing.solids:
             _draw_box(axes, drawing.solids[part], drawing.places[part], "black", ":")
-        for piece in drawing.straight if close else ():
+        for piece in drawing.path_ends if close else ():
             if piece.part == part:
                 ends = np.array([piece.begin, piece.end])
                 axes.plot(*ends.T, color=color, linewidth=4.0, alpha=0.6, label=piece.label)
 
 
-def _draw_times(axis: Any, drawing: Drawing) -> None:
-    tracks = drawing.tracks
-    stays = drawing.stays
-    rows = {part: i for i, part in enumerate(tracks)}
-    for color, (part, track) in zip(_colors(len(tracks)), tracks.items(), strict=True):
-        first = stays[part][0].rests[0].T if stays[part] else track.T[0]
+def _draw_times(axis: Any, drawing: RecordingDrawing) -> None:
+    rows = {part: i for i, part in enumerate(drawing.tracks)}
+    for part, row in rows.items():
+        color = _color(row)
+        track = drawing.tracks[part]
+        stays = drawing.stays[part]
+        first = stays[0].rests[0].T if stays else track.T[0]
         far = np.linalg.norm((pose.inverse(first) @ track.T)[:, :3, 3], axis=1)
-        axis.plot(track.t, rows[part] - 0.4 + 0.8 * far / max(float(far.max()), 1e-6), color=color, linewidth=0.8)
-        for stay in stays[part]:
+        axis.plot(track.t, row - 0.4 + 0.8 * far / max(float(far.max()), 1e-6), color=color, linewidth=0.8)
+        for stay in stays:
             for rest in stay.rests:
-                axis.barh(rows[part], rest.ends - rest.begins, left=rest.begins, height=0.8, color=color, alpha=0.25)
+                axis.barh(row, rest.ends - rest.begins, left=rest.begins, height=0.8, color=color, alpha=0.25)
     for k, (part, t) in enumerate(drawing.ended, 1):
         axis.text(t, rows[part] + 0.42, f"{k}", fontsize=10, ha="left", va="bottom", fontweight="bold")
         axis.plot([t, t], [rows[part] - 0.4, rows[part] + 0.5], color="black", linewidth=0.8)
@@ -126,12 +127,11 @@ def _draw_frame(axis: Any, T: Array, size: float, name: str) -> None:
 
 
 def _draw_box(axis: Any, solid: Solid, T: Array, color: str, style: str) -> None:
-    low = np.min([piece.center - piece.half for piece in solid.pieces], axis=0)
-    high = np.max([piece.center + piece.half for piece in solid.pieces], axis=0)
-    corners = np.array([[(low, high)[(i >> axis_) & 1][axis_] for axis_ in range(3)] for i in range(8)])
-    world = pose.apply(T, corners)
-    for i, j in _EDGES:
-        axis.plot(*world[[i, j]].T, color=color, linestyle=style, linewidth=0.9, alpha=0.8)
+    corners = [np.array(corner[::-1]) for corner in product((0, 1), repeat=3)]
+    for a, b in combinations(corners, 2):
+        if np.abs(a - b).sum() == 1:
+            ends = np.where(np.array([a, b]) == 1, solid.bounds[1], solid.bounds[0])
+            axis.plot(*pose.apply(T, ends).T, color=color, linestyle=style, linewidth=0.9, alpha=0.8)
 
 
 def _level(axis: Any, points: Array, least: float) -> None:
@@ -140,9 +140,7 @@ def _level(axis: Any, points: Array, least: float) -> None:
 
     middle = (points.max(axis=0) + points.min(axis=0)) / 2
     reach = max(0.55 * float(np.ptp(points, axis=0).max()), least)
-    axis.set_xlim(middle[0] - reach, middle[0] + reach)
-    axis.set_ylim(middle[1] - reach, middle[1] + reach)
-    axis.set_zlim(middle[2] - reach, middle[2] + reach)
+    axis.set(**{f"{name}lim": (at - reach, at + reach) for name, at in zip("xyz", middle, strict=True)})
     axis.set_box_aspect((1, 1, 1))
     for each in (axis.xaxis, axis.yaxis, axis.zaxis):
         each.set_major_locator(MaxNLocator(5))
@@ -150,5 +148,5 @@ def _level(axis: Any, points: Array, least: float) -> None:
     axis.view_init(elev=28.0, azim=-60.0)
 
 
-def _colors(n: int) -> list[str]:
-    return [_PARTS[i % len(_PARTS)] for i in range(n)]
+def _color(i: int) -> str:
+    return _PARTS[i % len(_PARTS)]

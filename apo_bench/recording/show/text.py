@@ -9,16 +9,19 @@ import numpy as np
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.io.words import columns, direction
-from apo_bench.recording.approach import approaches
-from apo_bench.recording.bare import Bare
 from apo_bench.recording.camera_pose import CameraPose
-from apo_bench.recording.importing import Imported
+from apo_bench.recording.importing import ImportedRecording
 from apo_bench.recording.log import Log
 from apo_bench.recording.objects_file import ObjectsFile
+from apo_bench.recording.operations import approaches
 from apo_bench.recording.rests import Rest
+from apo_bench.recording.without_scenario import UnplannedRecording
 
 _HEADS = ("", "part", "rests from", "until s", "frames", "outliers", "x mm", "y mm", "z mm", "a frame is off by")
 _MOST_TIMES = 5
+_POSE_UNITS = np.array([1e3, 1e3, 1e3, 1.0, 1.0, 1.0, 1.0])
+"""mm for m of a packed pose."""
+_POSE_UNITS.flags.writeable = False
 
 
 def reading_lines(log: Log, objects: ObjectsFile) -> list[tuple[str, str]]:
@@ -26,42 +29,32 @@ def reading_lines(log: Log, objects: ObjectsFile) -> list[tuple[str, str]]:
     frames = sum(len(track.t) for track in log.tracks.values())
     lines = [("log", f"{log.file}: {len(log.tracks)} ids, {frames} poses, {log.seconds:.1f} s")]
     lines += [("read as", "; ".join(log.notes))]
-    for part, one in objects.parts.items():
-        lines.append(("frame", f"{part} is id {one.id}, its frame {_said(one.T_model_part)}, in the tracker's model"))
+    for part, tracked in objects.parts.items():
+        frame = _pose_text(tracked.T_model_part)
+        lines.append(("frame", f"{part} is id {tracked.id}, its frame {frame}, in the tracker's model"))
     return lines
 
 
 def camera_lines(camera: CameraPose) -> list[tuple[str, str]]:
     """Where the camera stands, and how well known places agree."""
-    stands = f"{_said(camera.T_world_camera)}; its axes are those of OpenCV"
+    stands = f"{_pose_text(camera.T_world_camera)}; its axes are those of OpenCV"
     if not camera.residuals:
         return [("camera", f"as stated: {stands}")]
-    off = ", ".join(f"{p} {1e3 * np.linalg.norm(r[:3]):.2f} mm {_deg(r):.2f} deg" for p, r in camera.residuals.items())
+    off = ", ".join(f"{part} {_mm(r):.2f} mm {_deg(r):.2f} deg" for part, r in camera.residuals.items())
     return [("camera", f"solved: {stands}"), ("residuals", off)]
 
 
-def imported_lines(found: Imported) -> list[tuple[str, str]]:
+def imported_lines(recording: ImportedRecording) -> list[tuple[str, str]]:
     """What is known of starts, contacts, paths, and what stays unclear."""
-    stood = {
-        whence: [part for part, one in found.stood.items() if one == whence] for whence in ("known", "seen", "scenario")
-    }
-    said = [
-        f"{', '.join(parts)} {how}"
-        for how, parts in (
-            ("on known places", stood["known"]),
-            ("where they were seen, standing as in the scenario", stood["seen"]),
-            ("as in the scenario", stood["scenario"]),
-        )
-        if parts
-    ]
+    fit = recording.fit
     lines = [
-        ("starts", "; ".join(said)),
+        ("starts", _starts(recording.stood)),
         (
             "contacts",
-            f"open by up to {1e3 * found.fit.gap_m:.2f} mm and {np.degrees(found.fit.angle_rad):.2f} deg as seen",
+            f"open by up to {1e3 * fit.gap_m:.2f} mm and {np.degrees(fit.angle_rad):.2f} deg as seen",
         ),
     ]
-    if not found.stays_stated:
+    if not recording.stays_stated:
         lines.append(
             (
                 "noise",
@@ -69,24 +62,31 @@ def imported_lines(found: Imported) -> list[tuple[str, str]]:
                 "state [noise] in the camera file",
             )
         )
-    lines += [("path", text) for text in _paths(found)]
-    for k, one in enumerate(found.operations):
-        if one.rest is None:
-            lines.append(("not seen", f"operation {k + 1}, as stated"))
-        lines += [
-            ("moved", f"{part} by {_far(moved)} in the hand during operation {k + 1}")
-            for part, moved in one.carried.items()
-            if np.linalg.norm(moved[:3]) > 1e-3
-        ]
-        lines += [
-            (
-                "moved",
-                f"{part} by {_far(moved)} during operation {k + 1}, which does not move it: counted into its error",
-            )
-            for part, moved in one.adjusted.items()
-            if np.linalg.norm(moved[:3]) > 1e-3
-        ]
-    return lines + [("unclear", text) for text in found.unclear]
+    lines += [("path", text) for text in _paths(recording)]
+    for k, operation in enumerate(recording.operations, 1):
+        if operation.rest is None:
+            lines.append(("not seen", f"operation {k}, as stated"))
+        for moved, how in (
+            (operation.carried, f"in the hand during operation {k}"),
+            (operation.adjusted, f"during operation {k}, which does not move it: counted into its error"),
+        ):
+            lines += [
+                ("moved", f"{part} by {_mm(twist):.1f} mm and {_deg(twist):.1f} deg {how}")
+                for part, twist in moved.items()
+                if np.linalg.norm(twist[:3]) > 1e-3
+            ]
+    return lines + [("unclear", text) for text in recording.unclear]
+
+
+def _starts(stood: Mapping[str, str]) -> str:
+    """Which parts start where, by how that is known; those that stood otherwise are unclear, and stand there."""
+    how = {
+        "known": "on known places",
+        "seen": "where they were seen, standing as in the scenario",
+        "scenario": "as in the scenario",
+    }
+    parts = {whence: [part for part, each in stood.items() if each == whence] for whence in how}
+    return "; ".join(f"{', '.join(parts[whence])} {how[whence]}" for whence in how if parts[whence])
 
 
 def rest_lines(rests: Sequence[tuple[str, Rest | None]], X: Array, times: Mapping[str, Array]) -> list[str]:
@@ -106,21 +106,19 @@ def rest_lines(rests: Sequence[tuple[str, Rest | None]], X: Array, times: Mappin
         if rest is None or rest.mean.inlier.all():
             continue
         t = times[part][rest.first : rest.last + 1][~rest.mean.inlier]
-        shown = ", ".join(f"{x:.2f}" for x in t[:_MOST_TIMES]) + (", ..." if len(t) > _MOST_TIMES else "")
-        outliers.append(f"outliers of operation {k} ({part}) at {shown} s, left out")
+        first_few = ", ".join(f"{x:.2f}" for x in t[:_MOST_TIMES]) + (", ..." if len(t) > _MOST_TIMES else "")
+        outliers.append(f"outliers of operation {k} ({part}) at {first_few} s, left out")
     return [*columns([_HEADS, *cells]), *([""] if outliers else []), *outliers]
 
 
-def put_lines(found: Bare) -> list[str]:
+def put_lines(recording: UnplannedRecording) -> list[str]:
     """What a log says by itself of the order of operations."""
-    said = []
-    for k, put in enumerate(found.puts, 1):
-        if put.carries:
-            said.append(
-                f"operation {k}: {put.part} and {', '.join(put.carries)} moved together; {put.part}, which was "
-                "taken first, is what the hand held, as far as the log tells"
-            )
-    return said
+    return [
+        f"operation {k}: {put.part} and {', '.join(put.carries)} moved together; {put.part}, which was "
+        "taken first, is what the hand held, as far as the log tells"
+        for k, put in enumerate(recording.puts, 1)
+        if put.carries
+    ]
 
 
 def observation_table(
@@ -132,56 +130,50 @@ def observation_table(
     writer.writerow(
         ["operation", "part", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz", "deviation_mm", "deviation_deg", "seen"]
     )
-    for k, (part, T, (mm, deg), was) in enumerate(zip(parts, goals, deviations, seen, strict=True), 1):
-        packed = (pose.pack(T) * [1e3, 1e3, 1e3, 1, 1, 1, 1]).round(9).tolist()
-        writer.writerow([k, part, *packed, f"{1e3 * mm:.4g}", f"{np.degrees(deg):.4g}", "true" if was else "false"])
+    for k, (part, T, (m, rad), was_seen) in enumerate(zip(parts, goals, deviations, seen, strict=True), 1):
+        packed = (pose.pack(T) * _POSE_UNITS).round(9).tolist()
+        writer.writerow([k, part, *packed, f"{1e3 * m:.4g}", f"{np.degrees(rad):.4g}", "true" if was_seen else "false"])
     return text.getvalue()
 
 
-def path_rows(found: Imported) -> Iterator[tuple[object, ...]]:
+def path_rows(recording: ImportedRecording) -> Iterator[tuple[object, ...]]:
     """The paths between rests: operation, part, time, pose in the world."""
-    for k, (operation, one) in enumerate(zip(found.scenario.assembly.operations, found.operations, strict=True), 1):
-        if one.path is not None:
-            for t, T in zip(one.path.t, one.path.T, strict=True):
-                packed = (pose.pack(T) * [1e3, 1e3, 1e3, 1, 1, 1, 1]).round(6).tolist()
-                yield (k, operation.main, round(float(t), 6), *packed)
+    planned = recording.scenario.assembly.operations
+    for k, (operation, seen) in enumerate(zip(planned, recording.operations, strict=True), 1):
+        if seen.path is not None:
+            for t, T in zip(seen.path.t, seen.path.T, strict=True):
+                yield (k, operation.main, round(float(t), 6), *(pose.pack(T) * _POSE_UNITS).round(6).tolist())
 
 
 PATH_HEAD = ("operation", "part", "t_s", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")
 
 
-def _paths(found: Imported) -> Iterator[str]:
-    for one in approaches(found):
-        main = found.scenario.assembly.operations[one.operation].main
-        if one.straight is None:
-            yield f"operation {one.operation + 1} ({main}) shows no straight end"
+def _paths(recording: ImportedRecording) -> Iterator[str]:
+    for approach in approaches(recording.scenario, recording.operations, recording.camera.T_world_camera):
+        main = recording.scenario.assembly.operations[approach.operation].main
+        operation = f"operation {approach.operation + 1} ({main})"
+        if approach.end is None:
+            yield f"{operation} shows no straight end"
             continue
-        way = direction(np.round(one.straight.direction, 2))
+        way = direction(np.round(approach.end.direction, 2))
         how = (
-            f"as `{one.macro}` of the plan, {one.off_deg:.0f} deg off"
-            if one.alike
-            else (f"unlike the plan, whose nearest motion, `{one.macro}`, is {one.off_deg:.0f} deg off")
+            f"as `{approach.macro}` of the plan, {approach.off_deg:.0f} deg off"
+            if approach.alike
+            else f"unlike the plan, whose nearest motion, `{approach.macro}`, is {approach.off_deg:.0f} deg off"
         )
-        far = f"{1e3 * one.straight.length_m:.0f} mm"
-        yield f"operation {one.operation + 1} ({main}) ends along {way} of the part for {far}, {how}"
+        yield f"{operation} ends along {way} of the part for {1e3 * approach.end.length_m:.0f} mm, {how}"
 
 
 def _rest_cells(rest: Rest, X: Array) -> list[str]:
     S = rest.mean.scatter
     p = 1e3 * (X @ rest.T)[:3, 3]
     off = f"{1e3 * np.sqrt(np.trace(S[:3, :3]) / 3.0):.2f} mm {np.degrees(np.sqrt(np.trace(S[3:, 3:]) / 3.0)):.2f} deg"
-    left = int((~rest.mean.inlier).sum())
-    return [
-        f"{rest.begins:.2f}",
-        f"{rest.ends:.2f}",
-        str(len(rest.mean.inlier)),
-        str(left),
-        *(f"{x:.2f}" for x in p),
-        off,
-    ]
+    frames = len(rest.mean.inlier)
+    outliers = frames - int(rest.mean.inlier.sum())
+    return [f"{rest.begins:.2f}", f"{rest.ends:.2f}", str(frames), str(outliers), *(f"{x:.2f}" for x in p), off]
 
 
-def _said(T: Array) -> str:
+def _pose_text(T: Array) -> str:
     from scipy.spatial.transform import Rotation
 
     turn = Rotation.from_matrix(T[:3, :3]).as_rotvec(degrees=True)
@@ -194,8 +186,8 @@ def _listed(v: Array) -> str:
     return f"({', '.join(f'{x + 0.0:.4g}' for x in np.round(v, 3))})"
 
 
-def _far(twist: Array) -> str:
-    return f"{1e3 * np.linalg.norm(twist[:3]):.1f} mm and {_deg(twist):.1f} deg"
+def _mm(twist: Array) -> float:
+    return 1e3 * float(np.linalg.norm(twist[:3]))
 
 
 def _deg(twist: Array) -> float:

@@ -7,7 +7,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.residuals import Residuals
-from apo_bench.recording.log import Log, Track
+from apo_bench.recording.log import Log, PoseTrack
 from apo_bench.recording.rests import Rest, rests_of
 
 _MOST_GAP = 1.5
@@ -22,36 +22,33 @@ def still_residuals(log: Log) -> Residuals:
     Raises:
         InputError: Nothing rests.
     """
-    where = list[tuple[int, int, int]]()
-    shift = list[Array]()
-    turn = list[Array]()
+    parts = list[int]()
+    errors = list[Array]()
     distance = list[float]()
     camera = Camera(np.eye(4))
-    image = 0
     for part, track in enumerate(log.tracks.values()):
         for rest in rests_of(track):
-            errors = _errors(camera, track, rest)
+            seen = _errors(camera, track, rest)
             missing = _missing(track.t[rest.first : rest.last + 1])
-            shift += [*errors[:, :3] * 1e3, *np.full((missing, 3), np.nan)]
-            turn += [*np.degrees(errors[:, 3:]), *np.full((missing, 3), np.nan)]
-            distance += [1e3 * float(np.linalg.norm(rest.T[:3, 3]))] * len(errors)
-            n = len(errors) + missing
-            where += [(0, image + i, part) for i in range(n)]
-            image += n
-    if not shift:
+            errors += [seen, np.full((missing, 6), np.nan)]
+            distance += [1e3 * float(np.linalg.norm(rest.T[:3, 3]))] * len(seen)
+            parts += [part] * (len(seen) + missing)
+    if not errors:
         raise InputError(f"{log.file}: nothing rests in the log; give one in which parts stand still.")
-    n = len(shift)
+    n = len(parts)
+    shift, turn = np.split(np.concatenate(errors), 2, axis=1)
+    turn_deg = np.degrees(turn)
     return Residuals(
-        where=np.array(where, dtype=np.int64),
-        shift_mm=np.array(shift),
-        turn_deg=np.array(turn),
-        trace_deg=np.linalg.norm(np.array(turn), axis=1),
+        where=np.column_stack([np.zeros(n, dtype=np.int64), np.arange(n), np.array(parts)]),
+        shift_mm=shift * 1e3,
+        turn_deg=turn_deg,
+        trace_deg=np.linalg.norm(turn_deg, axis=1),
         score=np.full(n, np.nan),
         distance_mm=float(np.median(distance)),
     )
 
 
-def _errors(camera: Camera, track: Track, rest: Rest) -> Array:
+def _errors(camera: Camera, track: PoseTrack, rest: Rest) -> Array:
     """(n, 6), (x, y, along; rx, ry, about), [m, rad]: from the mean of a rest to each frame.
 
     A mean of n frames takes part of each error with it, so what is left is as much larger as it was made smaller.

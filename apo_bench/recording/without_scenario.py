@@ -8,11 +8,12 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
+from apo_bench.recording.arranging import solved_camera, staying
 from apo_bench.recording.camera_file import CameraFile
-from apo_bench.recording.camera_pose import CameraPose, solve_camera
-from apo_bench.recording.log import Track
-from apo_bench.recording.rests import Rest, rests_of
-from apo_bench.recording.stays import Stay, stays_of
+from apo_bench.recording.camera_pose import CameraPose
+from apo_bench.recording.log import PoseTrack
+from apo_bench.recording.rests import Rest
+from apo_bench.recording.stays import Stay, Stays, all_stays
 
 
 class Put(NamedTuple):
@@ -27,11 +28,11 @@ class Put(NamedTuple):
         return self.stay.rests[-1]
 
 
-class Bare(NamedTuple):
+class UnplannedRecording(NamedTuple):
     """What a log says by itself."""
 
     camera: CameraPose
-    stays: Mapping[str, tuple[Stay, ...]]
+    stays: Stays
     puts: tuple[Put, ...]
 
 
@@ -40,13 +41,13 @@ class _Move(NamedTuple):
     stay: Stay
 
 
-def bare_recording(tracks: Mapping[str, Track], camera: CameraFile, file: str) -> Bare:
+def unplanned_recording(tracks: Mapping[str, PoseTrack], camera: CameraFile, file: str) -> UnplannedRecording:
     """The order of operations, as far as poses alone tell it: parts that move together are one operation.
 
     Raises:
         InputError: A known place is not stated by a pose, or nothing moves.
     """
-    stays = {part: stays_of(part, rests_of(track)) for part, track in tracks.items()}
+    stays = all_stays(tracks)
     X = _camera_pose(stays, camera)
     pairs = [pair for known in stays.values() for pair in pairwise(known)]
     moves = sorted((_Move(before.ends, after) for before, after in pairs), key=lambda move: move.stay.begins)
@@ -58,10 +59,10 @@ def bare_recording(tracks: Mapping[str, Track], camera: CameraFile, file: str) -
             groups[-1].append(move)
         else:
             groups.append([move])
-    return Bare(X, stays, tuple(map(_put, groups)))
+    return UnplannedRecording(X, stays, tuple(map(_put, groups)))
 
 
-def _camera_pose(stays: Mapping[str, tuple[Stay, ...]], camera: CameraFile) -> CameraPose:
+def _camera_pose(stays: Stays, camera: CameraFile) -> CameraPose:
     if camera.T_world_camera is not None:
         return CameraPose(camera.T_world_camera)
     places = {part: T for part, T in camera.known.items() if T is not None and stays.get(part)}
@@ -70,14 +71,14 @@ def _camera_pose(stays: Mapping[str, tuple[Stay, ...]], camera: CameraFile) -> C
             "without --scenario the camera file has to state the pose of the camera, or poses of known parts that "
             'rest; "start" is a place of a scenario.'
         )
-    seen = {part: stays[part][0].rests[0].mean for part in places}
-    return solve_camera(places, seen, next(iter(seen.values())).scatter)
+    return solved_camera(stays, camera, places)
 
 
-def _together(one: _Move, other: _Move) -> bool:
-    shared = min(one.stay.begins, other.stay.begins) - max(one.taken, other.taken)
-    shorter = min(one.stay.begins - one.taken, other.stay.begins - other.taken)
-    return one.stay.part != other.stay.part and shared > 0.5 * shorter
+def _together(move: _Move, other: _Move) -> bool:
+    """Whether two parts were on their way at the same time, for more than half of the shorter way."""
+    shared = min(move.stay.begins, other.stay.begins) - max(move.taken, other.taken)
+    shorter = min(move.stay.begins - move.taken, other.stay.begins - other.taken)
+    return move.stay.part != other.stay.part and shared > 0.5 * shorter
 
 
 def _put(moves: Sequence[_Move]) -> Put:
@@ -88,10 +89,10 @@ def _put(moves: Sequence[_Move]) -> Put:
 
 def deviations(rest: Rest, camera: CameraFile) -> tuple[float, float]:
     """Standard deviations per axis of one rest, [m, rad]: of its mean, and of what stays; else that of one frame."""
-    C = rest.mean.covariance + (rest.mean.scatter if camera.stays is None else np.diag(np.repeat(camera.stays, 3) ** 2))
+    C = rest.mean.covariance + staying(camera, rest.mean)
     return float(np.sqrt(np.trace(C[:3, :3]) / 3.0)), float(np.sqrt(np.trace(C[3:, 3:]) / 3.0))
 
 
-def goals_of(found: Bare) -> Array:
+def goals_of(recording: UnplannedRecording) -> Array:
     """Where parts were put, (n, 4, 4), world, [m]."""
-    return np.array([found.camera.T_world_camera @ put.rest.T for put in found.puts])
+    return np.array([recording.camera.T_world_camera @ put.rest.T for put in recording.puts])
