@@ -10,13 +10,7 @@ LONGEST_NAME = 64
 _LARGEST_M = 10.0
 THINNEST_M = 0.0005
 """Half of the least thickness of a box or a cylinder."""
-_FILE = re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*\.stl")
 _NUMBER = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?")
-
-
-def _words(text: str) -> list[str]:
-    """Words between spaces, as MuJoCo reads them: other alphabets have spaces too, which are letters to it."""
-    return text.split() if text.isascii() else [text]
 
 
 class NumbersRule(NamedTuple):
@@ -26,69 +20,40 @@ class NumbersRule(NamedTuple):
     """The least and the largest value of each."""
     least: int
     """The least count of numbers."""
-    unit: str = ""
+    said: str
+    """What is allowed, in words."""
+    groups_of: int = 1
+    """So many of them belong together."""
 
     def allows(self, text: str) -> bool:
-        words = _words(text)
-        if not self.least <= len(words) <= len(self.spans) or not all(map(_NUMBER.fullmatch, words)):
+        # Words as MuJoCo reads them: other alphabets have spaces too, which are letters to it.
+        words = text.split() if text.isascii() else [text]
+        counted = self.least <= len(words) <= len(self.spans) and len(words) % self.groups_of == 0
+        if not counted or not all(map(_NUMBER.fullmatch, words)):
             return False
         return all(low <= float(word) <= high for word, (low, high) in zip(words, self.spans, strict=False))
 
-    def said(self) -> str:
-        most = len(self.spans)
-        count = f"{most}" if self.least == most else f"{self.least} to {most}"
-        spans = [f"{low:g} to {high:g}" for low, high in dict.fromkeys(self.spans)]
-        return f"{count} number{'s' * (most > 1)} of {', '.join(spans)}{self.unit}"
 
+class TextRule(NamedTuple):
+    """A short text."""
 
-class WordsRule(NamedTuple):
-    """One of some words."""
-
-    words: tuple[str, ...]
+    pattern: re.Pattern[str]
+    said: str
+    """What is allowed, in words."""
 
     def allows(self, text: str) -> bool:
-        return text in self.words
-
-    def said(self) -> str:
-        return " or ".join(f'"{word}"' for word in self.words)
+        return len(text) <= LONGEST_NAME and self.pattern.fullmatch(text) is not None
 
 
-class NameRule(NamedTuple):
-    """A name."""
-
-    def allows(self, text: str) -> bool:
-        return len(text) <= LONGEST_NAME and FACE_OR_PART_NAME.fullmatch(text) is not None
-
-    def said(self) -> str:
-        return f"a name is a letter, then letters, digits and underscores, {LONGEST_NAME} in all at most"
+def _numbers(spans: tuple[tuple[float, float], ...], least: int, unit: str = "") -> NumbersRule:
+    most = len(spans)
+    count = f"{most}" if least == most else f"{least} to {most}"
+    values = ", ".join(f"{low:g} to {high:g}" for low, high in dict.fromkeys(spans))
+    return NumbersRule(spans, least, f"{count} number{'s' * (most > 1)} of {values}{unit}")
 
 
-class CornersRule(NamedTuple):
-    """The corners of a convex piece, three numbers each."""
-
-    most: int
-
-    def allows(self, text: str) -> bool:
-        words = _words(text)
-        if len(words) % 3 or not 12 <= len(words) <= 3 * self.most or not all(map(_NUMBER.fullmatch, words)):
-            return False
-        return all(abs(float(word)) <= _LARGEST_M for word in words)
-
-    def said(self) -> str:
-        return f"4 to {self.most} corners of three numbers of {-_LARGEST_M:g} to {_LARGEST_M:g} m each"
-
-
-class FileRule(NamedTuple):
-    """A file in the folder of the part."""
-
-    def allows(self, text: str) -> bool:
-        return len(text) <= LONGEST_NAME and _FILE.fullmatch(text) is not None
-
-    def said(self) -> str:
-        return "the name of an .stl file in the folder of the part, of letters, digits, _ and -,"
-
-
-Rule = NumbersRule | WordsRule | NameRule | CornersRule | FileRule
+def _one_of(*words: str) -> TextRule:
+    return TextRule(re.compile("|".join(words)), " or ".join(f'"{word}"' for word in words))
 
 
 class ElementRule(NamedTuple):
@@ -96,25 +61,31 @@ class ElementRule(NamedTuple):
 
     inside: Mapping[str, int]
     """Elements, and how many of each."""
-    attributes: Mapping[str, Rule]
+    attributes: Mapping[str, NumbersRule | TextRule]
 
 
-_NAMED = NameRule()
-_POINT = NumbersRule(((-_LARGEST_M, _LARGEST_M),) * 3, 3, " m")
-_HALF_SIZES = NumbersRule(((THINNEST_M, _LARGEST_M),) * 3, 2, " m")
-_DIRECTION = NumbersRule(((-1.0, 1.0),) * 3, 3)
-_COLOR = NumbersRule((*((0.0, 1.0),) * 3, (0.1, 1.0)), 4)
+_NAMED = TextRule(
+    FACE_OR_PART_NAME, f"a name is a letter, then letters, digits and underscores, {LONGEST_NAME} in all at most"
+)
+_FILE = TextRule(
+    re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*\.stl"),
+    "the name of an .stl file in the folder of the part, of letters, digits, _ and -,",
+)
+_POINT = _numbers(((-_LARGEST_M, _LARGEST_M),) * 3, 3, " m")
+_HALF_SIZES = _numbers(((THINNEST_M, _LARGEST_M),) * 3, 2, " m")
+_DIRECTION = _numbers(((-1.0, 1.0),) * 3, 3)
+_COLOR = _numbers((*((0.0, 1.0),) * 3, (0.1, 1.0)), 4)
 """What cannot be seen, a range finder of MuJoCo would not see."""
-FRICTION = NumbersRule(((0.01, 10.0), (0.0, 0.1), (0.0, 0.1)), 1)
-_SURFACE: Mapping[str, Rule] = {
-    "type": WordsRule(("box", "mesh", "cylinder")),
-    "density": NumbersRule(((1.0, 25_000.0),), 1, " kg/m^3"),
+FRICTION = _numbers(((0.01, 10.0), (0.0, 0.1), (0.0, 0.1)), 1)
+_SURFACE: Mapping[str, NumbersRule | TextRule] = {
+    "type": _one_of("box", "mesh", "cylinder"),
+    "density": _numbers(((1.0, 25_000.0),), 1, " kg/m^3"),
     "friction": FRICTION,
     "rgba": _COLOR,
 }
-_DOT: Mapping[str, Rule] = {
-    "size": NumbersRule(((1e-4, 0.1),) * 3, 1, " m"),
-    "group": WordsRule(tuple("012345")),
+_DOT: Mapping[str, NumbersRule | TextRule] = {
+    "size": _numbers(((1e-4, 0.1),) * 3, 1, " m"),
+    "group": _one_of(*"012345"),
     "rgba": _COLOR,
 }
 MOST_BOXES = 100
@@ -131,15 +102,21 @@ MOST_SITES = 600
 MOST_CLASSES = 20
 LARGEST_BYTES = 4_000_000
 """Of a part file."""
+_CORNERS = NumbersRule(
+    ((-_LARGEST_M, _LARGEST_M),) * 3 * MOST_CORNERS,
+    12,
+    f"4 to {MOST_CORNERS} corners of three numbers of {-_LARGEST_M:g} to {_LARGEST_M:g} m each",
+    groups_of=3,
+)
 _DEFAULTS = {"geom": 1, "site": 1, "default": MOST_CLASSES}
 ELEMENT_RULES: Mapping[str, ElementRule] = {
     "mujoco": ElementRule({"default": 1, "asset": 1, "worldbody": 1}, {"model": _NAMED}),
-    "mujoco/default": ElementRule(_DEFAULTS, {"class": WordsRule(("main",))}),
+    "mujoco/default": ElementRule(_DEFAULTS, {"class": _one_of("main")}),
     "default/default": ElementRule(_DEFAULTS, {"class": _NAMED}),
     "default/geom": ElementRule({}, _SURFACE),
     "default/site": ElementRule({}, _DOT),
     "mujoco/asset": ElementRule({"mesh": MOST_PIECES + 1}, {}),
-    "asset/mesh": ElementRule({}, {"name": _NAMED, "vertex": CornersRule(MOST_CORNERS), "file": FileRule()}),
+    "asset/mesh": ElementRule({}, {"name": _NAMED, "vertex": _CORNERS, "file": _FILE}),
     "mujoco/worldbody": ElementRule({"body": 1}, {}),
     "worldbody/body": ElementRule({"geom": MOST_PIECES + 1, "site": MOST_SITES}, {"name": _NAMED}),
     "body/geom": ElementRule(
@@ -151,9 +128,9 @@ ELEMENT_RULES: Mapping[str, ElementRule] = {
             "size": _HALF_SIZES,
             "zaxis": _DIRECTION,
             "mesh": _NAMED,
-            "contype": WordsRule(("0",)),
-            "conaffinity": WordsRule(("0",)),
-            "group": WordsRule(("1",)),
+            "contype": _one_of("0"),
+            "conaffinity": _one_of("0"),
+            "group": _one_of("1"),
             **_SURFACE,
         },
     ),
