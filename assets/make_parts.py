@@ -12,7 +12,19 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.parts.making import Body, Bore, Step, bore, extrude, join, polygon, rectangle, shaft, turned, write_part
+from apo_bench.parts.making import (
+    Body,
+    Bore,
+    Frustum,
+    bore,
+    extrude,
+    join,
+    polygon,
+    rectangle,
+    shaft,
+    turned,
+    write_part,
+)
 
 SOURCE, LICENCE, DENSITY = "assets/make_parts.py of apo_bench", "Apache-2.0", 700.0
 SIDES = ("ny", "px", "py", "nx")
@@ -57,14 +69,14 @@ def rod() -> Body:
 
 def housing() -> Body:
     """60 x 60 x 45 mm with a blind bore of 32 mm, 35 mm deep."""
-    hole = Bore((0, 0), (Step(10, 45, 16, name="bore", fit=True),), {10: "floor"})
+    hole = Bore((0, 0), (Frustum(10, 45, 16, name="bore", fit=True),), {10: "floor"})
     return extrude(rectangle(60, 60, names=SIDES), 0, 45, bores=[hole], bottom="bottom", top="top")
 
 
 def bush() -> Body:
     """32 mm thick, 60 mm long, with a bore of 16 mm."""
     return turned(
-        [Step(0, 60, 16, name="outer")], [Step(0, 60, 8, name="bore", fit=True)], flats={0: "low", 60: "high"}
+        [Frustum(0, 60, 16, name="outer")], [Frustum(0, 60, 8, name="bore", fit=True)], flats={0: "low", 60: "high"}
     )
 
 
@@ -136,7 +148,11 @@ def l_plate() -> Body:
 def gear_base() -> Body:
     """174 x 70 x 24 mm with three blind bores of 10 mm, 48 mm apart, 21 mm deep, and two walls, 26 mm high."""
     holes = [
-        Bore((x, 0), (Step(3, 20, 5, name=name, fit=True), Step(20, 24, 7)), {3: f"{name}_floor", 20: f"{name}_rim"})
+        Bore(
+            (x, 0),
+            (Frustum(3, 20, 5, name=name, fit=True), Frustum(20, 24, 7)),
+            {3: f"{name}_floor", 20: f"{name}_rim"},
+        )
         for x, name in _GEARS
     ]
     plate = extrude(rectangle(174, 70), 0, 24, bores=holes, bottom="bottom", top="top")
@@ -147,30 +163,31 @@ def gear_base() -> Body:
 def axle() -> Body:
     """10 mm thick, 60 mm long, with a collar of 22 mm, 5 mm thick, 15 mm above its tip."""
     steps = [
-        Step(0, 1, 4, 5, "side_chamfer"),
-        Step(1, 15, 5, name="side"),
-        Step(15, 20, 11, name="collar"),
-        Step(20, 59, 5, name="neck"),
-        Step(59, 60, 5, 4, name="neck_chamfer"),
+        Frustum(0, 1, 4, 5, "side_chamfer"),
+        Frustum(1, 15, 5, name="side"),
+        Frustum(15, 20, 11, name="collar"),
+        Frustum(20, 59, 5, name="neck"),
+        Frustum(59, 60, 5, 4, name="neck_chamfer"),
     ]
     return turned(steps, flats={0: "tip", 15: "shoulder", 20: "ledge", 60: "head"})
 
 
 def stand() -> Body:
     """40 x 40 x 24 mm with a bore of 10 mm, 21 mm deep: holds an axle upright."""
-    hole = Bore((0, 0), (Step(3, 20, 5, name="bore", fit=True), Step(20, 24, 7)), {3: "floor", 20: "rim"})
+    hole = Bore((0, 0), (Frustum(3, 20, 5, name="bore", fit=True), Frustum(20, 24, 7)), {3: "floor", 20: "rim"})
     return extrude(rectangle(40, 40), 0, 24, bores=[hole], bottom="bottom", top="top")
 
 
 def disc() -> Body:
     """A gear without teeth: 40 mm across, 14 mm thick, with a bore of 10 mm."""
-    return turned([Step(0, 14, 20)], [Step(0, 14, 5, name="bore", fit=True)], flats={0: "low", 14: "high"})
+    return turned([Frustum(0, 14, 20)], [Frustum(0, 14, 5, name="bore", fit=True)], flats={0: "low", 14: "high"})
 
 
 def gear_cover() -> Body:
     """174 x 70 x 16 mm with three bores of 10 mm, 48 mm apart."""
     holes = [
-        Bore((x, 0), (Step(0, 1, 8), Step(1, 16, 5, name=name, fit=True)), {1: f"{name}_rim"}) for x, name in _GEARS
+        Bore((x, 0), (Frustum(0, 1, 8), Frustum(1, 16, 5, name=name, fit=True)), {1: f"{name}_rim"})
+        for x, name in _GEARS
     ]
     return extrude(rectangle(174, 70), 0, 16, bores=holes, bottom="bottom", top="top")
 

@@ -14,7 +14,7 @@ import numpy as np
 from apo_bench.drafting.draft import draft
 from apo_bench.drafting.posed import on_the_table, read_posed
 from apo_bench.drafting.writing import scenario_text
-from apo_bench.parts.making import Body, Step, bore, extrude, join, polygon, rectangle, shaft, turned, write_part
+from apo_bench.parts.making import Body, Frustum, bore, extrude, join, polygon, rectangle, shaft, turned, write_part
 from apo_bench.records.settings import TrialSettings
 from apo_bench.trial.scene import scene_of
 from apo_bench.trial.trial import run_trial
@@ -84,13 +84,13 @@ def bushed(between: Between, rng: np.random.Generator) -> Assembled:
     flange = between(14, 18)
     bores = [bore((x, 0), outer + play, 0, thick, f"bore_{i}") for i, x in enumerate((-width / 4, width / 4), start=1)]
     block = extrude(rectangle(width, between(44, 56)), 0, thick, bores=bores, bottom="bottom", top="top")
-    inner = [Step(0, thick + flange, r + play, name="bore")]
-    walls = [Step(0, thick, outer, name="side"), Step(thick, thick + flange, outer + 4, name="rim")]
+    inner = [Frustum(0, thick + flange, r + play, name="bore")]
+    walls = [Frustum(0, thick, outer, name="side"), Frustum(thick, thick + flange, outer + 4, name="rim")]
     bush = turned(walls, inner, flats={0.0: "tip", thick: "ledge", thick + flange: "face"})
     long = thick + flange - 2
     head = between(12, 16)
     pin = turned(
-        [Step(0, long, r, name="side"), Step(long, long + head, r + 3, name="grip")],
+        [Frustum(0, long, r, name="side"), Frustum(long, long + head, r + 3, name="grip")],
         flats={0.0: "tip", long: "ledge", long + head: "head"},
     )
     places = [Place("block", "block", (0, 0, 0))]
@@ -166,8 +166,8 @@ def slotted(between: Between, rng: np.random.Generator) -> Assembled:
     )
     thick = between(10, 14)
     ring = turned(
-        [Step(0, thick, r + between(6, 8), name="side")],
-        [Step(0, thick, r + play, name="bore")],
+        [Frustum(0, thick, r + between(6, 8), name="side")],
+        [Frustum(0, thick, r + play, name="bore")],
         flats={0.0: "bottom", thick: "top"},
     )
     places = [Place("base", "base", (0, 0, 0)), Place("key", "key", (0, 0, floor))]
@@ -198,8 +198,8 @@ def stacked(between: Between, rng: np.random.Generator) -> Assembled:
         )
         places.append(Place(f"plate_{i}", f"plate_{i}", (0, 0, round(z, 1))))
         z += h
-    inner = [Step(0, 10, r + play, name="bore")]
-    parts["cap"] = turned([Step(0, 24, r + 8, name="side")], inner, flats={0.0: "bottom", 10.0: "roof", 24.0: "top"})
+    inner = [Frustum(0, 10, r + play, name="bore")]
+    parts["cap"] = turned([Frustum(0, 24, r + 8, name="side")], inner, flats={0.0: "bottom", 10.0: "roof", 24.0: "top"})
     places.append(Place("cap", "cap", (0, 0, round(z, 1))))
     return Assembled(parts, tuple(places))
 

@@ -29,7 +29,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Solid
-from apo_bench.parts.making import Step, bore, extrude, rectangle, solid_of, turned
+from apo_bench.parts.making import Frustum, bore, extrude, rectangle, solid_of, turned
 
 PAGE = Path(__file__).parent.parent / "docs" / "how" / "contact.md"
 BEGIN = "<!-- table: python benchmarks/round_contacts.py -->"
@@ -89,7 +89,7 @@ def scene(kind: str) -> tuple[Assembly, dict[str, Array], Array]:
     face, touched, at = KINDS[kind]
     contact = Contact(PartFace("pin", face), PartFace(*touched.split(".")))
     below = Contact(PartFace("plate", "bottom"), PartFace("table", "top"))
-    body = turned([Step(0, 30, 5, name="wall"), Step(30, 40, 5, 15, name="cone")], flats={0: "end", 40: "head"})
+    body = turned([Frustum(0, 30, 5, name="wall"), Frustum(30, 40, 5, 15, name="cone")], flats={0: "end", 40: "head"})
     parts = {"table": solid_of("table", extrude(rectangle(600, 600), -20, 0, top="top")), "plate": plate()}
     operations = (Operation("plate", (below,)), Operation("pin", (contact,)))
     start = {"table": np.eye(4), "plate": pose.at((0.2, 0.0, 0.0)), "pin": pose.at((0.0, 0.2, 0.0))}

@@ -27,7 +27,7 @@ from apo_bench.observation.models.fitted import ConstantError, ViewNoise
 from apo_bench.observation.noise_file import noise_text, read_noise
 from apo_bench.observation.presets import presets
 from apo_bench.parts.allowed import ELEMENT_RULES
-from apo_bench.parts.stated import SCHEMA, read_stated
+from apo_bench.parts.stated import PART_SCHEMA, read_stated_part
 from apo_bench.records.setting_info import SettingInfo
 from apo_bench.records.settings import SETTINGS
 from apo_bench.scenario.file import load_scenario, scenario_names
@@ -288,8 +288,8 @@ def face_keys() -> Keys:
     with listening() as heard, tempfile.TemporaryDirectory() as folder:
         own = Path(folder) / "own.toml"
         said = "".join(f'[faces.{kind}]\nkind = "{kind}"\n{keys}' for kind, keys in faces.items())
-        own.write_text(f'schema = "{SCHEMA}"\n{matter}{said}', encoding="utf-8")
-        read_stated(own)
+        own.write_text(f'schema = "{PART_SCHEMA}"\n{matter}{said}', encoding="utf-8")
+        read_stated_part(own)
     return named(heard, lambda key: re.sub(r"^faces, (\w+)$", r"faces.NAME, a \1", key))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from apo_bench.errors import InputError
 
-LEAST = 1e-3
+_LEAST_RATE = 1e-3
 """A rate that is measured as 0 is not known to be smaller."""
 
 
@@ -48,5 +48,5 @@ class OutlierModel:
 
 def measured_rates(gross: float, broad: float = OutlierModel.broad, times: float = OutlierModel.times) -> OutlierModel:
     """A model with rates that were measured, kept away from 0 and 1, which no number of measurements proves."""
-    gross, broad = (float(np.clip(rate, LEAST, 0.49)) for rate in (gross, broad))
+    gross, broad = (float(np.clip(rate, _LEAST_RATE, 0.49)) for rate in (gross, broad))
     return OutlierModel(gross, broad, times)

@@ -39,7 +39,7 @@ class Contact(NamedTuple):
         return f"{self.manipulated} on {self.environment}"
 
 
-Kind = Literal["contact", "centred", "clearance"]
+GapKind = Literal["contact", "centred", "clearance"]
 
 
 class Gap(NamedTuple):
@@ -49,7 +49,7 @@ class Gap(NamedTuple):
     faces touch, so nominal faces of parts that fit overlap by the play. `clearance`: walls, anywhere in an interval.
     """
 
-    kind: Kind = "centred"
+    kind: GapKind = "centred"
     low_m: float | None = None
     """The least distance of a `clearance`, negative for overlap; None stands for all the play there is."""
     high_m: float | None = None

@@ -7,7 +7,7 @@ import numpy as np
 
 from apo_bench.cad.raw_solid import Mesh, RawSolid, Region
 from apo_bench.errors import InputError, unknown
-from apo_bench.parts.allowed import FACE_OR_PART_NAME, LONGEST_NAME
+from apo_bench.parts.allowed import FACE_OR_PART_NAME, LONGEST_FACE_NAME
 
 _GRID = 1e-4
 """Places that differ by less, in parts of the size, are in the order of the other ones."""
@@ -43,10 +43,10 @@ def renamed(raw: RawSolid, names: Mapping[str, str]) -> RawSolid:
     for old, new in new_names.items():
         if old not in have:
             raise InputError(unknown("face", old, have))
-        if not FACE_OR_PART_NAME.fullmatch(new) or len(new) > LONGEST_NAME or new.startswith("auto_"):
+        if not FACE_OR_PART_NAME.fullmatch(new) or len(new) > LONGEST_FACE_NAME or new.startswith("auto_"):
             raise InputError(
-                f"--name {old}={new} was given; a letter, then letters, digits and underscores, {LONGEST_NAME} in all "
-                "at most, are allowed, and not auto_ at the beginning."
+                f"--name {old}={new} was given; a letter, then letters, digits and underscores, {LONGEST_FACE_NAME} "
+                "in all at most, are allowed, and not auto_ at the beginning."
             )
     after = [new_names.get(name, name) for name in have]
     twice = sorted({name for name in after if after.count(name) > 1})

@@ -14,7 +14,7 @@ from apo_bench.drafting.waiting import Stance, laid_out, reach_of, site_of, stan
 from apo_bench.errors import InputError, unknown
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.holds import Hold, holds
+from apo_bench.geometry.holds import PadPlace, holds
 from apo_bench.geometry.intrusion import intrusion_depths
 from apo_bench.geometry.solid import Box, Solid, extent
 from apo_bench.parts import load_part
@@ -48,7 +48,7 @@ class Draft:
     starts: Mapping[str, Array]
     """(4, 4), world, [m]; of fixed parts in the frame of the assembly."""
     stances: Mapping[str, Stance]
-    grasps: Mapping[str, Hold | None]
+    grasps: Mapping[str, PadPlace | None]
     site: Site
     clearance_mm: float
     notes: tuple[str, ...]
@@ -124,12 +124,12 @@ def _base(parts: Sequence[PosedPart]) -> tuple[str]:
 
 def _holds(
     solids: Mapping[str, Solid], poses: Poses, order: Sequence[Placing], base: Sequence[str]
-) -> tuple[Mapping[str, Hold | None], list[str]]:
+) -> tuple[Mapping[str, PadPlace | None], list[str]]:
     """Where each part is held: the best place at which fingers have room beside what stands when it is put down.
 
     And what is to be said of parts that have no such place.
     """
-    best: dict[str, Hold | None] = {}
+    best: dict[str, PadPlace | None] = {}
     notes = list[str]()
     there = {*base}
     for placing in order:
@@ -156,7 +156,7 @@ def _holds(
 
 
 def _struck(
-    hold: Hold, below_m: float, T: Array, solids: Mapping[str, Solid], poses: Poses, others: Sequence[str]
+    hold: PadPlace, below_m: float, T: Array, solids: Mapping[str, Solid], poses: Poses, others: Sequence[str]
 ) -> bool:
     """Whether a finger beside a part at T would be in one of the others, or so far below it."""
     up = T[2, :3]
@@ -173,7 +173,7 @@ def _notes(
     solids: Mapping[str, Solid],
     turns: Mapping[str, Array],
     stances: Mapping[str, Stance],
-    grasps: Mapping[str, Hold | None],
+    grasps: Mapping[str, PadPlace | None],
 ) -> Iterator[str]:
     """What is to be said of parts that do not stand, roll, or cannot be held."""
     for part, R in turns.items():

@@ -12,7 +12,7 @@ from apo_bench.drafting.draft import Draft
 from apo_bench.drafting.ordering import Placing
 from apo_bench.drafting.posed import TABLE, PosedPart
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.holds import Hold
+from apo_bench.geometry.holds import PadPlace
 from apo_bench.parts import part_names, part_path
 from apo_bench.records.thresholds import Thresholds
 
@@ -123,7 +123,7 @@ def _contacts(contacts: Sequence[Contact], main: str) -> Iterator[str]:
     yield "]"
 
 
-def _grasp(hold: Hold | None, main: str, draft: Draft) -> Iterator[str]:
+def _grasp(hold: PadPlace | None, main: str, draft: Draft) -> Iterator[str]:
     solid = next(each.solid for each in draft.parts if each.name == main)
     low, high = solid.bounds
     if hold is None:

@@ -64,7 +64,7 @@ def _crossed(edges_a: Array, edges_b: Array) -> Array:
 
 
 @lru_cache(maxsize=1024)
-def corners_of(pieces: tuple[Piece, ...]) -> tuple[Array, NDArray[np.intp]]:
+def all_corners(pieces: tuple[Piece, ...]) -> tuple[Array, NDArray[np.intp]]:
     """The corners of all pieces, (k, 3), in the frame of their solid, [m], and where those of each begin."""
     corners = [piece.corners for piece in pieces]
     return frozen(np.concatenate(corners), None, 3), np.cumsum([0, *map(len, corners[:-1])])

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import corners_of
+from apo_bench.geometry.convex import all_corners
 from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.polygon import plane_across
 from apo_bench.geometry.solid import Piece, Solid, extent
@@ -20,7 +20,7 @@ from apo_bench.geometry.solid import Piece, Solid, extent
 PAD_M = (0.016, 0.010, 0.026)
 """How far pads reach from between their tips: to each side, down and up, [m]."""
 _FINGER_M = 0.012
-ROOM_M = 0.012
+FINGER_ROOM_M = 0.012
 """How thick a finger is; how far it stands off before it closes."""
 _PALM_M = 0.060
 _OVER_M = 0.0115
@@ -40,7 +40,7 @@ _UNEVEN_M = 0.003
 """So much farther from the middle a flat hold may be than a line on a shaft."""
 
 
-class Hold(NamedTuple):
+class PadPlace(NamedTuple):
     """A place for the pads; in the frame of the part, [m]."""
 
     point: Array
@@ -103,7 +103,7 @@ def holds_whole(pieces: tuple[Piece, ...], point: Array, across: Array, up: Arra
     return own is not None and own > (high - low) / 2 - _LESS_M
 
 
-def holds(solid: Solid, up: Array, opening_m: float, over_m: float = 0.0) -> tuple[Hold, ...]:
+def holds(solid: Solid, up: Array, opening_m: float, over_m: float = 0.0) -> tuple[PadPlace, ...]:
     """Places at which a gripper from above can hold a part, the best first: near the centre of mass, and not too low.
 
     Args:
@@ -121,16 +121,16 @@ def _axes_within(pieces: tuple[Piece, ...], axis: Array, low: float, high: float
 
 
 @lru_cache(maxsize=64)
-def _holds(solid: Solid, vertical: tuple[float, ...], opening_m: float, over_m: float) -> tuple[Hold, ...]:
+def _holds(solid: Solid, vertical: tuple[float, ...], opening_m: float, over_m: float) -> tuple[PadPlace, ...]:
     up = np.array(vertical)
     return _found(solid, up, opening_m, over_m, _RAY_M) or _found(solid, up, opening_m, over_m, _FINE_M)
 
 
-def _found(solid: Solid, up: Array, opening_m: float, over_m: float, ray_m: float) -> tuple[Hold, ...]:
+def _found(solid: Solid, up: Array, opening_m: float, over_m: float, ray_m: float) -> tuple[PadPlace, ...]:
     """With rows of rays so far apart, [m]."""
     bottom, top = extent(solid.pieces, up)
     best = max(bottom + _HEIGHT * (top - bottom), bottom + _OVER_M, top - _PALM_M)
-    candidates: list[tuple[float, int, Hold]] = []
+    candidates: list[tuple[float, int, PadPlace]] = []
     for across in _directions(solid, up):
         along = np.cross(up, across)
         low, high = extent(solid.pieces, along)
@@ -144,7 +144,7 @@ def _found(solid: Solid, up: Array, opening_m: float, over_m: float, ray_m: floa
                     point = (low + high) / 2 * across + place * along + tip * up
                     off = np.abs([(point - solid.centroid) @ across, (point - solid.centroid) @ along]).sum()
                     cost = float(off + 0.5 * abs(tip - best) + 0.25 * (high - low) + _UNEVEN_M * uneven)
-                    candidates.append((round(cost, 9), len(candidates), Hold(point, across, (high - low) / 2)))
+                    candidates.append((round(cost, 9), len(candidates), PadPlace(point, across, (high - low) / 2)))
     return tuple(hold for _, _, hold in sorted(candidates, key=lambda each: each[:2]))
 
 
@@ -177,7 +177,7 @@ def _lines(low: float, high: float, also: Sequence[float], ray_m: float = _RAY_M
 def _cast(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Array) -> _Rays:
     """Send rays along a direction through all places of a grid, each way in rising order."""
     along = np.cross(up, across)
-    corners, first = corners_of(pieces)
+    corners, first = all_corners(pieces)
     (t0, t1), (h0, h1) = (_over(places, corners @ axis, first) for places, axis in ((t, along), (h, up)))
     met = np.flatnonzero((t0 < t1) & (h0 < h1))
     T, H = np.meshgrid(t, h)
@@ -221,7 +221,7 @@ def _clusters(rays: _Rays, within: NDArray[np.bool_]) -> list[tuple[float, float
     order = np.argsort(low[there])
     low = low[there][order]
     reached = np.maximum.accumulate(high[there][order])
-    apart = low[1:] >= reached[:-1] + _FINGER_M + ROOM_M
+    apart = low[1:] >= reached[:-1] + _FINGER_M + FINGER_ROOM_M
     begins = np.append(low[0], low[1:][apart])
     ends = np.append(reached[:-1][apart], reached[-1])
     return list(zip(begins.tolist(), ends.tolist(), strict=True))
@@ -234,7 +234,7 @@ def _offers(rays: _Rays, t: float, h: float, opening_m: float) -> Iterator[tuple
     within = above & (rays.h <= h + over)
     on = ((np.abs(rays.t - t) <= side) & (rays.h >= h - down))[within]
     for low, high in _clusters(rays, within):
-        if (high - low) / 2 + ROOM_M / 2 > opening_m or _in_the_way(rays, above, low, high):
+        if (high - low) / 2 + FINGER_ROOM_M / 2 > opening_m or _in_the_way(rays, above, low, high):
             continue
         own = np.where((rays.low >= low - 1e-9) & (rays.high <= high + 1e-9), 1.0, np.nan)[within]
         with np.errstate(invalid="ignore"):
@@ -251,6 +251,6 @@ def _in_the_way(rays: _Rays, above: NDArray[np.bool_], low: float, high: float) 
     """Whether a finger, open or on its way down, would strike the part itself."""
     a = rays.low[above]
     b = rays.high[above]
-    room = _FINGER_M + ROOM_M
+    room = _FINGER_M + FINGER_ROOM_M
     struck = [(a < end) & (b > begin) for begin, end in ((low - room, low - 1e-6), (high + 1e-6, high + room))]
     return bool((struck[0] | struck[1]).any())

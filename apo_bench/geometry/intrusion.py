@@ -11,10 +11,10 @@ from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.convex import (
     across_edges,
     across_sides,
+    all_corners,
     ball_around,
     box_axes,
     boxes_around,
-    corners_of,
     separating_axes,
     shadow,
 )
@@ -145,7 +145,7 @@ def _rooms(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_
 
 def _upright(pieces: tuple[Piece, ...], R: Array) -> tuple[Array, Array]:
     """Middles and half sizes, (k, 3) each, of the boxes around turned pieces whose sides are those of the world."""
-    corners, first = corners_of(pieces)
+    corners, first = all_corners(pieces)
     turned = corners @ R.T
     low = np.minimum.reduceat(turned, first)
     high = np.maximum.reduceat(turned, first)
@@ -181,7 +181,7 @@ def upright_bounds(pieces: tuple[Piece, ...], R: Array, at: Array) -> tuple[Arra
         at: (3,), the place of their frame, [m].
     """
     if not _all_boxes(pieces):
-        corners = corners_of(pieces)[0] @ R.T + at
+        corners = all_corners(pieces)[0] @ R.T + at
         return corners.min(axis=0), corners.max(axis=0)
     centers, halves = boxes_around(pieces)
     middle = centers @ R.T + at

@@ -11,7 +11,7 @@ import numpy as np
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.overlap import NOTHING, Overlap, face_shape, plane_frame
+from apo_bench.geometry.overlap import NO_OVERLAP, Overlap, face_shape, plane_frame
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Face
 
@@ -79,7 +79,7 @@ def _coaxial(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Mate:
     at = (ends - origin) @ along
     low = max(at.min(), b.span[0])
     high = min(at.max(), b.span[1])
-    common = NOTHING
+    common = NO_OVERLAP
     points = ends
     if high > low and abs(at[1] - at[0]) > _EDGE_ON * a.length:
         points = ends[0] + np.outer((np.array([low, high]) - at[0]) / (at[1] - at[0]), ends[1] - ends[0])
@@ -102,7 +102,7 @@ def _on_rim(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Mate:
     rise, sine = _rise(cone, T_cone, rim, T_rim)
     fits = min(cone.radii) - _RIM_M * _EDGE_ON <= rim.radius <= max(cone.radii) + _RIM_M * _EDGE_ON
     over = fits and float(np.linalg.norm(off)) < rim.radius
-    common = _unrolled([(0.0, _RIM_M)], rim.radius * min(a.extent_rad, b.extent_rad), middle) if over else NOTHING
+    common = _unrolled([(0.0, _RIM_M)], rim.radius * min(a.extent_rad, b.extent_rad), middle) if over else NO_OVERLAP
     return Mate(points, off, v, _angle(u, v), rise, sine, common, 0.0)
 
 
@@ -120,7 +120,7 @@ def _on_plane(shaft: RoundFace, T_shaft: Array, flat: Face, T_flat: Array, *, of
     at = np.array(lines).reshape(-1) if lines else np.array([0.0, 1.0])
     points = ends[0] + np.outer([at.min(), at.max()], ends[1] - ends[0])
     heights = (points - pose.apply(T_flat, flat.outline[:1])) @ n - shaft.radius
-    common = NOTHING
+    common = NO_OVERLAP
     if lines and of_plane:
         common = _shadow(lines, pose.apply(pose.inverse(frame), ends)[:, :2], shaft.radius, points)
     elif lines:

@@ -44,7 +44,7 @@ class Overlap:
         return self.area > 0.0
 
 
-NOTHING = Overlap(np.zeros((0, 3)), 0.0)
+NO_OVERLAP = Overlap(np.zeros((0, 3)), 0.0)
 
 
 def overlap(face: Face, T_face: Array, on: Face, T_on: Array) -> Overlap:
@@ -63,7 +63,7 @@ def overlap(face: Face, T_face: Array, on: Face, T_on: Array) -> Overlap:
     """
     common, pieces = _common(face, T_face, on, T_on)
     if not pieces:
-        return NOTHING
+        return NO_OVERLAP
     flat = np.concatenate([straightened(ring) for piece in pieces for ring in rings_of(piece)])
     corners = pose.apply(T_on @ plane_frame(on), np.column_stack([flat, np.zeros(len(flat))]))
     return Overlap(corners, float(sum(piece.area for piece in pieces)), common)

@@ -14,7 +14,7 @@ from apo_bench.geometry.solid import extent
 from apo_bench.geometry.swept import Posed, exit_distance, is_way_free
 from apo_bench.insertion.line import Attach, Preference
 from apo_bench.insertion.macros import UP, Chain, Macro, Way, chain, departure
-from apo_bench.insertion.states import ANGLE_RAD, Screw, State, classify, null_space, screw_state, snap_normals
+from apo_bench.insertion.states import ANGLE_RAD, ContactState, Screw, classify, null_space, screw_state, snap_normals
 
 _ROOM_M = 0.02
 """A part begins its way in so far outside of what it goes into."""
@@ -50,7 +50,7 @@ class Arrival:
         freeze(self, T=(4, 4))
 
     @property
-    def state(self) -> State:
+    def state(self) -> ContactState:
         return self.chain.state
 
     @property

@@ -11,7 +11,7 @@ from typing import Literal, NamedTuple, final
 import numpy as np
 
 from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.insertion.states import ANGLE_RAD, Cone, State, classify, evenly_open, null_space
+from apo_bench.insertion.states import ANGLE_RAD, Cone, ContactState, classify, evenly_open, null_space
 
 MacroName = Literal[
     "move-to-contact",
@@ -107,7 +107,7 @@ _Out = Callable[[Array, tuple[int, ...]], Way]
 class Chain(NamedTuple):
     """How a part comes into its contacts."""
 
-    state: State
+    state: ContactState
     """When all are made."""
     macros: tuple[Macro, ...]
     way: Way | None

@@ -37,7 +37,7 @@ STATE_LETTERS = {
 """The ten states of translation, by decreasing freedom: S in the air, A on a plane, E in a through hole, I captured."""
 
 
-class State(NamedTuple):
+class ContactState(NamedTuple):
     """Degrees of freedom of each kind."""
 
     maintaining: int
@@ -65,7 +65,7 @@ class Cone:
     """(k,): contacts that some admissible motion opens; the others are equations."""
     direction: Array
     """A unit motion that opens all of those at once, (n,); zero if there are none."""
-    state: State
+    state: ContactState
 
     def __post_init__(self) -> None:
         freeze(self, rows=(None, None), direction=(self.rows.shape[1],))
@@ -83,13 +83,13 @@ def classify(rows: Array) -> Cone:
     """
     n = rows.shape[1]
     if not len(rows):
-        return Cone(rows, np.zeros(0, dtype=np.bool_), np.zeros(n), State(n, 0, 0))
+        return Cone(rows, np.zeros(0, dtype=np.bool_), np.zeros(n), ContactState(n, 0, 0))
     different, which = np.unique(np.round(rows, 12) + 0.0, axis=0, return_inverse=True)
     opens, x = _opened(different.tobytes(), *different.shape)
     detachable = opens[which.ravel()]
     maintaining = n - row_rank(rows)
     constraining = row_rank(rows[~detachable])
-    return Cone(rows, detachable, x, State(maintaining, n - maintaining - constraining, constraining))
+    return Cone(rows, detachable, x, ContactState(maintaining, n - maintaining - constraining, constraining))
 
 
 @lru_cache(maxsize=1024)
@@ -161,10 +161,10 @@ def snap_normals(normals: Array, angle_rad: float = ANGLE_RAD) -> Array:
 class Screw(NamedTuple):
     """The state of a part that may also turn."""
 
-    all: State
+    all: ContactState
     """The state in all six degrees of freedom."""
-    translation: State
-    rotation: State
+    translation: ContactState
+    rotation: ContactState
     """What is left of `all` when translation is taken out."""
 
 
@@ -179,7 +179,7 @@ def screw_state(points: Array, normals: Array) -> Screw:
     translation = classify(np.unique(normals, axis=0)).state
     m = everything.maintaining - translation.maintaining
     c = everything.constraining - translation.constraining
-    return Screw(everything, translation, State(m, 3 - m - c, c))
+    return Screw(everything, translation, ContactState(m, 3 - m - c, c))
 
 
 def _screw_rows(points: Array, normals: Array) -> Array:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 FACE_OR_PART_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 """What parts, boxes and faces may be called: names that stay unambiguous in `part.face` and in a scene."""
-LONGEST_NAME = 64
+LONGEST_FACE_NAME = 64
 _LARGEST_M = 10.0
 THINNEST_M = 0.0005
 """Half of the least thickness of a box or a cylinder."""
@@ -42,7 +42,7 @@ class TextRule(NamedTuple):
     """What is allowed, in words."""
 
     def allows(self, text: str) -> bool:
-        return len(text) <= LONGEST_NAME and self.pattern.fullmatch(text) is not None
+        return len(text) <= LONGEST_FACE_NAME and self.pattern.fullmatch(text) is not None
 
 
 def _numbers(spans: tuple[tuple[float, float], ...], least: int, unit: str = "") -> NumbersRule:
@@ -65,7 +65,7 @@ class ElementRule(NamedTuple):
 
 
 _NAMED = TextRule(
-    FACE_OR_PART_NAME, f"a name is a letter, then letters, digits and underscores, {LONGEST_NAME} in all at most"
+    FACE_OR_PART_NAME, f"a name is a letter, then letters, digits and underscores, {LONGEST_FACE_NAME} in all at most"
 )
 _FILE = TextRule(
     re.compile(r"[A-Za-z0-9][A-Za-z0-9_-]*\.stl"),
@@ -100,7 +100,7 @@ LIGHTEST_KG = 1e-4
 HEAVIEST_KG = 1e6
 MOST_SITES = 600
 MOST_CLASSES = 20
-LARGEST_BYTES = 4_000_000
+LARGEST_PART_BYTES = 4_000_000
 """Of a part file."""
 _CORNERS = NumbersRule(
     ((-_LARGEST_M, _LARGEST_M),) * 3 * MOST_CORNERS,

@@ -15,7 +15,7 @@ from apo_bench.geometry.hull import Cylinder, cylinder_hull
 from apo_bench.geometry.solid import Box, Piece, all_boxes
 from apo_bench.parts.allowed import MOST_BOXES, MOST_CORNERS_IN_ALL, WIDEST_M
 from apo_bench.parts.meshes import checked_hull, dress_picture, is_picture
-from apo_bench.parts.stated import USUAL_DENSITY, StatedPart, read_stated
+from apo_bench.parts.stated import USUAL_DENSITY, StatedPart, read_stated_part
 from apo_bench.parts.tree import read_tree
 
 _FIT_CLASS = "fit"
@@ -88,7 +88,7 @@ def read_part(path: Path) -> PartFile:
             f"{path}: site '{marks[0].name}' is given; where pieces are not boxes alone, faces stand in "
             f"{path.with_suffix('.toml').name}, so remove it."
         )
-    stated = read_stated(path.with_suffix(".toml"))
+    stated = read_stated_part(path.with_suffix(".toml"))
     _state_matter(path, root, body, stated)
     return PartFile(path, pieces, (), stated, stated.density, tostring(root, encoding="unicode"))
 

@@ -13,9 +13,9 @@ from apo_bench.geometry.polygon import flat_area, plane_across
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Face
 from apo_bench.io.documents import JsonNode, read_toml
-from apo_bench.parts.allowed import FACE_OR_PART_NAME, FRICTION, LONGEST_NAME, MOST_FACES
+from apo_bench.parts.allowed import FACE_OR_PART_NAME, FRICTION, LONGEST_FACE_NAME, MOST_FACES
 
-SCHEMA = "apo-bench/part/1"
+PART_SCHEMA = "apo-bench/part/1"
 USUAL_DENSITY = 1000.0
 """[kg/m^3], where none is stated."""
 _LARGEST_MM = 10_000.0
@@ -48,14 +48,14 @@ class StatedPart:
     licence: str
 
 
-def read_stated(path: Path) -> StatedPart:
+def read_stated_part(path: Path) -> StatedPart:
     """Read the file beside a part file.
 
     Raises:
         InputError: Anything in the file that is not as described, naming file and place.
     """
     top = read_toml(path, "file that states the faces of a part").fields_of(
-        SCHEMA, ("faces", "volume_mm3", "centroid_mm", "inertia_mm5"), ("density", "friction", "source", "licence")
+        PART_SCHEMA, ("faces", "volume_mm3", "centroid_mm", "inertia_mm5"), ("density", "friction", "source", "licence")
     )
     faces = [_face(name, node) for name, node in _named(top["faces"])]
     return StatedPart(
@@ -78,9 +78,9 @@ def _named(node: JsonNode) -> list[tuple[str, JsonNode]]:
     if len(node.value) > MOST_FACES:
         raise InputError(f"{node.file}: {len(node.value)} faces are stated; {MOST_FACES} are the most that a part has.")
     for name in node.value:
-        if len(name) > LONGEST_NAME or not FACE_OR_PART_NAME.fullmatch(name):
+        if len(name) > LONGEST_FACE_NAME or not FACE_OR_PART_NAME.fullmatch(name):
             node.child(name, "a name").fail(
-                f"letters, digits and underscores after a letter, {LONGEST_NAME} in all at most, are needed"
+                f"letters, digits and underscores after a letter, {LONGEST_FACE_NAME} in all at most, are needed"
             )
     return [(name, node.child(value, name)) for name, value in node.value.items()]
 

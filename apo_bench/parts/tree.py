@@ -8,7 +8,7 @@ from xml.parsers import expat
 
 from apo_bench.errors import InputError
 from apo_bench.io.reading import read_text
-from apo_bench.parts.allowed import ELEMENT_RULES, LARGEST_BYTES, MOST_CLASSES, REMEDIES, ElementRule
+from apo_bench.parts.allowed import ELEMENT_RULES, LARGEST_PART_BYTES, MOST_CLASSES, REMEDIES, ElementRule
 
 _DEEPEST = 8
 """Levels of nesting; classes stand in classes, all else at most four levels deep."""
@@ -20,7 +20,7 @@ def read_tree(path: Path) -> Element:
     Raises:
         InputError: The file cannot be read, is no XML, or says something that a part may not say.
     """
-    text = read_text(path, "part file", LARGEST_BYTES)
+    text = read_text(path, "part file", LARGEST_PART_BYTES)
     reader = _Reader(path)
     try:
         reader.parser.Parse(text.encode(), True)

@@ -34,7 +34,7 @@ _Pair = tuple[str, str, bytes]
 """Two parts, and where the second one is to the first."""
 
 
-class Case(NamedTuple):
+class _Case(NamedTuple):
     """A layout that the scenario can draw."""
 
     layout: Layout
@@ -64,35 +64,35 @@ def check_scenario(scenario: Scenario, file: str) -> None:
         _check_intrusions(scenario, file, case, stages, apart)
 
 
-def _cases(scenario: Scenario) -> Iterator[Case]:
+def _cases(scenario: Scenario) -> Iterator[_Case]:
     site = scenario.site
     x, y = site.center_m
     middle = sum(site.yaw_rad) / 2
-    yield Case(layout_at(scenario, x, y, middle))
+    yield _Case(layout_at(scenario, x, y, middle))
     for i, shift in enumerate(scenario.shifts):
         for length in (shift.low_m, shift.high_m):
             shifts = [length if j == i else 0.0 for j in range(len(scenario.shifts))]
             words = f" when it is varied by {1e3 * length:g} mm"
-            yield Case(layout_at(scenario, x, y, middle, shifts), f"operation {shift.operation + 1}, vary", words)
+            yield _Case(layout_at(scenario, x, y, middle, shifts), f"operation {shift.operation + 1}, vary", words)
     for i, turn in enumerate(scenario.turns):
         for angle in (turn.low_rad, turn.high_rad):
             turns = [angle if j == i else 0.0 for j in range(len(scenario.turns))]
             words = f" when it is turned by {np.degrees(angle):g} degrees"
-            yield Case(
+            yield _Case(
                 layout_at(scenario, x, y, middle, turns_rad=turns), f"operation {turn.operation + 1}, vary", words
             )
     for i, j, yaw in product((-1, 1), (-1, 1), sorted({middle, *site.yaw_rad})):
         x = site.center_m[0] + i * site.spread_m[0]
         y = site.center_m[1] + j * site.spread_m[1]
         words = f" when the site is at ({1e3 * x:g}, {1e3 * y:g}) mm, turned by {np.degrees(yaw):g} degrees"
-        yield Case(layout_at(scenario, x, y, yaw), "site", words, site_only=True)
+        yield _Case(layout_at(scenario, x, y, yaw), "site", words, site_only=True)
 
 
-def _refuse(file: str, case: Case, key: str, sentence: str, remedy: str) -> InputError:
+def _refuse(file: str, case: _Case, key: str, sentence: str, remedy: str) -> InputError:
     return InputError(f"{file}, {case.key or key}: {sentence}{case.words}; {remedy}.")
 
 
-def _check_starts(scenario: Scenario, file: str, case: Case) -> None:
+def _check_starts(scenario: Scenario, file: str, case: _Case) -> None:
     """Every movable part starts on something."""
     airborne = in_the_air(scenario.assembly, case.layout.start)
     if airborne is not None:
@@ -100,7 +100,7 @@ def _check_starts(scenario: Scenario, file: str, case: Case) -> None:
         raise _refuse(file, case, f"parts, {part}, start, at_mm", sentence, "let it start on a part, such as the table")
 
 
-def _check_turns(scenario: Scenario, file: str, case: Case, stages: tuple[Poses, ...]) -> None:
+def _check_turns(scenario: Scenario, file: str, case: _Case, stages: tuple[Poses, ...]) -> None:
     """A part turns about the vertical only: the robot does not turn parts over."""
     for k, operation in enumerate(scenario.assembly.operations):
         before = stages[k][operation.main]
@@ -117,7 +117,7 @@ def _check_turns(scenario: Scenario, file: str, case: Case, stages: tuple[Poses,
             )
 
 
-def _check_contacts(scenario: Scenario, file: str, case: Case, stages: tuple[Poses, ...]) -> None:
+def _check_contacts(scenario: Scenario, file: str, case: _Case, stages: tuple[Poses, ...]) -> None:
     for k, operation in enumerate(scenario.assembly.operations):
         for number, contact in enumerate(operation.contacts, start=1):
             if not case.site_only or _stays(scenario, contact):
@@ -130,7 +130,7 @@ def _stays(scenario: Scenario, contact: Contact) -> bool:
     return contact.environment.part in scenario.assembly.fixed - scenario.follows_site
 
 
-def _check_contact(scenario: Scenario, file: str, case: Case, key: str, contact: Contact, poses: Poses) -> None:
+def _check_contact(scenario: Scenario, file: str, case: _Case, key: str, contact: Contact, poses: Poses) -> None:
     if scenario.assembly.is_round(contact):
         _check_round(scenario, file, case, key, contact, poses)
         return
@@ -193,7 +193,7 @@ def _check_play(scenario: Scenario, file: str) -> None:
         )
 
 
-def _check_round(scenario: Scenario, file: str, case: Case, key: str, contact: Contact, poses: Poses) -> None:
+def _check_round(scenario: Scenario, file: str, case: _Case, key: str, contact: Contact, poses: Poses) -> None:
     m, e = contact
     face_of = scenario.assembly.face_of
     kind = contact_kind(face_of(m), face_of(e))
@@ -219,7 +219,7 @@ def _apart(kind: ContactKind | None, gap_mm: float) -> str:
     return f"the cone is {gap_mm:.4g} mm off its seat"
 
 
-def _check_intrusions(scenario: Scenario, file: str, case: Case, stages: tuple[Poses, ...], apart: set[_Pair]) -> None:
+def _check_intrusions(scenario: Scenario, file: str, case: _Case, stages: tuple[Poses, ...], apart: set[_Pair]) -> None:
     for a, b in combinations(scenario.assembly.solids, 2):
         _check_pair(scenario, file, case, f"parts, {b}, start", "at the start", (a, b), stages[0], apart)
     for k, operation in enumerate(scenario.assembly.operations):
@@ -232,7 +232,7 @@ def _check_intrusions(scenario: Scenario, file: str, case: Case, stages: tuple[P
 def _check_pair(
     scenario: Scenario,
     file: str,
-    case: Case,
+    case: _Case,
     key: str,
     place: str,
     pair: tuple[str, str],

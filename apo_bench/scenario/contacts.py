@@ -14,15 +14,15 @@ from typing import get_args
 import numpy as np
 
 from apo_bench.assembly.kinds import CONTACT_KINDS, contact_kind, geometric_play
-from apo_bench.assembly.topology import Contact, Gap, Kind, PartFace
+from apo_bench.assembly.topology import Contact, Gap, GapKind, PartFace
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, Solid
 from apo_bench.io.documents import JsonNode
-from apo_bench.scenario.keys import LARGEST_MM, read_span, refuse, refuse_name
+from apo_bench.scenario.keys import LARGEST_LENGTH_MM, read_span, refuse, refuse_name
 
 Asked = Mapping[Contact, Gap]
 """What is asked of each contact, in the order of the file."""
-_KINDS: tuple[Kind, ...] = get_args(Kind)
+_KINDS: tuple[GapKind, ...] = get_args(GapKind)
 _EXAMPLE = '["bottom", "table.top"]'
 _POSSIBLE = f"possible are {', '.join(CONTACT_KINDS[:-1])} and {CONTACT_KINDS[-1]}, of which cones have the same angle"
 _TABLE = '{ faces = ["py", "castle1.spy"], kind = "clearance" }'
@@ -97,7 +97,7 @@ def _gap(keys: Mapping[str, JsonNode], node: JsonNode, contact: Contact, fits: b
         return Gap(kind)
     if kind != "clearance":
         refuse(keys["gap_mm"], f'"{kind}" has no interval; say kind = "clearance", or take gap_mm out')
-    low, high = read_span(keys["gap_mm"], -LARGEST_MM, LARGEST_MM)
+    low, high = read_span(keys["gap_mm"], -LARGEST_LENGTH_MM, LARGEST_LENGTH_MM)
     if not (low <= 0.0 <= high and low < high):
         keys["gap_mm"].fail(
             "a lowest number up to 0 and a higher one from 0 are needed", "the faces of the goals coincide"
@@ -105,7 +105,7 @@ def _gap(keys: Mapping[str, JsonNode], node: JsonNode, contact: Contact, fits: b
     return Gap(kind, 1e-3 * low, 1e-3 * high)
 
 
-def _kind(node: JsonNode) -> Kind:
+def _kind(node: JsonNode) -> GapKind:
     for kind in _KINDS:
         if node.value == kind:
             return kind

@@ -11,14 +11,14 @@ from apo_bench.assembly.topology import Operation
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.holds import PAD_M, ROOM_M, holds, holds_whole
+from apo_bench.geometry.holds import FINGER_ROOM_M, PAD_M, holds, holds_whole
 from apo_bench.geometry.solid import Solid, all_boxes, extent
 from apo_bench.insertion.line import Preference
 from apo_bench.io.documents import JsonNode
 from apo_bench.parts import load_part, part_path
 from apo_bench.parts.allowed import FACE_OR_PART_NAME
 from apo_bench.scenario.contacts import Asked, check_kinds, read_contacts
-from apo_bench.scenario.keys import LARGEST_MM, read_pose, read_span, read_unit_axis, refuse, refuse_name
+from apo_bench.scenario.keys import LARGEST_LENGTH_MM, read_pose, read_span, read_unit_axis, refuse, refuse_name
 from apo_bench.scenario.scenario import Grasp, Shift, Turn
 
 _MOST_PARTS = 50
@@ -32,7 +32,7 @@ _RAISED = 0.15
 """Height of a grasp over the middle of the part, as a part of the height of the part."""
 _OPENING_M = 0.046
 """How far each finger of the arm that comes with the benchmark opens."""
-_MOST_HELD_M = 2 * _OPENING_M - ROOM_M
+_MOST_HELD_M = 2 * _OPENING_M - FINGER_ROOM_M
 """Width that the arm can hold where the file does not say how: so much room its fingers want before they close."""
 _LEVEL = 1e-6
 """Vertical component below which a unit vector is level."""
@@ -183,8 +183,8 @@ def _attach(node: JsonNode) -> Preference:
     keys = node.fields((), ("along", "travel_mm"))
     direction = read_unit_axis(keys["along"]) if "along" in keys else None
     travel_m = 1e-3 * keys["travel_mm"].number(0.0, above=True) if "travel_mm" in keys else None
-    if travel_m is not None and travel_m > 1e-3 * LARGEST_MM:
-        keys["travel_mm"].fail(f"a length of at most {LARGEST_MM:g} mm is needed")
+    if travel_m is not None and travel_m > 1e-3 * LARGEST_LENGTH_MM:
+        keys["travel_mm"].fail(f"a length of at most {LARGEST_LENGTH_MM:g} mm is needed")
     return Preference(direction, travel_m)
 
 
@@ -266,7 +266,7 @@ def _is_turn(node: JsonNode) -> bool:
 
 def _shift(node: JsonNode, operation: int) -> Shift:
     keys = node.fields(("along", "mm"))
-    low, high = read_span(keys["mm"], -LARGEST_MM, LARGEST_MM)
+    low, high = read_span(keys["mm"], -LARGEST_LENGTH_MM, LARGEST_LENGTH_MM)
     return Shift(operation, read_unit_axis(keys["along"]), 1e-3 * low, 1e-3 * high)
 
 
@@ -274,6 +274,6 @@ def _turn(node: JsonNode, operation: int) -> Turn:
     keys = node.fields(("about", "deg"), ("at_mm",))
     low, high = np.radians(read_span(keys["deg"], -360.0, 360.0))
     point = 1e-3 * keys["at_mm"].numbers(3) if "at_mm" in keys else np.zeros(3)
-    if np.abs(point).max() > 1e-3 * LARGEST_MM:
-        keys["at_mm"].fail(f"three lengths from -{LARGEST_MM:g} to {LARGEST_MM:g} mm are needed")
+    if np.abs(point).max() > 1e-3 * LARGEST_LENGTH_MM:
+        keys["at_mm"].fail(f"three lengths from -{LARGEST_LENGTH_MM:g} to {LARGEST_LENGTH_MM:g} mm are needed")
     return Turn(operation, read_unit_axis(keys["about"]), point, float(low), float(high))

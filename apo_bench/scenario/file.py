@@ -19,7 +19,7 @@ from apo_bench.records.thresholds import MEANINGS, Meaning, Thresholds
 from apo_bench.resources import folder
 from apo_bench.scenario.checks import check_scenario
 from apo_bench.scenario.entries import OperationEntry, read_operations, read_parts
-from apo_bench.scenario.keys import LARGEST_MM, read_span, read_unit_axis, refuse
+from apo_bench.scenario.keys import LARGEST_LENGTH_MM, read_span, read_unit_axis, refuse
 from apo_bench.scenario.nominal import with_attach_lines
 from apo_bench.scenario.scenario import Carelessness, Scenario, Shift, Site, Turn
 
@@ -127,7 +127,7 @@ def _scenario(root: JsonNode, path: Path) -> tuple[Scenario, tuple[Preference, .
 
 def _site(node: JsonNode) -> Site:
     keys = node.fields((), ("center_mm", "spread_mm", "yaw_deg"))
-    center = _pair(keys["center_mm"], -LARGEST_MM) if "center_mm" in keys else (0.0, 0.0)
+    center = _pair(keys["center_mm"], -LARGEST_LENGTH_MM) if "center_mm" in keys else (0.0, 0.0)
     spread = _pair(keys["spread_mm"], 0.0) if "spread_mm" in keys else (0.0, 0.0)
     yaw = read_span(keys["yaw_deg"], -360.0, 360.0) if "yaw_deg" in keys else (0.0, 0.0)
     return Site(
@@ -139,8 +139,8 @@ def _site(node: JsonNode) -> Site:
 
 def _pair(node: JsonNode, low: float) -> tuple[float, float]:
     x, y = node.numbers(2)
-    if not (low <= min(x, y) and max(x, y) <= LARGEST_MM):
-        node.fail(f"two lengths from {low:g} to {LARGEST_MM:g} mm are needed")
+    if not (low <= min(x, y) and max(x, y) <= LARGEST_LENGTH_MM):
+        node.fail(f"two lengths from {low:g} to {LARGEST_LENGTH_MM:g} mm are needed")
     return float(x), float(y)
 
 

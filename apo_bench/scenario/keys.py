@@ -10,7 +10,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.io.documents import JsonNode
 
-LARGEST_MM = 2000.0
+LARGEST_LENGTH_MM = 2000.0
 """No length in a scenario is larger: the room of an arm on a table."""
 _FARTHEST_MM = 1e5
 _AXES = {f"{sign}{'xyz'[i]}": value for sign, value in (("", 1.0), ("+", 1.0), ("-", -1.0)) for i in range(3)}
@@ -31,8 +31,8 @@ def read_pose(node: JsonNode) -> Array:
     keys = node.fields(("at_mm",), ("turn_deg",))
     at = keys["at_mm"].numbers(3)
     turn = keys["turn_deg"].numbers(3) if "turn_deg" in keys else np.zeros(3)
-    if np.abs(at).max() > LARGEST_MM:
-        keys["at_mm"].fail(f"three lengths from -{LARGEST_MM:g} to {LARGEST_MM:g} mm are needed")
+    if np.abs(at).max() > LARGEST_LENGTH_MM:
+        keys["at_mm"].fail(f"three lengths from -{LARGEST_LENGTH_MM:g} to {LARGEST_LENGTH_MM:g} mm are needed")
     if np.abs(turn).max() > 360:
         keys["turn_deg"].fail("three angles from -360 to 360 degrees are needed")
     return pose.at(1e-3 * at, turn)

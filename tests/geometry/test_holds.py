@@ -10,16 +10,18 @@ import pytest
 from apo_bench.geometry.holds import PAD_M, held_span, holds, holds_whole
 from apo_bench.geometry.intrusion import intrusion_depths
 from apo_bench.geometry.solid import Box, Solid
-from apo_bench.parts.making import Step, bore, extrude, polygon, rectangle, shaft, solid_of, turned
+from apo_bench.parts.making import Frustum, bore, extrude, polygon, rectangle, shaft, solid_of, turned
 
 OPENING_M = 0.046
 L = extrude(polygon((0, 0), (60, 0), (60, 10), (10, 10), (10, 40), (0, 40)), 0, 20)
 U = extrude(polygon((0, 0), (80, 0), (80, 40), (68, 40), (68, 10), (12, 10), (12, 40), (0, 40)), 0, 30)
-BUSH = turned([Step(0, 3, 9, name="flange"), Step(3, 20, 7, name="outer")], [Step(0, 20, 5, name="inner", fit=True)])
+BUSH = turned(
+    [Frustum(0, 3, 9, name="flange"), Frustum(3, 20, 7, name="outer")], [Frustum(0, 20, 5, name="inner", fit=True)]
+)
 PARTS = {
     "peg": (shaft(5, -25, 25, "wall"), (0, 0, 1)),
     "lying peg": (shaft(5, -25, 25, "wall"), (1, 0, 0)),
-    "disc": (turned([Step(0, 8, 30, name="rim")], [Step(0, 8, 5, name="inner")]), (0, 0, 1)),
+    "disc": (turned([Frustum(0, 8, 30, name="rim")], [Frustum(0, 8, 5, name="inner")]), (0, 0, 1)),
     "bush": (BUSH, (0, 0, 1)),
     "plate": (extrude(rectangle(60, 60), 0, 20, bores=[bore((0, 0), 5, 0, 20)]), (0, 0, 1)),
     "standing L": (L, (0, 1, 0)),

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.overlap import NOTHING, beside, face_area, overlap
+from apo_bench.geometry.overlap import NO_OVERLAP, beside, face_area, overlap
 from apo_bench.geometry.solid import Face
 from apo_bench.parts import load_part
 
@@ -63,8 +63,8 @@ def test_a_share_is_what_is_covered_of_the_other_overlap():
     assert narrow.share(wide) == pytest.approx(0.25)
     assert wide.share(narrow) == pytest.approx(1.0)
     assert beside.share(wide) == 0.0
-    assert NOTHING.share(wide) == 0.0
-    assert wide.share(NOTHING) == 1.0
+    assert NO_OVERLAP.share(wide) == 0.0
+    assert wide.share(NO_OVERLAP) == 1.0
 
 
 def test_a_strip_across_a_concave_face_leaves_two_pieces():

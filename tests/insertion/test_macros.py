@@ -13,7 +13,7 @@ from apo_bench.geometry.solid import Solid
 from apo_bench.insertion.arrival import Arrival, arrive
 from apo_bench.insertion.line import Preference
 from apo_bench.insertion.macros import Chain, Way, chain, departure, peel
-from apo_bench.insertion.states import State
+from apo_bench.insertion.states import ContactState
 from tests import scenes
 
 X, Y, Z = np.eye(3)
@@ -129,7 +129,7 @@ def test_a_block_in_a_corner() -> None:
             part=(scenes.block(), scenes.mm(0, 0, 25)),
         )
     )
-    assert found.state == State(0, 3, 0)
+    assert found.state == ContactState(0, 3, 0)
     assert [(m.name, m.direction.tolist()) for m in found.macros] == [
         ("move-to-contact", [0, 0, -1]),
         ("slide-to-contact", [1, 0, 0]),

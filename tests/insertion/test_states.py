@@ -9,7 +9,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.insertion.states import STATE_LETTERS, State, classify, null_space, row_rank, screw_state, snap_normals
+from apo_bench.insertion.states import (
+    STATE_LETTERS,
+    ContactState,
+    classify,
+    null_space,
+    row_rank,
+    screw_state,
+    snap_normals,
+)
 
 X, Y, Z = np.eye(3)
 TEN = {
@@ -148,7 +156,7 @@ def test_the_programme_agrees_with_the_corners_of_the_cone() -> None:
         found = classify(normals)
         spanned = row_rank(corners_of_cone(normals))
         m = 3 - row_rank(normals)
-        assert found.state == State(m, spanned - m, 3 - spanned)
+        assert found.state == ContactState(m, spanned - m, 3 - spanned)
         assert found.admits(found.direction, 1e-9)
         assert (normals[found.detachable] @ found.direction > 0.0).all()
         assert np.abs(normals[~found.detachable] @ found.direction).max(initial=0.0) < 1e-6

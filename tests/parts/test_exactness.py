@@ -17,7 +17,7 @@ from apo_bench.parts.check import check_matter
 from apo_bench.parts.making import (
     Body,
     Edge,
-    Step,
+    Frustum,
     bore,
     circle,
     extrude,
@@ -99,8 +99,8 @@ def random_bush(rng: np.random.Generator) -> tuple[Body, float, dict, dict]:
     low = rng.uniform(2, 8)
     R = r + wide + rng.uniform(1, 3)
     flange = rng.uniform(1, 3)
-    outer = [Step(0, low, R + flange, name="flange"), Step(low, h, R, name="outer")]
-    inner = [Step(0, h / 2, r, name="bore"), Step(h / 2, h, r + wide, name="wide")]
+    outer = [Frustum(0, low, R + flange, name="flange"), Frustum(low, h, R, name="outer")]
+    inner = [Frustum(0, h / 2, r, name="bore"), Frustum(h / 2, h, r + wide, name="wide")]
     volume = np.pi * (low * (R + flange) ** 2 + (h - low) * R**2 - h / 2 * (r**2 + (r + wide) ** 2))
     walls = {
         "flange": ((0, 0), R + flange, 0, low, False),

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from apo_bench.errors import InputError
 from apo_bench.geometry.solid import Box
 from apo_bench.parts import load_part, part_names, part_path, read_part
-from apo_bench.parts.allowed import ELEMENT_RULES, LARGEST_BYTES, MOST_FACES, MOST_PIECES, MOST_SITES
+from apo_bench.parts.allowed import ELEMENT_RULES, LARGEST_PART_BYTES, MOST_FACES, MOST_PIECES, MOST_SITES
 from apo_bench.parts.check import check_solid
 from apo_bench.parts.faces import unite
 from apo_bench.resources import folder
@@ -179,7 +179,7 @@ COSTLY = {
     "classes": (PART.replace("</default>", '<default class="c"/>' * 8_000 + "</default>", 1), "<default>"),
     "nested bodies": (PART.replace("</body>", "<body>" * 50_000 + "</body>" * 50_001), "<body> stands in <body>"),
     "unclosed": ("<mujoco>" * 100_000, "<mujoco> stands in <mujoco>"),
-    "larger than a part": (PART + " " * LARGEST_BYTES, "larger than 4 MB"),
+    "larger than a part": (PART + " " * LARGEST_PART_BYTES, "larger than 4 MB"),
     "empty": ("", "not well-formed XML"),
 }
 

@@ -15,7 +15,7 @@ from apo_bench.parts import load_part
 from apo_bench.parts.making import (
     Body,
     Edge,
-    Step,
+    Frustum,
     bore,
     extrude,
     join,
@@ -49,8 +49,8 @@ def base() -> Body:
 
 
 def bush() -> Body:
-    outer = [Step(0, 3, 9, name="flange"), Step(3, 20, 7, name="outer")]
-    return turned(outer, [Step(0, 20, 5, name="inner", fit=True)], flats={0: "low", 3: "shoulder", 20: "high"})
+    outer = [Frustum(0, 3, 9, name="flange"), Frustum(3, 20, 7, name="outer")]
+    return turned(outer, [Frustum(0, 20, 5, name="inner", fit=True)], flats={0: "low", 3: "shoulder", 20: "high"})
 
 
 def pins() -> Body:
@@ -68,7 +68,7 @@ BODIES: Mapping[str, Body] = {
     "peg": shaft(5, 0, 50, "peg", chamfer_low=0.5, bottom="tip", top="head"),
     "bracket": extrude(rounded(polygon((0, 0), (60, 0), (60, 10), (10, 10), (10, 40), (0, 40)), 3), 0, 20),
     "dovetail": extrude(polygon((-10, 0), (10, 0), (16, 10), (-16, 10), names=("b", "r", "t", "l"), fit=("r",)), 0, 40),
-    "taper": turned([Step(0, 20, 10, 5, name="cone")], flats={0: "low", 20: "high"}),
+    "taper": turned([Frustum(0, 20, 10, 5, name="cone")], flats={0: "low", 20: "high"}),
     "stairs": join(extrude(rectangle(60, 40), 0, 10, top="tread"), extrude(rectangle(20, 40, (-20, 0)), 10, 30)),
 }
 

@@ -2,8 +2,8 @@
 
 from apo_bench.parts.making.body import Body, join
 from apo_bench.parts.making.extrude import Bore, bore, extrude
+from apo_bench.parts.making.frustums import Frustum
 from apo_bench.parts.making.outline import Edge, Outline, circle, polygon, rectangle, rounded, slot
-from apo_bench.parts.making.steps import Step
 from apo_bench.parts.making.turned import shaft, turned
 from apo_bench.parts.making.writing import solid_of, write_part
 
@@ -11,8 +11,8 @@ __all__ = [
     "Body",
     "Bore",
     "Edge",
+    "Frustum",
     "Outline",
-    "Step",
     "bore",
     "circle",
     "extrude",

@@ -15,9 +15,9 @@ from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Face
 from apo_bench.parts.making.body import Body
 from apo_bench.parts.making.cells import bands, bore_cell, clipped, convex_cells, wedges
+from apo_bench.parts.making.frustums import Frustum, at_height, heights_of, tangent
 from apo_bench.parts.making.moments import Moments, extruded
 from apo_bench.parts.making.outline import Outline, arc_of, circle, goes_on, outline_moments, receding, ring
-from apo_bench.parts.making.steps import Step, at_height, heights_of, tangent
 
 _NARROW_MM = 6e-3
 
@@ -29,7 +29,7 @@ class Bore:
 
     at: tuple[float, float]
     """[mm]."""
-    steps: tuple[Step, ...]
+    steps: tuple[Frustum, ...]
     flats: Mapping[float, str] | None = None
     """Height -> name of the flat face there: the bottom of a blind bore, the ledge of a wider one."""
 
@@ -57,11 +57,11 @@ def bore(
     """
     a = chamfer_low
     b = chamfer_high
-    steps = [Step(low + a, high - b, radius, name=name, fit=fit, sides=sides)]
+    steps = [Frustum(low + a, high - b, radius, name=name, fit=fit, sides=sides)]
     if a:
-        steps.insert(0, Step(low, low + a, radius + a, radius, name and f"{name}_chamfer_low", sides=sides))
+        steps.insert(0, Frustum(low, low + a, radius + a, radius, name and f"{name}_chamfer_low", sides=sides))
     if b:
-        steps.append(Step(high - b, high, radius, radius + b, name and f"{name}_chamfer_high", sides=sides))
+        steps.append(Frustum(high - b, high, radius, radius + b, name and f"{name}_chamfer_high", sides=sides))
     return Bore(at, tuple(steps))
 
 

@@ -38,7 +38,7 @@ Outline = Sequence[Edge]
 """A closed one, counter-clockwise; of a hole too."""
 
 
-class Arc(NamedTuple):
+class OutlineArc(NamedTuple):
     """An arc of an outline."""
 
     center: Array
@@ -126,7 +126,7 @@ def rounded(outline: Outline, radius: float, corners: Sequence[int] | None = Non
     return edges
 
 
-def arc_of(outline: Outline, i: int) -> Arc | None:
+def arc_of(outline: Outline, i: int) -> OutlineArc | None:
     """The arc of side i; None if it is straight."""
     edge = outline[i]
     after = outline[(i + 1) % len(outline)]
@@ -139,7 +139,7 @@ def arc_of(outline: Outline, i: int) -> Arc | None:
         raise ValueError(f"side {i + 1} of an outline is no arc: its ends are not as far from its centre as each other")
     first = float(np.arctan2(a[1], a[0]))
     turn = (float(np.arctan2(b[1], b[0])) - first) % (2.0 * np.pi)
-    return Arc(np.array(edge.center), r, first, turn - 2.0 * np.pi if edge.clockwise else turn)
+    return OutlineArc(np.array(edge.center), r, first, turn - 2.0 * np.pi if edge.clockwise else turn)
 
 
 def ring(outline: Outline, hole: bool = False) -> Array:
@@ -176,7 +176,7 @@ def _corners(outline: Outline, i: int, hole: bool) -> Iterator[Array]:
         yield from arc.at(arc.first + arc.turn * np.arange(n) / n)
 
 
-def goes_on(before: Arc | None, arc: Arc) -> bool:
+def goes_on(before: OutlineArc | None, arc: OutlineArc) -> bool:
     """Whether an arc continues another one on its circle."""
     return (
         before is not None

@@ -13,16 +13,16 @@ from apo_bench.geometry.solid import Face
 from apo_bench.parts.making.body import Body
 from apo_bench.parts.making.cells import clipped, wedges
 from apo_bench.parts.making.extrude import flat_face
+from apo_bench.parts.making.frustums import Frustum, at_height, heights_of, inscribed, tangent
 from apo_bench.parts.making.moments import Moments
-from apo_bench.parts.making.steps import Step, at_height, heights_of, inscribed, tangent
 
 _SAME_MM = 1e-6
 _NARROW_MM = 6e-3
 
 
 def turned(
-    outer: Sequence[Step],
-    inner: Sequence[Step] = (),
+    outer: Sequence[Frustum],
+    inner: Sequence[Frustum] = (),
     *,
     flats: Mapping[float, str] | None = None,
     fit: Sequence[str] = (),
@@ -68,15 +68,15 @@ def shaft(
     """A cylinder along z with chamfers of 45 degrees, [mm]; those of `name` are `name_chamfer_low` and `..._high`."""
     a = chamfer_low
     b = chamfer_high
-    steps = [Step(low + a, high - b, radius, name=name)]
+    steps = [Frustum(low + a, high - b, radius, name=name)]
     if a:
-        steps.insert(0, Step(low, low + a, radius - a, radius, name and f"{name}_chamfer_low"))
+        steps.insert(0, Frustum(low, low + a, radius - a, radius, name and f"{name}_chamfer_low"))
     if b:
-        steps.append(Step(high - b, high, radius, radius - b, name and f"{name}_chamfer_high"))
+        steps.append(Frustum(high - b, high, radius, radius - b, name and f"{name}_chamfer_high"))
     return turned(steps, flats={low: bottom, high: top})
 
 
-def _length(outer: Sequence[Step], inner: Sequence[Step], a: float, b: float) -> Iterator[Hull]:
+def _length(outer: Sequence[Frustum], inner: Sequence[Frustum], a: float, b: float) -> Iterator[Hull]:
     """The pieces between two heights between which nothing changes."""
     around = next((s for s in outer if s.part(a, b)), None)
     bore = next((s for s in inner if s.part(a, b)), None)
@@ -105,7 +105,9 @@ def _ring(radius: float, sides: int, z: float) -> Array:
     return np.column_stack([inscribed((0.0, 0.0), radius, sides), np.full(sides, z)])
 
 
-def _flats(outer: Sequence[Step], inner: Sequence[Step], z: float, name: str, fit: Sequence[str]) -> Iterator[Face]:
+def _flats(
+    outer: Sequence[Frustum], inner: Sequence[Frustum], z: float, name: str, fit: Sequence[str]
+) -> Iterator[Face]:
     """The rings that look up or down at a height: what is full below and not above, or above and not below."""
     areas = []
     for above in (False, True):

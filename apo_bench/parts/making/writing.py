@@ -15,7 +15,7 @@ from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Box, Face, Piece, Solid, all_boxes
 from apo_bench.parts.allowed import THINNEST_M
 from apo_bench.parts.making.body import Body
-from apo_bench.parts.stated import SCHEMA
+from apo_bench.parts.stated import PART_SCHEMA
 
 _ALIGNED = 1e-9
 _STEEL = (0.70, 0.72, 0.75)
@@ -164,7 +164,7 @@ def stated_text(solid: Solid, density: float, friction: Sequence[float], source:
     assert J is not None
     six = 1e15 * J[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     lines = [
-        f'schema = "{SCHEMA}"',
+        f'schema = "{PART_SCHEMA}"',
         f"source = {_quoted(source)}",
         f"licence = {_quoted(licence)}",
         f"density = {float(density)!r}",

@@ -17,7 +17,7 @@ _SAME_MM = 1e-6
 
 @final
 @dataclass(frozen=True)
-class Step:
+class Frustum:
     """One length of a bore or of a shaft, a cylinder or a cone, [mm]."""
 
     low: float
@@ -68,7 +68,7 @@ class Step:
         return RoundFace(self.name, point, axis, span, (1e-3 * a, 1e-3 * b), hole, self.fit)
 
 
-def at_height(steps: Sequence[Step], height: float, above: bool) -> tuple[float, int]:
+def at_height(steps: Sequence[Frustum], height: float, above: bool) -> tuple[float, int]:
     """Radius and sides just above or just below a height; (0, 0) where no step is."""
     for step in steps:
         inside = step.low - _SAME_MM <= height < step.high - _SAME_MM
@@ -79,7 +79,7 @@ def at_height(steps: Sequence[Step], height: float, above: bool) -> tuple[float,
     return 0.0, 0
 
 
-def heights_of(steps: Sequence[Step], *more: float) -> list[float]:
+def heights_of(steps: Sequence[Frustum], *more: float) -> list[float]:
     """Where steps begin and end, and other heights, ascending, each once."""
     every = np.sort([*more, *(h for step in steps for h in (step.low, step.high))])
     return [float(h) for h in every[np.diff(every, prepend=-np.inf) > _SAME_MM]]
