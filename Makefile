@@ -15,7 +15,7 @@ headline: OUT ?= runs/headline_$(FIDELITY)
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
-NUMERIC = $(BIN)/python -m benchmarks.switches $(BIN)/pytest -q -m "numeric and not slow" -n 0 \
+NUMERIC = $(BIN)/python -m benchmarks.switches $(BIN)/pytest -q -m "numeric and not slow" -n {processes} \
     $$(grep -rl pytest.mark.numeric tests --include=test_*.py)
 MIN := import sys; sys.exit(not (3, 11) <= sys.version_info < (3, 15))
 

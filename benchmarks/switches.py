@@ -20,7 +20,10 @@ BLAS = ("Haswell", "Zen", "SkylakeX", "Nehalem")
 """Names that OPENBLAS_CORETYPE knows; one that it does not know or cannot run is passed over in silence."""
 EXPECTED = "APO_BENCH_KERNELS"
 AT_ONCE = 2
-"""Kernels whose commands run together: one process each, so that what a process imports is paid once per kernel."""
+"""Kernels whose commands run together."""
+PROCESSES = "{processes}"
+"""Stands in a command of pytest for how many processes it starts: none of its own where several kernels run together,
+so that what a process imports is paid once per kernel."""
 TOLD = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
 
 
@@ -139,8 +142,11 @@ def main(command: list[str]) -> int:
     if isinstance(own, str):
         print(f"the kernels of this processor are not known: {own}")
         return 1
+    to_run = list(taken(own))
+    processes = "0" if len(to_run) > 1 else str(AT_ONCE)
+    command = [processes if word == PROCESSES else word for word in command]
     with ThreadPoolExecutor(AT_ONCE) as pool:
-        runs = [(switch, pool.submit(run, switch, command, **TOLD)) for switch in taken(own)]
+        runs = [(switch, pool.submit(run, switch, command, **TOLD)) for switch in to_run]
         for switch, ended in runs:
             print(f"-- under {switch.name}\n{ended.result().stdout}", end="", flush=True)
     return int(any(ended.result().returncode for _, ended in runs))

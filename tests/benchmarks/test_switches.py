@@ -94,6 +94,16 @@ def test_every_kernel_has_its_command_and_one_that_fails_is_not_lost(
             assert f"-- under {name}\n{name} of {json.dumps(asdict(OWN))}\naside\n" in said
 
 
+@pytest.mark.parametrize(("names", "processes"), [(("one",), "2"), (("one", "two"), "0")])
+def test_a_single_kernel_has_both_cores(
+    names: tuple[str, ...], processes: str, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(switches, "under", lambda asked: OWN)
+    monkeypatch.setattr(switches, "switches", lambda own: iter([Switch(name, {}, own) for name in names]))
+    assert switches.main(["echo", "-n", "processes", switches.PROCESSES]) == 0
+    assert capsys.readouterr().out.count(f"processes {processes}") == len(names)
+
+
 @pytest.mark.parametrize(
     ("change", "told"),
     [
