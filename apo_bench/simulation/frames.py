@@ -25,7 +25,7 @@ def rotation(quaternion: Any) -> Array:
 
 
 def quaternion(T: Array) -> Array:
-    """How a pose, (4, 4), is turned, as a quaternion, w first."""
+    """How a pose, (4, 4), or a rotation, (3, 3), is turned, as a quaternion, w first."""
     q = np.zeros(4)
     mujoco.mju_mat2Quat(q, np.ascontiguousarray(T[:3, :3]).ravel())
     return q

@@ -20,29 +20,30 @@ _LARGEST_FILE = 100_000
 """Bytes that a library may write into a file."""
 
 
-def build_apart(said: ArmDescription) -> Arm:
+def build_apart(description: ArmDescription) -> Arm:
     """What `build_arm` makes of a description.
 
     Raises:
         InputError: As there; or it takes too long or too much memory, or ends its process.
     """
+    mjcf = description.mjcf
     command = [sys.executable, "-P", "-c", _START, *sys.path]
     one_thread = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     try:
-        done = subprocess.run(
-            command, input=pickle.dumps(said), capture_output=True, timeout=_WALL_S, check=False, env=one_thread
+        child = subprocess.run(
+            command, input=pickle.dumps(description), capture_output=True, timeout=_WALL_S, check=False, env=one_thread
         )
-        kind, found = pickle.loads(done.stdout)
+        kind, answer = pickle.loads(child.stdout)
     except subprocess.TimeoutExpired as error:
-        raise InputError(f"{said.mjcf}: MuJoCo needs more than {_WALL_S} s for this arm; make it simpler.") from error
+        raise InputError(f"{mjcf}: MuJoCo needs more than {_WALL_S} s for this arm; make it simpler.") from error
     except (pickle.UnpicklingError, EOFError) as error:
         raise InputError(
-            f"{said.mjcf}: MuJoCo ends without a word, or needs more than {_LIMIT_S} s or {_LIMIT_BYTES / 1e9:g} GB, "
+            f"{mjcf}: MuJoCo ends without a word, or needs more than {_LIMIT_S} s or {_LIMIT_BYTES / 1e9:g} GB, "
             "for this arm; make it simpler."
         ) from error
     if kind == "refused":
-        raise InputError(found)
-    arm: Arm = found
+        raise InputError(answer)
+    arm: Arm = answer
     return arm
 
 
@@ -54,7 +55,7 @@ def run_child() -> None:
 
     # otherwise MuJoCo writes MUJOCO_LOG.TXT into the user's folder when a stranger's gripper is unstable
     mujoco.set_mju_user_warning(lambda _: None)
-    said: ArmDescription = pickle.loads(sys.stdin.buffer.read())
+    description: ArmDescription = pickle.loads(sys.stdin.buffer.read())
     out = os.dup(1)
     os.dup2(2, 1)
     limits = (
@@ -68,10 +69,13 @@ def run_child() -> None:
             resource.setrlimit(what, (most, most))
     answer: tuple[str, Any]
     try:
-        answer = "arm", build_arm(said)
+        answer = "arm", build_arm(description)
     except InputError as error:
         answer = "refused", str(error)
     except MemoryError:
-        answer = "refused", f"{said.mjcf}: MuJoCo needs more than {_LIMIT_BYTES / 1e9:g} GB; make the arm simpler."
+        answer = (
+            "refused",
+            f"{description.mjcf}: MuJoCo needs more than {_LIMIT_BYTES / 1e9:g} GB; make the arm simpler.",
+        )
     with os.fdopen(out, "wb") as file:
         file.write(pickle.dumps(answer))

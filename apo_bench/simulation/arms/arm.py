@@ -1,13 +1,16 @@
-"""The arm as data."""
+"""The arm as data: what it can do, what its gripper does, where it stands."""
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array, copyable, frozen
-from apo_bench.simulation.arms.hand import Hand
+from apo_bench.geometry.arrays import Array, copyable, freeze
+
+_GRADED = 0.6
+"""A gripper of which one step of the command makes this part of its opening knows open and closed only."""
 
 
 @final
@@ -24,6 +27,70 @@ class ArmLimits:
     """(joints,), the most each can push; infinite where nothing is said."""
     fingers_m_s: float = 0.28
     """How fast the command of each finger moves at most."""
+
+
+@final
+@copyable
+@dataclass(frozen=True, eq=False)
+class Hand:
+    """Measured from closed to open; openings are of each finger, half the distance between the pads, [m]."""
+
+    actuators: tuple[str, ...]
+    joints: tuple[str, ...]
+    opening: Array
+    """(n,), ascending; below zero where pads would be inside each other."""
+    commands: Array
+    """(n, actuators), in their own units."""
+    states: Array
+    """(n, joints), [rad] or [m]."""
+    force_n: float
+    """How hard each pad pushes on a part of half its opening."""
+    squeeze_m: float
+    """How far inside the part its fingers are sent for that, each."""
+    gives_m: float
+    """How far the middle of each pad then gives way, beyond the surface of that part."""
+    turns_deg: float
+    """How far a pad turns while the empty hand closes to half of its opening."""
+    friction: float
+    """Of what pushes on that part."""
+    seconds: float
+    """How long it takes to close or open at most."""
+    pads: tuple[str, str]
+    """A geom of each side."""
+    thick_m: float
+    """How much farther apart the middles of these are than the surfaces that hold."""
+    reach: Array
+    """(n,), how far the pads reach beyond the tip, [m]."""
+
+    def __post_init__(self) -> None:
+        n = len(self.opening)
+        freeze(self, opening=(n,), reach=(n,), commands=(n, len(self.actuators)), states=(n, len(self.joints)))
+
+    @cached_property
+    def graded(self) -> bool:
+        """Whether it can be opened by any amount; else it is open or closed."""
+        steps = np.diff(self.opening)
+        return bool(steps.max() < _GRADED * steps.sum())
+
+    def command(self, opening: float) -> Array:
+        """(actuators,), at which the fingers of the empty hand stand at an opening; all of it, if there is no more."""
+        return self._at(self.commands, opening)
+
+    def state(self, opening: float) -> Array:
+        """(joints,), at an opening of the empty hand."""
+        return self._at(self.states, opening)
+
+    def of_command(self, ctrl: Array) -> float:
+        """The opening that is commanded, [m]."""
+        k = int(np.abs(self.commands[-1] - self.commands[0]).argmax())
+        # The actuator whose command changes most tells the opening; its commands may fall while the opening rises.
+        order = np.argsort(self.commands[:, k], kind="stable")
+        return float(np.interp(float(ctrl[k]), self.commands[order, k], self.opening[order]))
+
+    def _at(self, rows: Array, opening: float) -> Array:
+        if not self.graded:
+            return np.array(rows[-1 if opening > self.opening[0] else 0])
+        return np.array([np.interp(opening, self.opening, column) for column in rows.T])
 
 
 @final
@@ -71,7 +138,7 @@ class Arm:
     """What moves the joints, and how much stronger than in the model the drive of the gripper is, if it is."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "home", frozen(self.home, len(self.joints)))
+        freeze(self, home=(len(self.joints),))
         object.__setattr__(self, "files", self.files or (self.mjcf,))
 
     def finger_joints(self, opening: float) -> Array:

@@ -16,12 +16,12 @@ from apo_bench.resources import folder
 from apo_bench.simulation.arms.apart import build_apart
 from apo_bench.simulation.arms.arm import Arm, ArmLimits
 from apo_bench.simulation.arms.chain import find_flange, find_joints
-from apo_bench.simulation.arms.description import ArmDescription, read_description
+from apo_bench.simulation.arms.description import ArmDescription, GripperDescription, read_description
 from apo_bench.simulation.arms.home import find_home
 from apo_bench.simulation.arms.loading import check_surroundings, compiled, files_of, load_model
 from apo_bench.simulation.arms.measuring import Measured, measure
 from apo_bench.simulation.arms.pressing import PROBE
-from apo_bench.simulation.arms.servo import add_servos, drives_of, felt_inertia, is_soft
+from apo_bench.simulation.arms.servo import Drive, add_servos, drives_of, felt_inertia, is_soft
 from apo_bench.simulation.arms.stated import stated_arm
 from apo_bench.simulation.arms.strength import with_force
 
@@ -46,93 +46,109 @@ def read_arm(path: str | Path) -> Arm:
     return read_described(read_description(Path(path)))
 
 
-def read_described(said: ArmDescription) -> Arm:
+def read_described(description: ArmDescription) -> Arm:
     """The arm of a description, as it was built and measured when its files were as they are now."""
-    times = tuple((str(each), each.stat().st_mtime_ns) for each in (said.file, *_files(said)) if each.is_file())
+    files = (description.file, *_files(description))
+    times = tuple((str(each), each.stat().st_mtime_ns) for each in files if each.is_file())
     if times not in _BUILT:
         while len(_BUILT) >= _MOST_BUILT:
             del _BUILT[next(iter(_BUILT))]
-        _BUILT[times] = build_arm(said) if _is_ours(said) else build_apart(said)
+        # Models that come with the package are built here, those of strangers in a process of their own.
+        ours = os.path.realpath(folder("assets"))
+        models = (description.mjcf, description.gripper.mjcf or description.mjcf)
+        is_ours = all(Path(os.path.realpath(each)).is_relative_to(ours) for each in models)
+        _BUILT[times] = build_arm(description) if is_ours else build_apart(description)
     return _BUILT[times]
 
 
-def _is_ours(said: ArmDescription) -> bool:
-    """Whether the models come with the package."""
-    ours = os.path.realpath(folder("assets"))
-    models = (said.mjcf, said.gripper.mjcf or said.mjcf)
-    return all(Path(os.path.realpath(each)).is_relative_to(ours) for each in models)
-
-
-def build_arm(said: ArmDescription) -> Arm:
+def build_arm(description: ArmDescription) -> Arm:
     """Put an arm together.
 
     Raises:
         InputError: Its models do not fit the description, or cannot be used; what to do is said.
     """
-    if said.gripper.slides is not None:
-        return stated_arm(said, said.gripper.slides)
-    spec = load_model(said.mjcf, "arm")
-    model = compiled(spec, said.mjcf)
-    check_surroundings(model, said.mjcf)
-    flange, T_flange = find_flange(model, said)
-    joints = find_joints(model, flange, said)
-    if said.gripper.mjcf is not None:
-        hand = load_model(said.gripper.mjcf, "gripper")
-        hand.option = spec.option
-        T = T_flange @ said.gripper.mount
-        frame = spec.body(model.body(flange).name).add_frame(pos=T[:3, 3], quat=_quaternion(T))
-        spec.attach(hand, frame=frame, prefix=_GRIPPER)
-    elif said.gripper.mount is not None and not np.array_equal(said.gripper.mount, np.eye(4)):
-        raise InputError(
-            f"{said.file}, gripper: 'mount' needs 'mjcf'; a gripper that is part of the arm has its place."
-        )
+    mjcf = description.mjcf
+    spec = load_model(mjcf, "arm")
+    model = compiled(spec, mjcf)
+    check_surroundings(model, mjcf)
+    flange, T_flange = find_flange(model, description)
+    joints = find_joints(model, flange, description)
     last = model.body(flange).name
+    if description.gripper.slides is not None:
+        return stated_arm(description, description.gripper.slides, model, joints, last)
+    _mount_gripper(spec, last, T_flange, description)
     _make_passive(spec, joints)
-    whole = compiled(spec, said.mjcf)
+    whole = compiled(spec, mjcf)
     drives = drives_of(whole, joints)
-    usual = _usual_home(model, joints)
-    rig = _measuring_model(spec, said.mjcf)
-    start = said.home if said.home is not None else usual
-    if len(start) != len(joints):
-        raise InputError(f"{said.file}: 'home_deg' has {len(start)} numbers; the arm has {len(joints)} joints.")
-    names = said.gripper.actuators
-    if names is not None and said.gripper.mjcf is not None:
-        gripper = replace(said.gripper, actuators=tuple(_prefixed(rig, "actuator", name) for name in names))
-    else:
-        gripper = said.gripper
-    if gripper.pads is not None and gripper.mjcf is not None:
-        a, b = (name if _known(rig, name) else _GRIPPER + name for name in gripper.pads)
-        gripper = replace(gripper, pads=(a, b))
-    where = said.gripper.mjcf or said.mjcf
+    home = _usual_home(model, joints) if description.home is None else description.home
+    rig = _measuring_model(spec, mjcf)
+    if len(home) != len(joints):
+        raise InputError(f"{description.file}: 'home_deg' has {len(home)} numbers; the arm has {len(joints)} joints.")
+    gripper = _with_names_as_mounted(rig, description.gripper)
+    where = gripper.mjcf or mjcf
     flange = rig.body(last).id
-    found, times = with_force(
+    measured, times = with_force(
         spec,
-        said.gripper.force_n,
-        said.file,
-        lambda spec: measure(_measuring_model(spec, said.mjcf), where, joints, start, flange, gripper),
+        gripper.force_n,
+        description.file,
+        lambda spec: measure(_measuring_model(spec, mjcf), where, joints, home, flange, gripper),
     )
-    own = _drive(spec, whole, joints, start, drives, found, said)
-    text = _text(spec, found)
+    hand = measured.hand
+    own = _drive(spec, joints, felt_inertia(whole, joints, home), drives, hand.actuators, description)
     arm = Arm(
-        mjcf=said.file,
-        base=tuple(said.base[:3, 3].tolist()),
-        turn=tuple(_quaternion(said.base).tolist()),
+        mjcf=description.file,
+        base=tuple(description.base[:3, 3].tolist()),
+        turn=tuple(_quaternion(description.base).tolist()),
         joints=tuple(joints),
         tip=_TIP,
-        fingers=found.hand.joints,
+        fingers=hand.joints,
         grip="",
-        mount=found.mount,
-        home=start,
-        opening_m=float(found.hand.opening[-1]),
-        squeeze_m=found.hand.squeeze_m,
-        model=text,
-        hand=found.hand,
-        limits=_limits(said, joints, drives),
-        files=_files(said),
+        mount=measured.mount,
+        home=home,
+        opening_m=float(hand.opening[-1]),
+        squeeze_m=hand.squeeze_m,
+        model=_text(spec, measured),
+        hand=hand,
+        limits=ArmLimits(
+            payload_kg=description.payload_kg,
+            speed_rad_s=description.of_each_joint("speed_deg_s", description.speed_rad_s, len(joints)),
+            torque_nm=np.array([drives[name].torque for name in joints]),
+            fingers_m_s=description.gripper.speed_m_s or _USUAL_FINGERS_M_S,
+        ),
+        files=_files(description),
         control=("own position actuators" if own else "position servos made from the model")
         + (f", gripper drive {times:.3g} times as strong as in the model" if times != 1.0 else ""),
     )
-    return arm if said.home is not None else replace(arm, home=find_home(arm))
+    return arm if description.home is not None else replace(arm, home=find_home(arm))
+
+
+def _mount_gripper(spec: Any, flange: str, T_flange: Array, description: ArmDescription) -> None:
+    """Attach the gripper of a file of its own to the flange, a body."""
+    gripper = description.gripper
+    if gripper.mjcf is not None:
+        hand = load_model(gripper.mjcf, "gripper")
+        hand.option = spec.option
+        T = T_flange @ gripper.mount
+        spec.attach(hand, frame=spec.body(flange).add_frame(pos=T[:3, 3], quat=_quaternion(T)), prefix=_GRIPPER)
+    elif not np.array_equal(gripper.mount, np.eye(4)):
+        raise InputError(
+            f"{description.file}, gripper: 'mount' needs 'mjcf'; a gripper that is part of the arm has its place."
+        )
+
+
+def _with_names_as_mounted(model: Any, gripper: GripperDescription) -> GripperDescription:
+    """The description of a gripper, its actuators and pads called as they are called in the whole arm."""
+    if gripper.mjcf is None:
+        return gripper
+    actuators = {model.actuator(i).name for i in range(model.nu)}
+    shapes = {model.body(i).name for i in range(model.nbody)} | {model.geom(i).name for i in range(model.ngeom)}
+    if gripper.actuators is not None:
+        names = tuple(name if name in actuators else _GRIPPER + name for name in gripper.actuators)
+        gripper = replace(gripper, actuators=names)
+    if gripper.pads is not None:
+        a, b = (name if name in shapes else _GRIPPER + name for name in gripper.pads)
+        gripper = replace(gripper, pads=(a, b))
+    return gripper
 
 
 def _make_passive(spec: Any, joints: Sequence[str]) -> None:
@@ -172,52 +188,51 @@ def _measuring_model(spec: Any, mjcf: Path) -> Any:
 
 
 def _drive(
-    spec: Any, model: Any, joints: Sequence[str], home: Array, drives: Any, found: Measured, said: ArmDescription
+    spec: Any,
+    joints: Sequence[str],
+    inertia: Array,
+    drives: dict[str, Drive],
+    kept: Sequence[str],
+    description: ArmDescription,
 ) -> bool:
-    """Keep the arm's own position actuators where each is stiff and named like its joint, else make servos."""
-    inertia = felt_inertia(model, joints, home)
-    limits = said.torque_nm
-    if limits is not None:
-        if len(limits) not in (1, len(joints)):
-            raise InputError(f"{said.file}: 'torque_nm' has {len(limits)} numbers; the arm has {len(joints)} joints.")
-        each = np.broadcast_to(limits, len(joints))
-        drives.update({name: drives[name]._replace(torque=float(x)) for name, x in zip(joints, each, strict=True)})
+    """Keep the arm's own position actuators where each is stiff and named like its joint, else make servos.
+
+    Args:
+        inertia: (joints,), that each joint feels, [kg m^2].
+        drives: Of each joint; takes the torques of the description.
+        kept: Actuators of the gripper, which stay.
+    """
+    torques = description.of_each_joint("torque_nm", description.torque_nm, len(joints))
+    if torques is not None:
+        drives.update({name: drives[name]._replace(torque=float(x)) for name, x in zip(joints, torques, strict=True)})
     names = [actuator.name for actuator in spec.actuators]
     stiff = all(not is_soft(drives[name].stiffness, felt) for name, felt in zip(joints, inertia, strict=True))
-    if stiff and limits is None and all(name in names for name in joints):
+    if stiff and torques is None and all(name in names for name in joints):
         return True
     for actuator in list(spec.actuators):
-        if actuator.name not in found.hand.actuators:
+        if actuator.name not in kept:
             spec.delete(actuator)
     add_servos(spec, joints, inertia, drives)
     return False
 
 
-def _text(spec: Any, found: Measured) -> str:
+def _text(spec: Any, measured: Measured) -> str:
     """The whole as MJCF, with the site of the tip."""
     for site in list(spec.sites):
         if site.name == _TIP:
             site.name = f"{_TIP}_of_the_model"
-    T = found.T_mount_tip
-    spec.body(found.mount).add_site(name=_TIP, pos=T[:3, 3], quat=_quaternion(T), size=(0.003, 0.003, 0.003), group=4)
+    T = measured.T_mount_tip
+    size = (0.003, 0.003, 0.003)
+    spec.body(measured.mount).add_site(name=_TIP, pos=T[:3, 3], quat=_quaternion(T), size=size, group=4)
     spec.modelname = "arm"
     spec.compile()
     return str(spec.to_xml())
 
 
-def _limits(said: ArmDescription, joints: Sequence[str], drives: Any) -> ArmLimits:
-    return ArmLimits(
-        payload_kg=said.payload_kg,
-        speed_rad_s=None if said.speed_rad_s is None else said.joint_speeds(len(joints)),
-        torque_nm=np.array([drives[name].torque for name in joints]),
-        fingers_m_s=said.gripper.speed_m_s or _USUAL_FINGERS_M_S,
-    )
-
-
-def _files(said: ArmDescription) -> tuple[Path, ...]:
-    gripper = files_of(said.gripper.mjcf) if said.gripper.mjcf is not None else ()
-    own = () if said.file == said.mjcf else (said.file,)
-    return tuple(dict.fromkeys((*own, *files_of(said.mjcf), *gripper)))
+def _files(description: ArmDescription) -> tuple[Path, ...]:
+    gripper = files_of(description.gripper.mjcf) if description.gripper.mjcf is not None else ()
+    own = () if description.file == description.mjcf else (description.file,)
+    return tuple(dict.fromkeys((*own, *files_of(description.mjcf), *gripper)))
 
 
 def _usual_home(model: Any, joints: Sequence[str]) -> Array:
@@ -225,16 +240,6 @@ def _usual_home(model: Any, joints: Sequence[str]) -> Array:
     at = [model.joint(name).id for name in joints]
     low, high = model.jnt_range[at].T
     return np.where(model.jnt_limited[at].astype(bool), (low + high) / 2, 0.0)
-
-
-def _known(model: Any, name: str) -> bool:
-    bodies = {model.body(i).name for i in range(model.nbody)}
-    return name in bodies or name in {model.geom(i).name for i in range(model.ngeom)}
-
-
-def _prefixed(model: Any, kind: str, name: str) -> str:
-    known = {getattr(model, kind)(i).name for i in range(model.nu)}
-    return name if name in known else _GRIPPER + name
 
 
 def _quaternion(T: Array) -> Array:

@@ -8,7 +8,8 @@ from typing import final
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.scenario.keys import read_pose
 
@@ -22,9 +23,8 @@ _MOST_FORCE_N = 60.0
 _MOST_OPENING_MM = 1000.0
 _STATED = ("tip", "slides", "opening_mm")
 """Keys of a gripper that is not measured."""
-USUAL_BASE = np.array([[1.0, 0, 0, -0.45], [0, 1.0, 0, 0], [0, 0, 1.0, 0], [0, 0, 0, 1.0]])
+_USUAL_BASE = frozen(pose.at((-0.45, 0.0, 0.0)))
 """Where a base stands that nothing is said of: behind the middle of the table, (4, 4), world, [m]."""
-USUAL_BASE.flags.writeable = False
 
 
 @final
@@ -70,14 +70,14 @@ class ArmDescription:
 
     file: Path
     mjcf: Path
-    flange: str | None
+    gripper: GripperDescription = GripperDescription()
+    flange: str | None = None
     """A site or a body; None: the last body of the one chain of hinges."""
-    joints: tuple[str, ...] | None
-    home: Array | None
+    joints: tuple[str, ...] | None = None
+    home: Array | None = None
     """[rad]; None: looked for."""
-    base: Array
+    base: Array = field(default_factory=lambda: _USUAL_BASE)
     """Where the base stands, (4, 4), world, [m]."""
-    gripper: GripperDescription
     payload_kg: float | None = None
     """Of what is held, without the gripper."""
     speed_rad_s: Array | None = None
@@ -85,18 +85,17 @@ class ArmDescription:
     torque_nm: Array | None = None
     """The most each joint may push; None: as the model says."""
 
-    def joint_speeds(self, count: int) -> Array:
-        """The fastest that each of so many joints may turn, (count,), [rad/s], where that is stated.
+    def of_each_joint(self, key: str, numbers: Array | None, count: int) -> Array | None:
+        """What a key says of each of so many joints, (count,); None where it is not stated.
 
         Raises:
             InputError: It is stated of another number of joints.
         """
-        assert self.speed_rad_s is not None
-        if len(self.speed_rad_s) not in (1, count):
-            raise InputError(
-                f"{self.file}: 'speed_deg_s' has {len(self.speed_rad_s)} numbers; the arm has {count} joints."
-            )
-        return np.array(np.broadcast_to(self.speed_rad_s, count))
+        if numbers is None:
+            return None
+        if len(numbers) not in (1, count):
+            raise InputError(f"{self.file}: '{key}' has {len(numbers)} numbers; the arm has {count} joints.")
+        return np.array(np.broadcast_to(numbers, count))
 
 
 def read_description(path: Path) -> ArmDescription:
@@ -107,15 +106,14 @@ def read_description(path: Path) -> ArmDescription:
     """
     optional = ("flange", "joints", "home_deg", "base", "gripper", "payload_kg", "speed_deg_s", "torque_nm")
     top = read_toml(path, "arm file").fields_of(_SCHEMA, ("mjcf",), optional)
-    joints = _names(top["joints"]) if "joints" in top else None
     speed = _each(top, "speed_deg_s", _MOST_DEG_S)
     return ArmDescription(
         file=path,
         mjcf=_beside(path, top["mjcf"]),
         flange=top["flange"].text() if "flange" in top else None,
-        joints=joints,
+        joints=_names(top["joints"]) if "joints" in top else None,
         home=np.radians(_row(top["home_deg"])) if "home_deg" in top else None,
-        base=read_pose(top["base"]) if "base" in top else USUAL_BASE,
+        base=read_pose(top["base"]) if "base" in top else _USUAL_BASE,
         gripper=_gripper(path, top["gripper"]) if "gripper" in top else GripperDescription(),
         payload_kg=top["payload_kg"].number(0.0, _MOST_PAYLOAD_KG, above=True) if "payload_kg" in top else None,
         speed_rad_s=None if speed is None else np.radians(speed),
@@ -160,15 +158,18 @@ def _beside(path: Path, node: JsonNode) -> Path:
 
 
 def _names(node: JsonNode) -> tuple[str, ...]:
-    if not isinstance(node.value, list) or not 0 < len(node.value) <= _MOST_JOINTS:
-        node.fail(f"a list of 1 to {_MOST_JOINTS} names is needed")
+    _check_length(node, "names")
     return tuple(each.text() for each in node.items("name"))
 
 
 def _row(node: JsonNode) -> Array:
-    if not isinstance(node.value, list) or not 0 < len(node.value) <= _MOST_JOINTS:
-        node.fail(f"a list of 1 to {_MOST_JOINTS} numbers is needed")
+    _check_length(node, "numbers")
     return node.numbers(len(node.value))
+
+
+def _check_length(node: JsonNode, items: str) -> None:
+    if not isinstance(node.value, list) or not 0 < len(node.value) <= _MOST_JOINTS:
+        node.fail(f"a list of 1 to {_MOST_JOINTS} {items} is needed")
 
 
 def _each(top: Mapping[str, JsonNode], key: str, most: float) -> Array | None:
@@ -176,7 +177,7 @@ def _each(top: Mapping[str, JsonNode], key: str, most: float) -> Array | None:
     if key not in top:
         return None
     node = top[key]
-    found = _row(node) if isinstance(node.value, list) else np.array([node.number(0.0, most, above=True)])
-    if not ((found > 0.0) & (found <= most)).all():
+    numbers = _row(node) if isinstance(node.value, list) else np.array([node.number(0.0, most, above=True)])
+    if not ((numbers > 0.0) & (numbers <= most)).all():
         node.fail(f"numbers above 0 and up to {most:g} are needed")
-    return found
+    return numbers

@@ -1,44 +1,137 @@
-"""Arms by name: those that come with the benchmark, those of a file, of a collection, of a module."""
+"""Arms by name: those that come with the benchmark, those of a file, of a collection, of a module.
+
+Collections are MuJoCo Menagerie and robosuite, where they are installed. Nothing is downloaded.
+"""
+
+import importlib.util
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from types import MappingProxyType
 
 from apo_bench.errors import InputError, unknown
 from apo_bench.names import resolve
 from apo_bench.records.short_names import FOREIGN_ARMS
 from apo_bench.resources import folder
 from apo_bench.simulation.arms.arm import Arm
-from apo_bench.simulation.arms.building import read_arm
-from apo_bench.simulation.arms.foreign import find_foreign
+from apo_bench.simulation.arms.building import read_arm, read_described
+from apo_bench.simulation.arms.description import ArmDescription, GripperDescription
+from apo_bench.simulation.arms.tree import read_model_tree
 
-NAMES = ("six_axis", "ur5e_primitive", "panda_primitive")
+_MENAGERIE = "APO_BENCH_MENAGERIE"
+_ROBOSUITE = "APO_BENCH_ROBOSUITE"
+"""Variables that name their folders."""
+_CACHE = Path("robot_descriptions") / "mujoco_menagerie"
+_2F85 = Path("robotiq_2f85") / "2f85.xml"
+_WITH_FINGERS = ("finger", "gripper", "hand", "knuckle", "driver")
+_GRIPPERS = MappingProxyType(
+    {
+        "ur5e": "robotiq_gripper_85",
+        "panda": "panda_gripper",
+        "sawyer": "rethink_gripper",
+        "iiwa": "robotiq_gripper_140",
+        "kinova3": "robotiq_gripper_85",
+        "xarm7": "xarm7_gripper",
+    }
+)
+"""Of robosuite's arms, the gripper that each has there."""
+_NAMES = ("six_axis", "ur5e_primitive", "panda_primitive")
 """Arms that come with the benchmark, as arm files."""
 
 
 def arm_names() -> tuple[str, ...]:
     """The short names of arms."""
-    return NAMES
+    return _NAMES
 
 
-def find_arm(given: str | Arm) -> Arm:
-    """An arm by short name, `module:name`, or as the object itself."""
-    if isinstance(given, Arm):
-        return given
-    if given.endswith(".toml"):
-        return read_arm(given)
-    if given in NAMES:
-        return read_arm(folder("assets") / "arms" / f"{given}.toml")
-    if given.startswith(FOREIGN_ARMS):
-        return find_foreign(given)
-    if ":" in given:
-        made = resolve(given, {}, "arm")
+def find_arm(name: str | Arm) -> Arm:
+    """An arm by short name, `FILE.toml`, `menagerie:NAME`, `robosuite:NAME`, `module:name`, or as the object itself.
+
+    Raises:
+        InputError: It is not known; its collection is not there, with the command that fetches it; it cannot be used as
+            it is.
+    """
+    if isinstance(name, Arm):
+        return name
+    if name.endswith(".toml"):
+        return read_arm(name)
+    if name in _NAMES:
+        return read_arm(folder("assets") / "arms" / f"{name}.toml")
+    if name.startswith(FOREIGN_ARMS):
+        collection, _, of_it = name.partition(":")
+        return read_described(_of_menagerie(of_it) if collection == "menagerie" else _of_robosuite(of_it))
+    if ":" in name:
+        arm = resolve(name, {}, "arm")
         try:
-            made = made() if callable(made) else made
+            arm = arm() if callable(arm) else arm
         except Exception as error:
             raise InputError(
-                f"the arm '{given}' failed: it raised {error!r}; give a function without arguments."
+                f"the arm '{name}' failed: it raised {error!r}; give a function without arguments."
             ) from error
-        if not isinstance(made, Arm):
-            raise InputError(f"the arm '{given}' is a {type(made).__name__}; an `Arm`, or a function that returns one.")
-        return made
-    known = unknown("arm", given, NAMES)
+        if not isinstance(arm, Arm):
+            raise InputError(f"the arm '{name}' is a {type(arm).__name__}; an `Arm`, or a function that returns one.")
+        return arm
     raise InputError(
-        f"{known} Or give your own as FILE.toml, menagerie:NAME, robosuite:NAME, or 'package.module:name'."
+        f"{unknown('arm', name, _NAMES)} Or give your own as FILE.toml, menagerie:NAME, robosuite:NAME, or "
+        "'package.module:name'."
     )
+
+
+def _of_menagerie(name: str) -> ArmDescription:
+    root = next((each for each in _menageries() if each.is_dir()), None)
+    if root is None:
+        raise InputError(
+            f"menagerie:{name}: MuJoCo Menagerie was not found; fetch it with 'git clone --depth 1 "
+            f"https://github.com/google-deepmind/mujoco_menagerie' and name its folder in {_MENAGERIE}."
+        )
+    known = [each.name for each in sorted(root.iterdir()) if any(each.glob("*.xml"))]
+    if name not in known:
+        raise InputError(f"{root}: {unknown('arm', name, known)}")
+    plain = name.replace("_", "").lower()
+    files = [f for f in sorted((root / name).glob("*.xml")) if plain.endswith(f.stem.replace("_", "").lower())]
+    if not files:
+        raise InputError(
+            f"{root / name}: which of its files is the arm is not known; state it as 'mjcf' in an arm file."
+        )
+    gripper = None if _has_fingers(files[0]) else root / _2F85
+    if gripper is not None and not gripper.is_file():
+        raise InputError(f"{root}: the arm '{name}' has no gripper, and {_2F85} is not there; fetch all of it.")
+    return ArmDescription(file=files[0], mjcf=files[0], gripper=GripperDescription(mjcf=gripper))
+
+
+def _of_robosuite(name: str) -> ArmDescription:
+    root = _robosuite()
+    if root is None:
+        raise InputError(
+            f"robosuite:{name}: robosuite was not found; install it with 'pip install --no-deps robosuite', or name "
+            f"the folder of the package in {_ROBOSUITE}."
+        )
+    robots = root / "models" / "assets" / "robots"
+    key = name.lower()
+    if key not in _GRIPPERS or not (robots / key / "robot.xml").is_file():
+        raise InputError(f"{root}: {unknown('arm', name, _GRIPPERS)}")
+    mjcf = robots / key / "robot.xml"
+    gripper = root / "models" / "assets" / "grippers" / f"{_GRIPPERS[key]}.xml"
+    return ArmDescription(file=mjcf, mjcf=mjcf, flange="right_hand", gripper=GripperDescription(mjcf=gripper))
+
+
+def _menageries() -> Iterator[Path]:
+    if named := os.environ.get(_MENAGERIE):
+        yield Path(named)
+        return
+    yield Path(os.environ.get("ROBOT_DESCRIPTIONS_CACHE", "") or Path.home() / ".cache" / _CACHE.parent) / _CACHE.name
+
+
+def _robosuite() -> Path | None:
+    if named := os.environ.get(_ROBOSUITE):
+        root = Path(named)
+        return root if (root / "models" / "assets").is_dir() else None
+    package = importlib.util.find_spec("robosuite")
+    return Path(package.origin).parent if package is not None and package.origin else None
+
+
+def _has_fingers(mjcf: Path) -> bool:
+    """Whether an actuator, by its name or what it drives, is of a gripper."""
+    root = read_model_tree(mjcf, "arm").root
+    names = (f"{body.get('name')} {joint.get('name')}" for body in root.iter("body") for joint in body.iter("joint"))
+    return any(word in name.lower() for name in names for word in _WITH_FINGERS)

@@ -6,6 +6,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.kinematics import Kinematics
+from apo_bench.simulation.frames import frame
 
 _AT = (-0.05, 0.0, 0.30)
 _TABLE = [(-0.15, -0.25, 0.03), (-0.15, 0.25, 0.3), (0.2, 0.25, 0.03), (0.2, -0.25, 0.3)]
@@ -25,10 +26,7 @@ def tip_down(at: Array, turn: float = 0.0) -> Array:
     """A tip that looks down, (4, 4); at turn 0 its fingers close along x."""
     c = np.cos(turn)
     s = np.sin(turn)
-    T = np.eye(4)
-    T[:3, :3] = np.array([[-c, s, 0.0], [-s, -c, 0.0], [0.0, 0.0, 1.0]]) @ np.diag([1.0, -1.0, -1.0])
-    T[:3, 3] = at
-    return T
+    return frame(np.array([[-c, s, 0.0], [-s, -c, 0.0], [0.0, 0.0, 1.0]]) @ np.diag([1.0, -1.0, -1.0]), at)
 
 
 def find_home(arm: Arm) -> Array:
@@ -40,7 +38,7 @@ def find_home(arm: Arm) -> Array:
     kinematics = Kinematics(arm, posture=False)
     rng = np.random.default_rng(0)
     low, high = (np.clip(limit, -_WIDEST, _WIDEST) for limit in kinematics.range_of_joints)
-    found: list[tuple[Array, float]] = []
+    homes: list[tuple[Array, float]] = []
     for i in range(_TRIES):
         start = rng.uniform(low, high)
         near = _NEAR * (i > 0)
@@ -50,16 +48,16 @@ def find_home(arm: Arm) -> Array:
         if q is None:
             continue
         q = _unwound(q, *kinematics.range_of_joints)
-        if any(np.abs(q - other).max() < _SAME_RAD for other, _ in found) or _in_table(kinematics, q):
+        if any(np.abs(q - other).max() < _SAME_RAD for other, _ in homes) or _in_table(kinematics, q):
             continue
-        found.append((q, way))
-    if not found:
+        homes.append((q, way))
+    if not homes:
         at = ", ".join(f"{1e3 * x:g}" for x in _AT)
         raise InputError(
             f"{arm.mjcf}: the tip does not reach ({at}) mm looking down; move the 'base', which stands at "
             f"({', '.join(f'{1e3 * x:g}' for x in arm.base)}) mm."
         )
-    return max(found, key=lambda each: _worth(kinematics, *each))[0]
+    return max(homes, key=lambda each: _worth(kinematics, *each))[0]
 
 
 def _worth(kinematics: Kinematics, q: Array, way: float) -> tuple[int, float, float]:

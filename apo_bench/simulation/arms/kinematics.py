@@ -9,6 +9,7 @@ import numpy as np
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.arms.arm import Arm
+from apo_bench.simulation.frames import frame, quaternion
 
 
 class Kinematics:
@@ -66,27 +67,22 @@ class Kinematics:
         self._full[self.adr] = q
         self.configuration.update(self._full)
         data = self.configuration.data
-        T = np.eye(4)
-        T[:3, :3] = data.site_xmat[self.site].reshape(3, 3)
-        T[:3, 3] = data.site_xpos[self.site]
-        return T
+        return frame(data.site_xmat[self.site], data.site_xpos[self.site])
 
     def inverse(self, T: Array, near: Array, turns: int = 40) -> Array | None:
         """Joint angles that bring the tip to T, found by Newton steps from `near`; None if there are none there."""
-        q = np.zeros(4)
-        mujoco.mju_mat2Quat(q, np.ascontiguousarray(T[:3, :3]).ravel())
-        self._task.set_target(mink.SE3(np.concatenate([q, T[:3, 3]])))
+        self._task.set_target(mink.SE3(np.concatenate([quaternion(T), T[:3, 3]])))
         self._full[self.adr] = near
         self.configuration.update(self._full)
         for _ in range(turns):
             error: Any = self._task.compute_error(self.configuration)
             off = error.tolist()
             if all(abs(x) < self.POSITION_M for x in off[:3]) and all(abs(x) < self.ANGLE_RAD for x in off[3:]):
-                found = self.configuration.q[self.adr]
-                return np.array(found)
+                return self.last
             step = self._step()
             if step is None:
                 return None
+            # No joint turns by more than half a radian in one step: far from the target the linearisation is wrong.
             longest = float(np.abs(step).max())
             self.configuration.integrate_inplace(step * min(1.0, 0.5 / max(longest, 1e-12)), 1.0)
         return None
@@ -96,6 +92,8 @@ class Kinematics:
 
         Without limits the programme is a linear system. Where its solution keeps them, it is that of the programme too.
         """
+        # The least of 1/2 s^T H s + c^T s with H = J^T W J and c = -J^T W error: without limits H s = -c. A little
+        # damping on the diagonal keeps H regular where the arm is straight.
         H, c = self._task.compute_qp_objective(self.configuration)
         if self._posture is not None:
             more = self._posture.compute_qp_objective(self.configuration)
@@ -108,10 +106,10 @@ class Kinematics:
             return step
         try:
             tasks = [self._task] if self._posture is None else [self._task, self._posture]
-            found = mink.solve_ik(self.configuration, tasks, 1.0, "daqp", damping=self.DAMPING, limits=self._limits)
+            limited = mink.solve_ik(self.configuration, tasks, 1.0, "daqp", damping=self.DAMPING, limits=self._limits)
         except mink.exceptions.MinkError:
             return None
-        return np.asarray(found)
+        return np.asarray(limited)
 
 
 def _alone(arm: Arm) -> Any:

@@ -14,11 +14,12 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
+from apo_bench.simulation.arms.arm import Hand
 from apo_bench.simulation.arms.description import GripperDescription
-from apo_bench.simulation.arms.hand import Hand
 from apo_bench.simulation.arms.pads import geom_reach, pads_of
 from apo_bench.simulation.arms.pressing import PROBE_WIDE, force_of
-from apo_bench.simulation.arms.rig import Rig, command_ends, frame_of, poses_after, rig_of
+from apo_bench.simulation.arms.rig import Rig, below, command_ends, rig_of
+from apo_bench.simulation.frames import frame
 
 _LEVELS = 17
 _LEAST_M = 0.004
@@ -41,7 +42,7 @@ class Measured(NamedTuple):
 
 
 def measure(
-    model: Any, path: Path, joints: Sequence[str], home: Array, flange: int, said: GripperDescription
+    model: Any, path: Path, joints: Sequence[str], home: Array, flange: int, gripper: GripperDescription
 ) -> Measured:
     """Drive the gripper of a compiled arm.
 
@@ -51,25 +52,38 @@ def measure(
         flange: The body behind the gripper.
 
     Raises:
-        InputError: There is nothing that moves, or nothing that closes; what to state is said.
+        InputError: There is nothing that moves, or nothing that closes; what to state is gripper.
     """
-    rig = rig_of(model, path, joints, home, flange, said)
-    ends = command_ends(rig, said)
-    states = {end: poses_after(rig, np.array(end)) for end in ends}
-    spread = {end: float(np.linalg.norm(c - c.mean(axis=0), axis=1).sum()) for end, c in states.items()}
-    if said.open is not None and said.closed is not None:
-        opened = said.open
-        closed = said.closed
+    rig = rig_of(model, path, joints, home, flange, gripper)
+    widths = {}
+    for command in command_ends(rig, gripper):
+        rig.settle(np.array(command))
+        bodies = rig.data.xipos[model.jnt_bodyid[rig.joints]]
+        widths[command] = float(np.linalg.norm(bodies - bodies.mean(axis=0), axis=1).sum())
+    if gripper.open is not None and gripper.closed is not None:
+        opened = gripper.open
+        closed = gripper.closed
     else:
-        opened = np.array(max(spread, key=spread.__getitem__))
-        closed = np.array(min(spread, key=spread.__getitem__))
+        opened = np.array(max(widths, key=widths.__getitem__))
+        closed = np.array(min(widths, key=widths.__getitem__))
     rig.settle(closed)
     at_closed = np.array(rig.data.geom_xpos)
-    frame = frame_of(rig, flange)
     seconds = rig.settle(opened)
-    way = at_closed - rig.data.geom_xpos
-    sides, across, ahead = pads_of(rig, said, way, flange)
-    return _table(rig, sides, across, ahead, (closed, opened), seconds, frame, flange)
+    sides, across, ahead = pads_of(rig, gripper, at_closed - rig.data.geom_xpos, flange)
+    return _table(rig, sides, across, ahead, (closed, opened), seconds, flange)
+
+
+class _Level(NamedTuple):
+    """The gripper at one command."""
+
+    opening: float
+    command: Array
+    joints: Array
+    reach: float
+    """How far the pads reach ahead, world, [m]."""
+    middle: Array
+    """Between the pads, (3,), world, [m]."""
+    R_pad: Array
 
 
 def _table(
@@ -79,70 +93,70 @@ def _table(
     ahead: Array,
     ends: tuple[Array, Array],
     seconds: float,
-    frame: Array,
     flange: int,
 ) -> Measured:
     model = rig.model
     data = rig.data
     pads = sides[0] + sides[1]
-    rows = []
-    reach = []
-    middles = []
-    turns = []
+    levels = []
     closed, opened = ends
     for part in np.linspace(1.0, 0.0, _LEVELS):
         command = closed + part * (opened - closed)
         rig.settle(command)
         width, middle = _between(model, data, sides)
-        rows.append((width / 2, command, np.array(data.qpos[model.jnt_qposadr[rig.joints]])))
-        reach.append(max(geom_reach(model, data, g, ahead) for g in pads))
-        middles.append(middle)
-        turns.append(np.array(data.geom_xmat[pads[0]].reshape(3, 3)))
-    kept = _ascending([row[0] for row in rows])
-    if rows[kept[-1]][0] - max(rows[kept[0]][0], 0.0) < _LEAST_M / 2:
+        joints = np.array(data.qpos[model.jnt_qposadr[rig.joints]])
+        reach = max(geom_reach(model, data, g, ahead) for g in pads)
+        R_pad = np.array(data.geom_xmat[pads[0]].reshape(3, 3))
+        levels.append(_Level(width / 2, command, joints, reach, middle, R_pad))
+    table = [levels[i] for i in _ascending([level.opening for level in levels])]
+    widest = table[-1].opening
+    if widest - max(table[0].opening, 0.0) < _LEAST_M / 2:
         raise InputError(
-            f"{rig.path}: the gripper opens {2e3 * rows[0][0]:.1f} mm; {1e3 * _LEAST_M:g} mm are needed, so check "
-            "'open' and 'closed', or name its 'pads'."
+            f"{rig.path}: the gripper opens {2e3 * levels[0].opening:.1f} mm; {1e3 * _LEAST_M:g} mm are needed, so "
+            "check 'open' and 'closed', or name its 'pads'."
         )
-    longest = max(reach)
-    half = kept[len(kept) // 2]
+    # The tip lies between the pads as they are at half of the table, in the middle of what they are wide, and short of
+    # where they reach farthest.
+    longest = max(level.reach for level in levels)
     side = np.cross(ahead, across)
+    R = np.column_stack([across, side, ahead])
     centre = np.mean([data.geom_xpos[g] for g in pads], axis=0)
-    at = (middles[half] @ across) * across + (centre @ side) * side + (longest - _BEYOND_M) * ahead
+    between = table[len(table) // 2].middle
+    at = (between @ across) * across + (centre @ side) * side + (longest - _BEYOND_M) * ahead
     mount = _mount(model, pads, flange)
     R_mount = data.xmat[mount].reshape(3, 3)
-    T = np.eye(4)
-    T[:3, :3] = R_mount.T @ np.column_stack([across, side, ahead])
-    T[:3, 3] = R_mount.T @ (at - data.xpos[mount])
+    T = frame(R_mount.T @ R, R_mount.T @ (at - data.xpos[mount]))
     left = sides[0][0]
     right = sides[1][0]
     apart = abs(float((data.geom_xpos[left] - data.geom_xpos[right]) @ across))
-    thick = apart - 2 * rows[-1][0]
-    table = [rows[i] for i in kept]
-    force, squeeze, friction = force_of(rig, at, np.column_stack([across, side, ahead]), table)
+    thick = apart - 2 * levels[-1].opening
+    openings = np.array([level.opening for level in table])
+    commands = np.array([level.command for level in table])
+    force, squeeze, friction = force_of(rig, at, R, openings, commands)
     apart = abs(float((data.geom_xpos[left] - data.geom_xpos[right]) @ across)) - thick
+    half_open = min(table, key=lambda level: abs(level.opening - widest / 2))
     hand = Hand(
         actuators=tuple(model.actuator(int(a)).name for a in rig.actuators),
         joints=tuple(model.joint(int(j)).name for j in rig.joints),
-        opening=np.array([rows[i][0] for i in kept]),
-        commands=np.array([rows[i][1] for i in kept]),
-        states=np.array([rows[i][2] for i in kept]),
+        opening=openings,
+        commands=commands,
+        states=np.array([level.joints for level in table]),
         force_n=force,
         squeeze_m=squeeze,
-        gives_m=max(0.0, PROBE_WIDE * rows[kept[-1]][0] - apart / 2),
-        turns_deg=_angle(turns[min(kept, key=lambda i: abs(rows[i][0] - rows[kept[-1]][0] / 2))], turns[kept[-1]]),
+        gives_m=max(0.0, PROBE_WIDE * widest - apart / 2),
+        turns_deg=_angle(half_open.R_pad, table[-1].R_pad),
         friction=friction,
         pads=(model.geom(left).name, model.geom(right).name),
         thick_m=thick,
         seconds=seconds + _STROKE_S,
-        reach=np.array([reach[i] - longest + _BEYOND_M for i in kept]),
+        reach=np.array([level.reach - longest + _BEYOND_M for level in table]),
     )
     return Measured(hand, model.body(mount).name, T)
 
 
-def _angle(one: Array, other: Array) -> float:
-    """Between two rotations, [deg]."""
-    return float(np.degrees(np.arccos(np.clip((np.sum(one * other) - 1.0) / 2.0, -1.0, 1.0))))
+def _angle(R: Array, other: Array) -> float:
+    """Between two rotations, [deg]: the trace of R^T other is 1 + 2 cos."""
+    return float(np.degrees(np.arccos(np.clip((np.sum(R * other) - 1.0) / 2.0, -1.0, 1.0))))
 
 
 def _ascending(openings: Sequence[float]) -> list[int]:
@@ -169,15 +183,10 @@ def _between(model: Any, data: Any, sides: tuple[list[int], list[int]]) -> tuple
 
 def _mount(model: Any, pads: Sequence[int], flange: int) -> int:
     """The body behind all fingers, and what is fixed to it, but for the last link of the arm."""
-    chains = []
-    for g in pads:
-        body = int(model.geom_bodyid[g])
-        chain = []
-        while body:
-            chain.append(body)
-            body = int(model.body_parentid[body])
-        chains.append(chain)
-    mount = next(body for body in chains[0] if all(body in chain for chain in chains))
+    mount = int(model.geom_bodyid[pads[0]])
+    bodies = {int(model.geom_bodyid[g]) for g in pads}
+    while not bodies <= below(model, mount):
+        mount = int(model.body_parentid[mount])
     while not model.body_jntnum[mount] and mount != flange:
         parent = int(model.body_parentid[mount])
         if model.body_jntnum[parent] or parent == 0:

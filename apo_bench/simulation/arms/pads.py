@@ -7,16 +7,18 @@ import numpy as np
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.arms.description import GripperDescription
-from apo_bench.simulation.arms.rig import Rig, below, frame_of
+from apo_bench.simulation.arms.rig import Rig, below
 
 _MOVES_M = 0.001
 _TIP_M = 0.012
 """What moves less than the first is no finger; what ends within the second of the farthest end is of a pad."""
-_SNAP = np.cos(np.radians(1.0))
+_SNAP = float(np.cos(np.radians(1.0)))
+_SNAP_AHEAD = float(np.cos(np.radians(10.0)))
+"""A direction so near to an axis of the flange is meant as that axis."""
 
 
 def pads_of(
-    rig: Rig, said: GripperDescription, way: Array, flange: int
+    rig: Rig, gripper: GripperDescription, way: Array, flange: int
 ) -> tuple[tuple[list[int], list[int]], Array, Array]:
     """The pads of both sides, by geom; the closing direction and the way ahead, unit vectors, world."""
     model = rig.model
@@ -28,31 +30,32 @@ def pads_of(
         if int(model.geom_bodyid[g]) in hanging and (model.geom_contype[g] or model.geom_conaffinity[g])
     ]
     moving = [g for g in touching if np.linalg.norm(way[g]) > _MOVES_M]
-    if said.pads is not None:
-        named = [[g for g in touching if _is(model, g, name)] for name in said.pads]
-        for name, found in zip(said.pads, named, strict=True):
-            if not found:
+    if gripper.pads is not None:
+        named = [[g for g in touching if _is(model, g, name)] for name in gripper.pads]
+        for name, geoms in zip(gripper.pads, named, strict=True):
+            if not geoms:
                 raise InputError(f"{rig.path}, gripper: nothing that could touch a part is called '{name}'.")
         moving = named[0] + named[1]
     if len(moving) < 2:
         raise InputError(
             f"{rig.path}: nothing of the gripper moves between its ends of command; state 'open' and 'closed'."
         )
-    _, _, axes = np.linalg.svd(way[moving], full_matrices=False)
-    across = axes[0]
+    # The direction in which the motions of all shapes are largest in the mean square: the first right singular vector.
+    across = np.linalg.svd(way[moving], full_matrices=False)[2][0]
     first = [g for g in moving if way[g] @ across > 0.3 * np.linalg.norm(way[g])]
     second = [g for g in moving if way[g] @ across < -0.3 * np.linalg.norm(way[g])]
-    if said.pads is not None:
+    if gripper.pads is not None:
         first, second = named
     if not first or not second:
         raise InputError(f"{rig.path}: the fingers do not close on each other; name both 'pads' in 'gripper'.")
-    across = _snapped(across, frame_of(rig, flange)[:3, :3])
+    R_flange = data.xmat[flange].reshape(3, 3)
+    across = _snapped(across, R_flange, _SNAP)
     middle = np.mean([data.geom_xpos[g] for g in first + second], axis=0) - data.xpos[flange]
     ahead = middle - (middle @ across) * across
     if np.linalg.norm(ahead) < 1e-3:
         raise InputError(f"{rig.path}: the fingers do not reach ahead of the flange; check 'mount' in 'gripper'.")
-    ahead = _snapped(ahead / np.linalg.norm(ahead), frame_of(rig, flange)[:3, :3], np.cos(np.radians(10.0)))
-    if said.pads is None:
+    ahead = _snapped(ahead / np.linalg.norm(ahead), R_flange, _SNAP_AHEAD)
+    if gripper.pads is None:
         most = max(geom_reach(model, data, g, ahead) for g in first + second)
         first = [g for g in first if geom_reach(model, data, g, ahead) > most - _TIP_M]
         second = [g for g in second if geom_reach(model, data, g, ahead) > most - _TIP_M]
@@ -74,7 +77,7 @@ def _is(model: Any, geom: int, name: str) -> bool:
     return name in (model.geom(geom).name, model.body(int(model.geom_bodyid[geom])).name)
 
 
-def _snapped(direction: Array, R: Array, near: float = float(_SNAP)) -> Array:
+def _snapped(direction: Array, R: Array, near: float) -> Array:
     """An axis of a frame where a direction is as good as that, else the direction."""
     along = R.T @ direction
     k = int(np.abs(along).argmax())

@@ -1,12 +1,11 @@
 """How hard the pads of a gripper push on a part between them."""
 
-from collections.abc import Sequence
-
 import mujoco
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.arms.rig import STEP_S, Rig
+from apo_bench.simulation.frames import quaternion
 
 PROBE = "probe"
 """The body between the pads on which their force is measured; it stands elsewhere until then."""
@@ -24,7 +23,7 @@ _LOOKS = 100
 which the force is averaged."""
 
 
-def force_of(rig: Rig, at: Array, R: Array, table: Sequence[tuple[float, Array, Array]]) -> tuple[float, float, float]:
+def force_of(rig: Rig, at: Array, R: Array, openings: Array, commands: Array) -> tuple[float, float, float]:
     """How hard each pad pushes on a part between them, [N], how far inside it they are sent for that, [m], and the
     friction of what touches it there.
 
@@ -32,11 +31,10 @@ def force_of(rig: Rig, at: Array, R: Array, table: Sequence[tuple[float, Array, 
     """
     model = rig.model
     data = rig.data
-    opening = table[-1][0]
-    opened = table[-1][1]
+    opened = commands[-1]
     body = model.body(PROBE).id
     geom = int(model.body_geomadr[body])
-    half = np.array([PROBE_WIDE * opening, 0.02, _PROBE_HIGH_M])
+    half = np.array([PROBE_WIDE * float(openings[-1]), 0.02, _PROBE_HIGH_M])
     model.geom_size[geom] = half
     model.geom_rbound[geom] = float(np.linalg.norm(half))
     model.geom_aabb[geom, 3:] = half
@@ -46,10 +44,8 @@ def force_of(rig: Rig, at: Array, R: Array, table: Sequence[tuple[float, Array, 
     for squeeze in _SQUEEZES_M:
         rig.settle(opened)
         data.mocap_pos[mocap] = at
-        mujoco.mju_mat2Quat(data.mocap_quat[mocap], np.ascontiguousarray(R).ravel())
-        wanted = half[0] - squeeze
-        openings = [row[0] for row in table]
-        closed = np.array([np.interp(wanted, openings, column) for column in np.array([row[1] for row in table]).T])
+        data.mocap_quat[mocap] = quaternion(R)
+        closed = np.array([np.interp(half[0] - squeeze, openings, column) for column in commands.T])
         force, friction = _pressed(rig, geom, opened, closed, R[:, 0])
         data.mocap_pos[mocap] = (0.0, 0.0, -_AWAY_M)
         if force <= _MOST_N:
@@ -72,6 +68,6 @@ def _pressed(rig: Rig, probe: int, opened: Array, closed: Array, across: Array) 
             mujoco.mj_contactForce(rig.model, data, c, wrench)
             push = abs(float(wrench[0] * (data.contact[c].frame[:3] @ across)))
             pad = next(int(g) for g in data.contact[c].geom if g != probe)
-            total = total + push
-            rubs = rubs + push * float(rig.model.geom_friction[pad, 0])
+            total += push
+            rubs += push * float(rig.model.geom_friction[pad, 0])
     return total / 2 / _LOOKS, round(rubs / total, 6) if total else 0.0

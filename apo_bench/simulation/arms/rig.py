@@ -55,7 +55,12 @@ class Rig(NamedTuple):
         return STEP_S * steps
 
 
-def rig_of(model: Any, path: Path, joints: Sequence[str], home: Array, flange: int, said: GripperDescription) -> Rig:
+def rig_of(model: Any, path: Path, joints: Sequence[str], home: Array, flange: int, gripper: GripperDescription) -> Rig:
+    """The model made ready: hard contacts and no gravity.
+
+    Raises:
+        InputError: Nothing of the gripper moves, or what moves it is not known; what to state is said.
+    """
     arm = [model.joint(name).id for name in joints]
     hanging = below(model, flange)
     own = [j for j in range(model.njnt) if int(model.jnt_bodyid[j]) in hanging and j not in arm]
@@ -75,76 +80,59 @@ def rig_of(model: Any, path: Path, joints: Sequence[str], home: Array, flange: i
     model.opt.impratio = hard.impratio
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET) | int(mujoco.mjtDisableBit.mjDSBL_MIDPHASE)
     data = mujoco.MjData(model)
-    at = np.array([model.jnt_qposadr[j] for j in arm])
+    at = model.jnt_qposadr[arm]
     data.qpos[at] = home
     mujoco.mj_forward(model, data)
-    actuators = _actuators(model, data, path, own, said)
-    return Rig(model, data, at, np.array([model.jnt_dofadr[j] for j in arm]), home, actuators, np.array(own), path)
+    actuators = _actuators(model, data, path, own, gripper)
+    return Rig(model, data, at, model.jnt_dofadr[arm], home, actuators, np.array(own), path)
 
 
-def _actuators(model: Any, data: Any, path: Path, own: Sequence[int], said: GripperDescription) -> Ints:
+def _actuators(model: Any, data: Any, path: Path, own: Sequence[int], gripper: GripperDescription) -> Ints:
     """Those that are named, or that push a joint of the gripper."""
-    if said.actuators is not None:
+    if gripper.actuators is not None:
         known = [model.actuator(i).name for i in range(model.nu)]
-        if missing := [name for name in said.actuators if name not in known]:
+        if missing := [name for name in gripper.actuators if name not in known]:
             raise InputError(f"{path}: there is no actuator '{missing[0]}'; known are {', '.join(known) or 'none'}.")
-        return np.array([model.actuator(name).id for name in said.actuators])
+        return np.array([model.actuator(name).id for name in gripper.actuators])
     moment = np.zeros((model.nu, model.nv))
     if model.nu:
         mujoco.mju_sparse2dense(
             moment, data.actuator_moment, data.moment_rownnz, data.moment_rowadr, data.moment_colind
         )
     pushes = np.abs(moment[:, [int(model.jnt_dofadr[j]) for j in own]]).max(axis=1, initial=0.0) > 0.0
-    found: Ints = np.flatnonzero(pushes)
-    if not 0 < len(found) <= _MOST_ACTUATORS:
+    pushing: Ints = np.flatnonzero(pushes)
+    if not 0 < len(pushing) <= _MOST_ACTUATORS:
         raise InputError(
-            f"{path}: {len(found)} actuators move the gripper; name the 1 to {_MOST_ACTUATORS} that open it in "
+            f"{path}: {len(pushing)} actuators move the gripper; name the 1 to {_MOST_ACTUATORS} that open it in "
             "'gripper', 'actuators'."
         )
-    return found
+    return pushing
 
 
-def command_ends(rig: Rig, said: GripperDescription) -> list[tuple[float, ...]]:
+def command_ends(rig: Rig, gripper: GripperDescription) -> list[tuple[float, ...]]:
     """Every combination of the ends of the commands."""
-    for given in (said.open, said.closed):
-        if given is not None and len(given) != len(rig.actuators):
+    for command in (gripper.open, gripper.closed):
+        if command is not None and len(command) != len(rig.actuators):
             raise InputError(
                 f"{rig.path}, gripper: 'open' and 'closed' have one number for each of {len(rig.actuators)} actuators."
             )
-    if said.open is not None and said.closed is not None:
-        return [tuple(said.open), tuple(said.closed)]
+    if gripper.open is not None and gripper.closed is not None:
+        return [tuple(gripper.open), tuple(gripper.closed)]
     model = rig.model
-    ranges = []
     for a in rig.actuators:
-        low, high = model.actuator_ctrlrange[a]
         if not model.actuator_ctrllimited[a]:
             name = model.actuator(int(a)).name
             raise InputError(
                 f"{rig.path}: the command of the actuator '{name}' has no range; state 'open' and 'closed' in "
                 "'gripper'."
             )
-        ranges.append((float(low), float(high)))
-    return list(product(*ranges))
-
-
-def poses_after(rig: Rig, command: Array) -> Array:
-    """Where the shapes of the gripper are after a command, (k, 3), [m]."""
-    rig.settle(command)
-    bodies = rig.model.jnt_bodyid[rig.joints]
-    return np.array(rig.data.xipos[bodies])
-
-
-def frame_of(rig: Rig, body: int) -> Array:
-    T = np.eye(4)
-    T[:3, :3] = rig.data.xmat[body].reshape(3, 3)
-    T[:3, 3] = rig.data.xpos[body]
-    return T
+    return list(product(*model.actuator_ctrlrange[rig.actuators].tolist()))
 
 
 def below(model: Any, body: int) -> set[int]:
     """A body and what hangs on it."""
-    found = {body}
+    hanging = {body}
     for b in range(body + 1, model.nbody):
-        if int(model.body_parentid[b]) in found:
-            found.add(b)
-    return found
+        if int(model.body_parentid[b]) in hanging:
+            hanging.add(b)
+    return hanging

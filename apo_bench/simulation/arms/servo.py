@@ -33,7 +33,7 @@ class Drive(NamedTuple):
 
 def drives_of(model: Any, joints: Sequence[str]) -> dict[str, Drive]:
     """What the actuators of a model do at its joints."""
-    found = {}
+    drives = {}
     for name in joints:
         j = model.joint(name).id
         stiffness = 0.0
@@ -51,18 +51,19 @@ def drives_of(model: Any, joints: Sequence[str]) -> dict[str, Drive]:
                 limit = min(limit, gear * abs(float(model.actuator_gainprm[a, 0])) * most)
         if model.jnt_actfrclimited[j]:
             limit = min(limit, float(np.abs(model.jnt_actfrcrange[j]).max()))
-        found[name] = Drive(stiffness, limit)
-    return found
+        drives[name] = Drive(stiffness, limit)
+    return drives
 
 
 def felt_inertia(model: Any, joints: Sequence[str], q: Array) -> Array:
     """(joints,), the inertia at each joint alone, [kg m^2]."""
     data = mujoco.MjData(model)
-    data.qpos[[int(model.jnt_qposadr[model.joint(name).id]) for name in joints]] = q
+    at = [model.joint(name).id for name in joints]
+    data.qpos[model.jnt_qposadr[at]] = q
     mujoco.mj_forward(model, data)
     M = np.zeros((model.nv, model.nv))
     mujoco.mj_fullM(model, data, M)
-    return np.array([M[v, v] for v in (int(model.jnt_dofadr[model.joint(name).id]) for name in joints)])
+    return M.diagonal()[model.jnt_dofadr[at]]
 
 
 def stiffness_for(inertia: float) -> float:
@@ -83,6 +84,7 @@ def add_servos(spec: Any, joints: Sequence[str], inertia: Array, drives: Mapping
         servo = spec.add_actuator(name=name, target=name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
         servo.gaintype = mujoco.mjtGain.mjGAIN_FIXED
         servo.biastype = mujoco.mjtBias.mjBIAS_AFFINE
+        # Torque kp (u - q) - kd dq on an inertia J: critical damping is kd = 2 sqrt(kp J).
         servo.gainprm[0] = kp
         servo.biasprm[:3] = (0.0, -kp, -2.0 * math.sqrt(kp * float(felt)))
         if math.isfinite(drives[name].torque):

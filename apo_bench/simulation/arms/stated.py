@@ -1,6 +1,5 @@
 """From a description that states its gripper to an `Arm`: the model is used as it is."""
 
-from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -8,63 +7,59 @@ import mujoco
 from apo_bench.errors import InputError, unknown
 from apo_bench.geometry import pose
 from apo_bench.simulation.arms.arm import Arm, ArmLimits
-from apo_bench.simulation.arms.chain import find_flange, find_joints
 from apo_bench.simulation.arms.description import ArmDescription, SlideGripper
-from apo_bench.simulation.arms.loading import check_surroundings, compiled, files_of, load_model
+from apo_bench.simulation.arms.loading import files_of
 from apo_bench.simulation.arms.tree import read_model_tree
 
 
-def stated_arm(said: ArmDescription, slides: SlideGripper) -> Arm:
+def stated_arm(description: ArmDescription, slides: SlideGripper, model: Any, joints: list[str], flange: str) -> Arm:
     """The arm of a file whose gripper is stated.
+
+    Args:
+        model: As its MJCF file says it, compiled.
+        joints: The hinges between base and flange.
+        flange: The body at the end of the arm.
 
     Raises:
         InputError: Its model has not what the file names, or something is not stated that nothing else tells.
     """
-    model = compiled(load_model(said.mjcf, "arm"), said.mjcf)
-    check_surroundings(model, said.mjcf)
-    flange, _ = find_flange(model, said)
-    joints = find_joints(model, flange, said)
-    if said.home is None or len(said.home) != len(joints):
-        raise InputError(f"{said.file}: 'home_deg' needs {len(joints)} numbers, one for each joint of the arm.")
-    if said.torque_nm is not None:
-        raise InputError(f"{said.file}: 'torque_nm' is for an arm whose gripper is measured; leave it out.")
-    (grip, *more) = said.gripper.actuators or ("",)
+    file = description.file
+    if description.home is None or len(description.home) != len(joints):
+        raise InputError(f"{file}: 'home_deg' needs {len(joints)} numbers, one for each joint of the arm.")
+    if description.torque_nm is not None:
+        raise InputError(f"{file}: 'torque_nm' is for an arm whose gripper is measured; leave it out.")
+    (grip, *more) = description.gripper.actuators or ("",)
     if more:
-        raise InputError(f"{said.file}, gripper: one of 'actuators' drives all 'slides'; {1 + len(more)} were given.")
-    _check_names(model, said.file, joints, slides, grip)
-    return Arm(
-        mjcf=said.file,
-        base=tuple(said.base[:3, 3].tolist()),
-        turn=tuple(pose.pack(said.base)[3:].tolist()),
-        joints=tuple(joints),
-        tip=slides.tip,
-        fingers=slides.joints,
-        grip=grip,
-        mount=model.body(flange).name,
-        home=said.home,
-        opening_m=slides.opening_m,
-        model=read_model_tree(said.mjcf, "arm").text,
-        limits=ArmLimits(
-            payload_kg=said.payload_kg,
-            speed_rad_s=None if said.speed_rad_s is None else said.joint_speeds(len(joints)),
-            fingers_m_s=said.gripper.speed_m_s or ArmLimits.fingers_m_s,
-        ),
-        files=tuple(dict.fromkeys((said.file, *files_of(said.mjcf)))),
-    )
-
-
-def _check_names(model: Any, path: Path, joints: list[str], slides: SlideGripper, grip: str) -> None:
-    """Every joint and the gripper have a position actuator, the slides slide, and the tip is a site."""
+        raise InputError(f"{file}, gripper: one of 'actuators' drives all 'slides'; {1 + len(more)} were given.")
     sites = [model.site(i).name for i in range(model.nsite)]
     if slides.tip not in sites:
-        raise InputError(f"{path}, gripper: {unknown('site', slides.tip, sites)}")
+        raise InputError(f"{file}, gripper: {unknown('site', slides.tip, sites)}")
     sliding = [
         model.joint(j).name for j in range(model.njnt) if int(model.jnt_type[j]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
     ]
     for name in slides.joints:
         if name not in sliding:
-            raise InputError(f"{path}, gripper: {unknown('slide', name, sliding)}")
+            raise InputError(f"{file}, gripper: {unknown('slide', name, sliding)}")
     actuators = [model.actuator(i).name for i in range(model.nu)]
     for name in (*joints, grip):
         if name not in actuators:
-            raise InputError(f"{path}: {unknown('actuator', name, actuators)}")
+            raise InputError(f"{file}: {unknown('actuator', name, actuators)}")
+    return Arm(
+        mjcf=file,
+        base=tuple(description.base[:3, 3].tolist()),
+        turn=tuple(pose.pack(description.base)[3:].tolist()),
+        joints=tuple(joints),
+        tip=slides.tip,
+        fingers=slides.joints,
+        grip=grip,
+        mount=flange,
+        home=description.home,
+        opening_m=slides.opening_m,
+        model=read_model_tree(description.mjcf, "arm").text,
+        limits=ArmLimits(
+            payload_kg=description.payload_kg,
+            speed_rad_s=description.of_each_joint("speed_deg_s", description.speed_rad_s, len(joints)),
+            fingers_m_s=description.gripper.speed_m_s or ArmLimits.fingers_m_s,
+        ),
+        files=tuple(dict.fromkeys((file, *files_of(description.mjcf)))),
+    )

@@ -34,23 +34,24 @@ def with_force(
     Raises:
         InputError: The force that was asked for is not reached, however strong the drive is.
     """
-    first = found = measured(spec)
-    if wanted_n is None and found.hand.force_n >= LEAST_FORCE_N:
-        return found, 1.0
+    first = measured(spec)
+    if wanted_n is None and first.hand.force_n >= LEAST_FORCE_N:
+        return first, 1.0
     aim = _USUAL_FORCE_N if wanted_n is None else wanted_n
     times = 1.0
+    scaled = first
     for _ in range(_TRIES):
-        if abs(found.hand.force_n - aim) <= _NEAR * aim:
-            return found, times
-        by = aim / max(found.hand.force_n, _NOTHING_N)
+        if abs(scaled.hand.force_n - aim) <= _NEAR * aim:
+            return scaled, times
+        by = aim / max(scaled.hand.force_n, _NOTHING_N)
         _scale(spec, first.hand.actuators, by)
         times *= by
-        found = measured(spec)
+        scaled = measured(spec)
     if wanted_n is None:
         _scale(spec, first.hand.actuators, 1.0 / times)
         return first, 1.0
     raise InputError(
-        f"{path}, gripper: 'force_n' is {wanted_n:g}, and each pad pushes with {found.hand.force_n:.1f} N after its "
+        f"{path}, gripper: 'force_n' is {wanted_n:g}, and each pad pushes with {scaled.hand.force_n:.1f} N after its "
         f"drive was made {times:.3g} times as strong; state what it can do, or mend its actuators."
     )
 

@@ -12,6 +12,7 @@ from apo_bench.assembly.goals import Poses, Step
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, Ints
 from apo_bench.geometry.solid import all_boxes
+from apo_bench.simulation.frames import quaternion
 from apo_bench.simulation.hooks import BY_HAND, Doing, Hooks, hooks_of
 from apo_bench.simulation.robot.in_hand import TINY_S, take_along
 from apo_bench.simulation.robot.near import Moving, near_spans
@@ -134,7 +135,7 @@ class Hands:
             path = line.poses(line.progress(np.minimum(steps / n, 1.0)))
             at = self._mocap[hand]
             targets.append((self.data.mocap_pos[at], path[:, :3, 3]))
-            self.data.mocap_quat[at] = _quaternion(line.end)
+            self.data.mocap_quat[at] = quaternion(line.end)
             if np.abs(line.turn).max() > _NO_TURN:
                 targets.append((self.data.mocap_quat[at], _quaternions(path)))
         for i in range(len(steps)):
@@ -179,9 +180,13 @@ class Hands:
 
     def _hold(self, hand: int, part: str, T_hand_part: Array) -> None:
         weld = self._weld(hand, part)
-        quaternion = _quaternion(T_hand_part)
         at = self._held_at(part)
-        self.world.model.eq_data[weld, :11] = (*at, *(T_hand_part[:3, :3] @ at + T_hand_part[:3, 3]), *quaternion, 1)
+        self.world.model.eq_data[weld, :11] = (
+            *at,
+            *(T_hand_part[:3, :3] @ at + T_hand_part[:3, 3]),
+            *quaternion(T_hand_part),
+            1,
+        )
         self.data.eq_active[weld] = 1
         self._held[hand][part] = T_hand_part
 
@@ -195,14 +200,7 @@ class Hands:
 
     def _put(self, data: Any, hand: int, T: Array) -> None:
         data.mocap_pos[self._mocap[hand]] = T[:3, 3]
-        data.mocap_quat[self._mocap[hand]] = _quaternion(T)
-
-
-def _quaternion(T: Array) -> Array:
-    """(4, 4) -> (4,), w first."""
-    q = np.zeros(4)
-    mujoco.mju_mat2Quat(q, np.ascontiguousarray(T[:3, :3]).ravel())
-    return q
+        data.mocap_quat[self._mocap[hand]] = quaternion(T)
 
 
 def _trailing(steps: Array, n: int, step_s: float) -> Array:

@@ -12,8 +12,7 @@ import numpy as np
 
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Box
-from apo_bench.simulation.arms.arm import Arm
-from apo_bench.simulation.arms.hand import Hand
+from apo_bench.simulation.arms.arm import Arm, Hand
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.arms.rig import below
 

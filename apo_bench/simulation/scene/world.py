@@ -12,6 +12,7 @@ import numpy as np
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.reached import Snapshot
 from apo_bench.geometry.arrays import Array, Ints
+from apo_bench.simulation.frames import frame, quaternion, rotation
 
 SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 _NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
@@ -55,12 +56,10 @@ def world(model: Any, free: tuple[str, ...], fixed: tuple[str, ...]) -> World:
 
 def place(world: World, data: Any, part: str, T: Array) -> None:
     """Put a movable part somewhere, at rest."""
-    q = np.zeros(4)
-    mujoco.mju_mat2Quat(q, np.ascontiguousarray(T[:3, :3]).ravel())
     a = world.qpos[part]
     v = world.dof[part]
     data.qpos[a : a + 3] = T[:3, 3]
-    data.qpos[a + 3 : a + 7] = q
+    data.qpos[a + 3 : a + 7] = quaternion(T)
     data.qvel[v : v + 6] = 0.0
 
 
@@ -69,7 +68,7 @@ def initial_state(world: World, start: Poses) -> Any:
     for part in world.fixed:
         body = world.body[part]
         world.model.body_pos[body] = start[part][:3, 3]
-        mujoco.mju_mat2Quat(world.model.body_quat[body], np.ascontiguousarray(start[part][:3, :3]).ravel())
+        world.model.body_quat[body] = quaternion(start[part])
     data = mujoco.MjData(world.model)
     for part in world.free:
         place(world, data, part, start[part])
@@ -80,12 +79,7 @@ def initial_state(world: World, start: Poses) -> Any:
 def part_pose(world: World, data: Any, part: str) -> Array:
     """The pose of a movable part, (4, 4), straight from its joint."""
     a = world.qpos[part]
-    T = np.eye(4)
-    R = np.zeros(9)
-    mujoco.mju_quat2Mat(R, data.qpos[a + 3 : a + 7])
-    T[:3, :3] = R.reshape(3, 3)
-    T[:3, 3] = data.qpos[a : a + 3]
-    return T
+    return frame(rotation(data.qpos[a + 3 : a + 7]), data.qpos[a : a + 3])
 
 
 def has_failed(data: Any) -> bool:
