@@ -2,17 +2,23 @@
 
 import json
 from functools import cache
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from apo_bench.assembly.goals import Plan
+from apo_bench.geometry import pose
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.execution import search
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache
+from apo_bench.simulation.execution.search import press_in
 from apo_bench.simulation.execution.spiral import PITCH_M, RADIUS_M, Easing, Spiral
+from apo_bench.simulation.execution.transfer import Grip
 from apo_bench.simulation.robot.forces import Guard
+from apo_bench.simulation.robot.paths import shifted, steady
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.stages import replay_and_judge, simulate_demonstration
@@ -170,3 +176,19 @@ def test_the_tip_goes_where_a_law_says():
     assert robot.T[:3, 3] - before[:3, 3] == pytest.approx([1e-3, -1e-3, 1e-3])
     reached = its.kinematics.forward(robot.q)
     assert reached == pytest.approx(robot.T, abs=2e-5), "straight joint motions leave the line by some micrometres"
+
+
+def test_two_searches_in_one_motion_bring_every_pose_to_where_the_second_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A turn and a shift do not commute: what is returned takes the end of the line to where the tip then goes."""
+    first = pose.at((0.001, 0.0, 0.0), (0.0, 0.0, 2.0))
+    second = pose.at((0.0, 0.001, 0.0), (0.0, 0.0, -1.0))
+    steps = iter([first, second, None])
+    monkeypatch.setattr(search, "search_hole", lambda *_: next(steps))
+    monkeypatch.setattr(search, "_ease_in", lambda *_: np.zeros(3))
+    end = pose.at((0.0, 0.0, 0.1))
+    stopped = shifted(end, DOWN, -0.01)
+    robot = SimpleNamespace(T=stopped, macro="insert-into", follow=lambda line, guard: 0.01)
+    grip = Grip(np.eye(4), 0.01)
+    transfer = SimpleNamespace(front=np.zeros(3), slide_n=1.0)
+    _, T_search = press_in(robot, transfer, grip, steady(stopped, end, 0.01), Guard(DOWN, 5.0), 0.001)
+    assert T_search == pytest.approx(second @ first)

@@ -57,23 +57,25 @@ def _insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple
     robot.stage = "attach"
     guard = Guard(t.into.way, t.insert_n)
     rise = t.floats
-    found = None
+    T_search = None
     if t.into.left is not None and second is not None:
         there = shifted(shifted(t.T_world_goal, t.into.way, -t.into.left), UP, rise)
         line = _into(robot, t, there @ grip.T_part_tip, t.into.left)
-        left, found = press_in(robot, t, grip, line, guard, ARRIVED_M)
+        left, T_search = press_in(robot, t, grip, line, guard, ARRIVED_M)
         if left > ARRIVED_M:
             return left + t.into.left, grip
-        change_grip(robot, t, grip, second, after_search(found, shifted(there, UP, -rise) @ second.T_part_tip))
+        change_grip(robot, t, grip, second, after_search(T_search, shifted(there, UP, -rise) @ second.T_part_tip))
         grip = second
         rise = t.clearance
         robot.follow(smooth(robot.T, shifted(robot.T, UP, rise), 0.01))
-    goal = after_search(found, shifted(first_contact_pose(t) @ grip.T_part_tip, UP, rise))
+    goal = after_search(T_search, shifted(first_contact_pose(t) @ grip.T_part_tip, UP, rise))
     if any(macro.name == "move-to-bottom" for macro in t.macros):
         line = _into(robot, t, shifted(goal, t.into.way, -_BOTTOM_M), _BOTTOM_M)
-        left, found = press_in(robot, t, grip, line, guard, ARRIVED_M)
+        left, T_search = press_in(robot, t, grip, line, guard, ARRIVED_M)
         if left == 0.0:
-            robot.follow(steady(robot.T, after_search(found, shifted(goal, t.into.way, _OVERTRAVEL_M)), _TOUCH), guard)
+            robot.follow(
+                steady(robot.T, after_search(T_search, shifted(goal, t.into.way, _OVERTRAVEL_M)), _TOUCH), guard
+            )
     else:
         left, _ = press_in(robot, t, grip, _into(robot, t, goal, 0.0), guard, ARRIVED_M)
     lower = shifted(robot.T, UP, -rise - _OVERTRAVEL_M)
@@ -88,9 +90,9 @@ def _come_down(robot: Robot, t: Transfer, grip: Grip) -> float:
     down = Guard(t.into.way, t.place_n)
     goal = first_contact_pose(t) @ grip.T_part_tip
     above = steady(robot.T, shifted(goal, t.into.way, -t.slow), _PLACE)
-    left, found = press_in(robot, t, grip, above, down, 0.0)
+    left, T_search = press_in(robot, t, grip, above, down, 0.0)
     if left == 0.0:
-        end = after_search(found, shifted(goal, t.into.way, _OVERTRAVEL_M))
+        end = after_search(T_search, shifted(goal, t.into.way, _OVERTRAVEL_M))
         press_in(robot, t, grip, steady(robot.T, end, _TOUCH), down, _OVERTRAVEL_M + t.depth / 2)
     robot.stand()
     return 0.0

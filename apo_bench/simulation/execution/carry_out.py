@@ -1,4 +1,7 @@
-"""One part, with what it carries, from one place to another: pick, lift, carry, attach, release, depart."""
+"""How one operation is carried out: `take` (pick, lift), then `bring` (carry, attach, release, depart).
+
+Each is a sequence of straight motions of the tip, by `Robot.follow` and `Robot.go`, and of the fingers.
+"""
 
 from apo_bench.insertion.macros import UP
 from apo_bench.simulation.execution.attach import ARRIVED_M, attach, leave, pull_out
@@ -21,12 +24,20 @@ def take(robot: Robot, t: Transfer) -> int:
     Raises:
         Halt: Something went wrong; the stage and code say what.
     """
-    changes = t.out.left is not None
-    _pick(robot, t, t.grips[0])
+    robot.stage = "pick"
+    grasp(robot, t, t.grips[0], t.T_world_start @ t.grips[0].T_part_tip)
+    in_use = 0
     if t.out.level:
-        pull_out(robot, t, t.grips[0], t.grips[1] if changes else None)
-    _lift(robot, t)
-    return 1 if t.out.level and changes else 0
+        in_use = int(t.out.left is not None)
+        pull_out(robot, t, t.grips[0], t.grips[1] if in_use else None)
+    robot.stage = "lift"
+    if t.carried:
+        robot.follow(smooth(robot.T, shifted(robot.T, UP, 0.004), 0.02))
+    leave(robot, t)
+    robot.steady(not t.drawn)
+    robot.follow(smooth(robot.T, with_height(robot.T, max(t.safe, robot.T[2, 3])), _LIFT[bool(t.carried)]))
+    robot.steady(False)
+    return in_use
 
 
 def bring(robot: Robot, t: Transfer, i: int) -> None:
@@ -46,22 +57,8 @@ def bring(robot: Robot, t: Transfer, i: int) -> None:
         centre(robot, t, other)
 
 
-def _pick(robot: Robot, t: Transfer, grip: Grip) -> None:
-    robot.stage = "pick"
-    grasp(robot, t, grip, t.T_world_start @ grip.T_part_tip)
-
-
-def _lift(robot: Robot, t: Transfer) -> None:
-    robot.stage = "lift"
-    if t.carried:
-        robot.follow(smooth(robot.T, shifted(robot.T, UP, 0.004), 0.02))
-    leave(robot, t)
-    robot.steady(not t.drawn)
-    robot.follow(smooth(robot.T, with_height(robot.T, max(t.safe, robot.T[2, 3])), _LIFT[bool(t.carried)]))
-    robot.steady(False)
-
-
 def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
+    """Over everything that stands, down to where the last motion begins; there the arm stands, and feels its load."""
     robot.stage = "carry"
     before = shifted(first_contact_pose(t) @ grip.T_part_tip, t.into.way, -t.begins)
     if t.into.level:

@@ -38,12 +38,12 @@ def press_in(
         What is left of it, [m], and what brings the poses that were meant to those that were found, (4, 4), world; None
         if nothing was searched for or found.
     """
-    end = meant = line.end
     left = robot.follow(line, guard)
-    found = None
-    aside = 0.0
     if t.front is None:
         return left, None
+    end = line.end
+    T_search = None
+    aside = 0.0
     T_tip_front = pose.inverse(grip.T_part_tip) @ pose.at(t.front)
     for _ in range(_SEARCHES):
         if left <= near or aside >= RADIUS_M:
@@ -57,16 +57,16 @@ def press_in(
             break
         guard = Guard(more[:3, :3] @ guard.way, guard.newton)
         more = shifted(more, _ease_in(robot, more @ end, guard), 1.0)
-        found = after_search(found, more)
+        T_search = more if T_search is None else more @ T_search
         end = more @ end
         left = float((end - robot.T)[:3, 3] @ guard.way)
-        aside = float(np.linalg.norm((end - meant)[:3, 3]))
-    return left, found
+        aside = float(np.linalg.norm((end - line.end)[:3, 3]))
+    return left, T_search
 
 
-def after_search(found: Array | None, T: Array) -> Array:
+def after_search(T_search: Array | None, T: Array) -> Array:
     """A pose that was meant, as it has to be after a search."""
-    return T if found is None else found @ T
+    return T if T_search is None else T_search @ T
 
 
 def search_hole(robot: Robot, stopped: Array, front: Array, guard: Guard, press: float, radius: float) -> Array | None:
