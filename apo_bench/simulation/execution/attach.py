@@ -73,9 +73,8 @@ def _insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple
         line = _into(robot, t, shifted(goal, t.into.way, -_BOTTOM_M), _BOTTOM_M)
         left, T_search = press_in(robot, t, grip, line, guard, ARRIVED_M)
         if left == 0.0:
-            robot.follow(
-                steady(robot.T, after_search(T_search, shifted(goal, t.into.way, _OVERTRAVEL_M)), _TOUCH), guard
-            )
+            beyond = after_search(T_search, shifted(goal, t.into.way, _OVERTRAVEL_M))
+            robot.follow(steady(robot.T, beyond, _TOUCH), guard)
     else:
         left, _ = press_in(robot, t, grip, _into(robot, t, goal, 0.0), guard, ARRIVED_M)
     lower = shifted(robot.T, UP, -rise - _OVERTRAVEL_M)
