@@ -10,15 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Assembly, Operation
+from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import world_bounds
 from apo_bench.simulation.film.captions import Caption, captioned, ending_lines, shortened
 from apo_bench.simulation.film.track import Chapter, FilmMoment
 from apo_bench.simulation.hooks import BY_HAND
 from apo_bench.simulation.scene.graphics import renderer
-from apo_bench.simulation.scene.render import camera_view, save_film
-from apo_bench.simulation.scene.world import World, initial_state
+from apo_bench.simulation.scene.render import camera_view, place_for_picture, save_film
+from apo_bench.simulation.scene.world import initial_state
 
 _WIDTH = 720
 _HEIGHT = 480
@@ -49,8 +49,8 @@ def write_film(
         InputError: Another ending, a place that cannot be written, or there is nothing to draw with.
     """
     fps = _GIF_FPS if Path(path).suffix.lower() == ".gif" else _FPS
-    shown = frames(assembly, assembled, chapters, speed, fps)
-    save_film((picture for picture, seconds in shown for _ in range(round(seconds * fps))), path, fps)
+    timed = frames(assembly, assembled, chapters, speed, fps)
+    save_film((picture for picture, seconds in timed for _ in range(round(seconds * fps))), path, fps)
 
 
 def frames(
@@ -74,7 +74,10 @@ def _chapter(
         small = stack.enter_context(renderer(model, *_INSET))
 
         def drawn(moment: FilmMoment, caption: Caption) -> NDArray[np.uint8]:
-            put(chapter.world, data, moment)
+            data.qpos[:] = moment.qpos
+            if len(moment.hands):
+                data.mocap_pos[:] = moment.hands
+            place_for_picture(model, data)
             pictures = []
             for draws, camera in ((large, near), (small, wide)):
                 draws.update_scene(data, camera=camera)
@@ -83,8 +86,8 @@ def _chapter(
             return captioned(pictures[0], pictures[1], caption)
 
         for moment, force_n, most_n in sampled(chapter.moments, speed / fps):
-            said = "" if moment.doing.macro == BY_HAND else f"force {force_n:.1f} N, most {most_n:.1f} N"
-            yield drawn(moment, Caption(chapter.title, pace, _lines(assembly, moment), said)), 1.0 / fps
+            force = "" if moment.doing.macro == BY_HAND else f"force {force_n:.1f} N, most {most_n:.1f} N"
+            yield drawn(moment, Caption(chapter.title, pace, _lines(assembly, moment), force)), 1.0 / fps
         yield (
             drawn(chapter.moments[-1], Caption(chapter.title, pace, ending_lines(chapter.ending), "", chapter.good)),
             _ENDING_S,
@@ -110,37 +113,24 @@ def sampled(moments: Sequence[FilmMoment], every_s: float) -> Iterator[tuple[Fil
             force = 0.0
 
 
-def put(world: World, data: Any, moment: FilmMoment) -> None:
-    """Bring a state of a world to a moment."""
-    data.qpos[:] = moment.qpos
-    if len(moment.hands):
-        data.mocap_pos[:] = moment.hands
-    mujoco.mj_kinematics(world.model, data)
-    mujoco.mj_comPos(world.model, data)
-    mujoco.mj_camlight(world.model, data)
-
-
 def operation_words(assembly: Assembly, moment: FilmMoment) -> str:
     """`operation 2 of 3, castle2: pick`."""
     k = moment.doing.operation
     if k is None:
         return "at the start"
-    what = f"operation {k + 1} of {len(assembly)}{' undone' * moment.doing.undoes}, {_moved(assembly.operations[k])}"
-    return f"{what}: {moment.doing.macro}"
+    operation = assembly.operations[k]
+    carried = f" with {', '.join(operation.carries)}" if operation.carries else ""
+    undone = " undone" * moment.doing.undoes
+    return f"operation {k + 1} of {len(assembly)}{undone}, {operation.main}{carried}: {moment.doing.macro}"
 
 
 def _lines(assembly: Assembly, moment: FilmMoment) -> tuple[str, ...]:
     k = moment.doing.operation
-    said = operation_words(assembly, moment)
+    words = operation_words(assembly, moment)
     if k is None:
-        return (said,)
+        return (words,)
     contacts = "; ".join(map(str, assembly.operations[k].contacts))
-    return (said, shortened(contacts))
-
-
-def _moved(operation: Operation) -> str:
-    carried = f" with {', '.join(operation.carries)}" if operation.carries else ""
-    return f"{operation.main}{carried}"
+    return (words, shortened(contacts))
 
 
 def framing(assembly: Assembly, states: Sequence[Poses]) -> tuple[Array, float]:

@@ -35,7 +35,7 @@ class BodyMesh(NamedTuple):
 def body_meshes(world: World) -> tuple[BodyMesh, ...]:
     """Everything that is drawn of a world, planes excepted."""
     model = world.model
-    found = defaultdict[Any, list[tuple[Array, NDArray[np.int64]]]](list)
+    meshes = defaultdict[Any, list[tuple[Array, NDArray[np.int64]]]](list)
     parts = (*world.free, *world.fixed)
     for geom in range(model.ngeom):
         mesh = _mesh(model, geom)
@@ -45,8 +45,8 @@ def body_meshes(world: World) -> tuple[BodyMesh, ...]:
         T = pose.unpack([*model.geom_pos[geom], *model.geom_quat[geom]])
         owner = int(world.geom_part[geom])
         key = (int(model.geom_bodyid[geom]), None if owner < 0 else parts[owner], rgba)
-        found[key].append((mesh[0] @ T[:3, :3].T + T[:3, 3], mesh[1]))
-    return tuple(BodyMesh(body, part, *_joined(each), rgba) for (body, part, rgba), each in found.items())
+        meshes[key].append((pose.apply(T, mesh[0]), mesh[1]))
+    return tuple(BodyMesh(body, part, *_joined(each), rgba) for (body, part, rgba), each in meshes.items())
 
 
 def body_poses(scene: Scene, data: Any) -> Array:
@@ -61,12 +61,12 @@ def part_meshes(world: World, part: str) -> tuple[BodyMesh, ...]:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     inverse = pose.inverse(pose.unpack([*data.xpos[root], *data.xquat[root]]))
-    made = []
-    for shape in body_meshes(world):
-        if shape.part == part:
-            T = inverse @ pose.unpack([*data.xpos[shape.body], *data.xquat[shape.body]])
-            made.append(shape._replace(body=root, vertices=shape.vertices @ T[:3, :3].T + T[:3, 3]))
-    return tuple(made)
+    moved = []
+    for mesh in body_meshes(world):
+        if mesh.part == part:
+            T = inverse @ pose.unpack([*data.xpos[mesh.body], *data.xquat[mesh.body]])
+            moved.append(mesh._replace(body=root, vertices=pose.apply(T, mesh.vertices)))
+    return tuple(moved)
 
 
 def _joined(meshes: list[tuple[Array, NDArray[np.int64]]]) -> tuple[Array, NDArray[np.int64]]:
@@ -96,15 +96,15 @@ def _mesh(model: Any, geom: int) -> tuple[Array, NDArray[np.int64]] | None:
         m = int(model.mesh_facenum[i])
         return np.array(model.mesh_vert[v : v + n], float), np.array(model.mesh_face[f : f + m], np.int64)
     if kind == mujoco.mjtGeom.mjGEOM_BOX:
-        made = creation.box(2.0 * size)
+        solid = creation.box(2.0 * size)
     elif kind == mujoco.mjtGeom.mjGEOM_CYLINDER:
-        made = creation.cylinder(size[0], 2.0 * size[1], sections=_AROUND)
+        solid = creation.cylinder(size[0], 2.0 * size[1], sections=_AROUND)
     elif kind == mujoco.mjtGeom.mjGEOM_CAPSULE:
-        made = creation.capsule(2.0 * size[1], size[0], count=[_AROUND, _AROUND // 2])
-        made.apply_translation([0.0, 0.0, -made.bounds.mean(axis=0)[2]])
+        solid = creation.capsule(2.0 * size[1], size[0], count=[_AROUND, _AROUND // 2])
+        solid.apply_translation([0.0, 0.0, -solid.bounds.mean(axis=0)[2]])
     elif kind in (mujoco.mjtGeom.mjGEOM_SPHERE, mujoco.mjtGeom.mjGEOM_ELLIPSOID):
-        made = creation.icosphere(_BALLS)
-        made.apply_scale(size if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID else size[0])
+        solid = creation.icosphere(_BALLS)
+        solid.apply_scale(size if kind == mujoco.mjtGeom.mjGEOM_ELLIPSOID else size[0])
     else:
         return None
-    return np.asarray(made.vertices, float), np.asarray(made.faces, np.int64)
+    return np.asarray(solid.vertices, float), np.asarray(solid.faces, np.int64)

@@ -13,7 +13,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Face
 from apo_bench.simulation.film.track import NO_HANDS, Chapter, FilmMoment
 from apo_bench.simulation.hooks import Doing
-from apo_bench.simulation.scene.render import arm_home
+from apo_bench.simulation.scene.render import arm_home, place_for_picture
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import initial_state, place
 
@@ -49,14 +49,14 @@ def scenario_chapter(scene: Scene, start: Poses, goals: Array) -> Chapter:
     """What a scenario asks for: the parts before the first operation and after each, a second apart."""
     world = scene.work
     data = initial_state(world, start)
-    made = list[FilmMoment]()
+    moments = list[FilmMoment]()
     arm_home(scene, data)
     for k, poses in enumerate((start, *placements(scene.scenario.assembly, start, goals)), start=-1):
         for part in world.free:
             place(world, data, part, poses[part])
         doing = Doing(None if k < 0 else k, IN_PLACE, 0.0)
-        made.append(FilmMoment(k + 1.0, np.array(data.qpos), doing, NO_HANDS))
-    return Chapter(f"{scene.scenario.name}: as the scenario asks", world, start, tuple(made), "", None)
+        moments.append(FilmMoment(k + 1.0, np.array(data.qpos), doing, NO_HANDS))
+    return Chapter(f"{scene.scenario.name}: as the scenario asks", world, start, tuple(moments), "", None)
 
 
 def part_poses(chapter: Chapter, moment: FilmMoment) -> Poses:
@@ -75,9 +75,7 @@ def show_moment(scene: Scene, data: Any, chapter: Chapter, moment: FilmMoment) -
         for part, T in part_poses(chapter, moment).items():
             if part in scene.work.qpos:
                 place(scene.work, data, part, T)
-    mujoco.mj_kinematics(scene.work.model, data)
-    mujoco.mj_comPos(scene.work.model, data)
-    mujoco.mj_camlight(scene.work.model, data)
+    place_for_picture(scene.work.model, data)
 
 
 def draw_over(scene: Scene, still: Still, drawn: Any) -> None:

@@ -101,5 +101,5 @@ def _draw(scene: Scene, data: Any, still: Still, window: Any) -> None:
     font = mujoco.mjtFontScale.mjFONTSCALE_150
     place = mujoco.mjtGridPos
     keys, meanings = ("\n".join(words) for words in zip(*_HELP, strict=True))
-    said = "\n".join((still.chapter.title, *still.words))
-    window.set_texts([(font, place.mjGRID_TOPLEFT, said, ""), (font, place.mjGRID_BOTTOMLEFT, keys, meanings)])
+    words = "\n".join((still.chapter.title, *still.words))
+    window.set_texts([(font, place.mjGRID_TOPLEFT, words, ""), (font, place.mjGRID_BOTTOMLEFT, keys, meanings)])

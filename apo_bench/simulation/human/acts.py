@@ -57,29 +57,27 @@ def act(scenario: Scenario, k: int, target: Array, stages: tuple[Poses, ...], la
         stages: Where every part should be before the first operation and after each.
         late: Displaced parts that the other hand corrects.
     """
-    operation = scenario.assembly.operations[k]
-    what = nominal_operations(scenario)[k]
-    way = target[:3, :3] @ what.after.line.direction
-    beside = _off(slide_directions(scenario.assembly, what.after, stages[k + 1]))
+    assembly = scenario.assembly
+    operation = assembly.operations[k]
+    nominal = nominal_operations(scenario)[k]
+    way = target[:3, :3] @ nominal.after.line.direction
+    on_floor = any(each.normal[2] > 0.5 and not assembly.play(each.contact, 1.0) for each in nominal.after.touched)
+    top, bottom = ends_of(assembly, operation.moves, stages[k])
+    beside = _off(slide_directions(assembly, nominal.after, stages[k + 1]))
     return Act(
         part=operation.main,
         carries=operation.carries,
         target=target,
         way=way,
-        travel=what.after.line.travel_m,
-        out=_out(scenario.assembly, what.before, stages[k]),
+        travel=nominal.after.line.travel_m,
+        out=_out(assembly, nominal.before, stages[k]),
         aside=_SIDE_M * beside if way[2] < -0.5 else np.zeros(3),
         true=stages[k + 1],
         bearing=tuple(dict.fromkeys(contact.manipulated.part for contact in operation.contacts)),
-        over=_over(scenario.assembly, operation.main, operation.moves, stages[k]),
-        drags=abs(way[2]) < 0.5 and _on_floor(scenario.assembly, what.after),
+        over=top + (float(stages[k][operation.main][2, 3]) - bottom) + OVER_M,
+        drags=abs(way[2]) < 0.5 and on_floor,
         late=late,
     )
-
-
-def _over(assembly: Assembly, main: str, moves: tuple[str, ...], poses: Poses) -> float:
-    top, bottom = ends_of(assembly, moves, poses)
-    return top + (float(poses[main][2, 3]) - bottom) + OVER_M
 
 
 def _out(assembly: Assembly, before: Arrival, poses: Poses) -> Array:
@@ -88,10 +86,6 @@ def _out(assembly: Assembly, before: Arrival, poses: Poses) -> Array:
     if before.touched and abs(way[2]) < 0.5:
         return np.asarray(-before.line.travel_m * way)
     return _SIDE_M * _off(slide_directions(assembly, before, poses))
-
-
-def _on_floor(assembly: Assembly, found: Arrival) -> bool:
-    return any(each.normal[2] > 0.5 and not assembly.play(each.contact, 1.0) for each in found.touched)
 
 
 def _off(sides: tuple[Array, ...]) -> Array:

@@ -83,16 +83,11 @@ def _draw(how: Carelessness | None, human_error: float, rng: np.random.Generator
 
 def _wrong(scene: Scene, layout: Layout, after: list[Snapshot], final: Snapshot) -> str:
     """What is wrong with what the human built, empty if nothing is; that late adjustments pushed a part is no fault."""
-    verdict = judge(
-        scene.scenario.assembly,
-        Reached(after=tuple(after), final=final),
-        layout.goals,
-        scene.criteria,
-    )
-    found = verdict.demonstrated
-    fault = next((fault for fault, there in found.conditions.items() if there and fault != "pushed"), None)
+    reached = Reached(after=tuple(after), final=final)
+    demonstrated = judge(scene.scenario.assembly, reached, layout.goals, scene.criteria).demonstrated
+    fault = next((fault for fault, there in demonstrated.conditions.items() if there and fault != "pushed"), None)
     if fault is None:
         return ""
-    bad = next((c for c in found.contacts if not c.strict), None)
+    bad = next((c for c in demonstrated.contacts if not c.strict), None)
     where = f" ({bad.contact}, operation {bad.operation + 1})" if bad and fault in ("gap", "overlap") else ""
     return sentence(fault) + where

@@ -12,6 +12,10 @@ from apo_bench.geometry.arrays import Array
 
 _PEAK = 1.875
 """Peak over mean speed of a minimum-jerk motion."""
+_SHORTEST_S = 0.15
+"""No smooth motion is shorter."""
+_RAMP_S = 0.1
+"""How long a steady motion gains and loses speed."""
 _GAIN = 0.6
 _CELL_M = 2e-5
 """How fast a paced motion gains and loses speed, [m/s^2]; its speed is found in cells of this length."""
@@ -45,18 +49,18 @@ class Trajectory:
         return T
 
 
-def smooth(start: Array, end: Array, speed: float, turn_speed: float = 1.5, shortest: float = 0.15) -> Trajectory:
+def smooth(start: Array, end: Array, speed: float, turn_speed: float = 1.5) -> Trajectory:
     """Minimum jerk: at rest at both ends, its peak speeds [m/s] and [rad/s] bounded."""
     far = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
     turn = float(np.linalg.norm(_turn_between(start, end)))
-    return Trajectory(start, end, max(shortest, _PEAK * far / speed, _PEAK * turn / turn_speed), minimum_jerk)
+    return Trajectory(start, end, max(_SHORTEST_S, _PEAK * far / speed, _PEAK * turn / turn_speed), minimum_jerk)
 
 
-def steady(start: Array, end: Array, speed: float, ramp: float = 0.1) -> Trajectory:
-    """Constant speed [m/s] with a short ramp [s] at both ends, for motions that a guard may stop."""
+def steady(start: Array, end: Array, speed: float) -> Trajectory:
+    """Constant speed [m/s] with a short ramp at both ends, for motions that a guard may stop."""
     far = float(np.linalg.norm(end[:3, 3] - start[:3, 3]))
-    seconds = max(far / speed + ramp, 2.0 * ramp)
-    return Trajectory(start, end, seconds, _Trapezoid(ramp / seconds))
+    seconds = max(far / speed + _RAMP_S, 2.0 * _RAMP_S)
+    return Trajectory(start, end, seconds, _Trapezoid(_RAMP_S / seconds))
 
 
 def paced(start: Array, end: Array, quick: float, slow: float, stretches: Sequence[tuple[float, float]]) -> Trajectory:
@@ -67,6 +71,9 @@ def paced(start: Array, end: Array, quick: float, slow: float, stretches: Sequen
     for begin, stop in stretches:
         limit[(x >= begin) & (x <= stop)] = slow
     limit[[0, -1]] = 0.0
+    # v^2 grows by at most 2 a per metre: forwards, the least of limit^2 - 2 a x so far, plus 2 a x, is the largest v^2
+    # that can be reached; backwards the same, so that speed is lost in time. Then t is the integral of dx / v, where v
+    # changes linearly with time in a cell.
     squares = limit**2
     gain = 2.0 * _GAIN * (x[1] - x[0]) * np.arange(len(x))
     squares = np.minimum.accumulate(squares - gain) + gain

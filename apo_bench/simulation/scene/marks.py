@@ -8,7 +8,7 @@ from typing import Any, final
 import mujoco
 import numpy as np
 
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry.arrays import Array, freeze
 
 _Color = tuple[float, float, float]
 _WIDTH_M = 0.0035
@@ -42,8 +42,7 @@ class ShiftArrows:
     name: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "center", frozen(self.center, 3))
-        object.__setattr__(self, "axis", frozen(self.axis, 3))
+        freeze(self, center=(3,), axis=(3,))
 
     @property
     def tips(self) -> Array:
@@ -67,9 +66,7 @@ class TurnRing:
     name: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "center", frozen(self.center, 3))
-        object.__setattr__(self, "axis", frozen(self.axis, 3))
-        object.__setattr__(self, "away", frozen(self.away, 3))
+        freeze(self, center=(3,), axis=(3,), away=(3,))
 
     @property
     def tips(self) -> Array:
@@ -88,8 +85,7 @@ class AxisLine:
     color: _Color
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "begin", frozen(self.begin, 3))
-        object.__setattr__(self, "end", frozen(self.end, 3))
+        freeze(self, begin=(3,), end=(3,))
 
 
 @final

@@ -62,6 +62,13 @@ def picture_with_arm(
     return _drawn(scene.work, data, width, height, camera, more)
 
 
+def place_for_picture(model: Any, data: Any) -> None:
+    """Bring all that a picture shows up to date with the positions of a state: frames, centres of mass, cameras."""
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_camlight(model, data)
+
+
 def arm_home(scene: Scene, data: Any) -> None:
     """Put the arm at home in a state of its world, its fingers open."""
     for joint, q in zip(scene.arm.joints, scene.arm.home, strict=True):

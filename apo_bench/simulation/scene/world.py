@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from typing import Any, final
 
@@ -87,38 +87,31 @@ def has_failed(data: Any) -> bool:
     return bool(data.warning.number.any()) or not math.isfinite(data.qpos.sum())
 
 
-@contextmanager
-def sleeping(world: World, allowed: bool) -> Iterator[None]:
+def sleeping(world: World, allowed: bool) -> AbstractContextManager[None]:
     """Whether parts that rest and that nothing moves against are left as they are, for a while."""
-    options = world.model.opt
-    before = int(options.enableflags)
-    options.enableflags = before | SLEEP if allowed else before & ~SLEEP
-    try:
-        yield
-    finally:
-        options.enableflags = before
+    flags = int(world.model.opt.enableflags)
+    return _with_option(world.model, "enableflags", flags | SLEEP if allowed else flags & ~SLEEP)
 
 
-@contextmanager
-def timestep(model: Any, seconds: float) -> Iterator[None]:
+def timestep(model: Any, seconds: float) -> AbstractContextManager[None]:
     """Steps of another length, for a while."""
-    before = float(model.opt.timestep)
-    model.opt.timestep = seconds
-    try:
-        yield
-    finally:
-        model.opt.timestep = before
+    return _with_option(model, "timestep", seconds)
+
+
+def unfelt(model: Any) -> AbstractContextManager[None]:
+    """Steps after which no sensor is asked: they need not be computed for a while."""
+    return _with_option(model, "disableflags", int(model.opt.disableflags) | _NO_SENSORS)
 
 
 @contextmanager
-def unfelt(model: Any) -> Iterator[None]:
-    """Steps after which no sensor is asked: they need not be computed for a while."""
-    before = int(model.opt.disableflags)
-    model.opt.disableflags = before | _NO_SENSORS
+def _with_option(model: Any, name: str, value: float) -> Iterator[None]:
+    """A model with another value of one of its options, for a while."""
+    before = getattr(model.opt, name)
+    setattr(model.opt, name, value)
     try:
         yield
     finally:
-        model.opt.disableflags = before
+        setattr(model.opt, name, before)
 
 
 def awaken(world: World, data: Any) -> None:

@@ -32,20 +32,14 @@ class DemonstrationImages:
 class DemonstrationCamera:
     """Pass it to `demonstrate` as `watch`: it is called with the `MjData` at every picture and changes nothing."""
 
-    def __init__(
-        self,
-        world: World,
-        rng: np.random.Generator,
-        camera: TvCamera | None = None,
-        finder: RangeFinder | None = None,
-    ) -> None:
+    def __init__(self, world: World, rng: np.random.Generator) -> None:
         """A watcher of one demonstration.
 
         Args:
             rng: The noise of the TV camera.
         """
-        self.camera = camera or TvCamera()
-        self.finder = finder or RangeFinder()
+        self.camera = TvCamera()
+        self.finder = RangeFinder()
         self.period_s = self.camera.period_s
         self._sight = Sight(world)
         self._rgba = np.array(world.model.geom_rgba, dtype=np.float64)
