@@ -25,10 +25,12 @@ from threading import Thread
 
 from apo_bench.records.row import Row
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.sweeps.environment_lock import EnvironmentLock, environment_lock, names_of
-from apo_bench.sweeps.grid import SweepSettings, Unit, load_all, units
-from apo_bench.sweeps.local.pool import spread
-from apo_bench.sweeps.worker import Emit, Timing, Worker
+from apo_bench.sweeps.grid import SweepSettings, load_all, units
+from apo_bench.sweeps.local.pool import run_locally
+from apo_bench.sweeps.sweep import names_of
+from apo_bench.sweeps.work.environment_lock import EnvironmentLock, environment_lock
+from apo_bench.sweeps.work.messages import Unit
+from apo_bench.sweeps.work.worker import Emit, Timing, Worker
 
 SCENARIOS = ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table")
 WAYS = ("one", "two", "threads")
@@ -36,7 +38,8 @@ RESULT = Path(__file__).parent / "results" / "workers.json"
 _REPLAY = ("-m", "apo_bench.cli.app", "replay", "stick_in_tower", "--json")
 _WORKER = """
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.sweeps.environment_lock import environment_lock, names_of
+from apo_bench.sweeps.sweep import names_of
+from apo_bench.sweeps.work.environment_lock import environment_lock
 from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.sweeps.local import pool
 grid = SweepSettings(("stick_in_tower",), (1.0,), (1.0,), ("contact",), trials=1)
@@ -79,7 +82,7 @@ def rows_per_second(way: str, trials: int) -> float:
     if way == "threads":
         _by_threads(work, lock, emit, 2)
     else:
-        spread(work, lock, workers=1 + WAYS.index(way), limit_s=600.0, emit=emit)
+        run_locally(work, lock, workers=1 + WAYS.index(way), limit_s=600.0, emit=emit)
     warm = max(at for at, seed in ended if seed == grid.seed)
     later = [at for at, _ in ended if at > warm]
     return len(later) / (later[-1] - warm)

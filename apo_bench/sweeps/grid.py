@@ -23,6 +23,7 @@ from apo_bench.records.settings import (
 )
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
+from apo_bench.sweeps.work.messages import Unit
 
 LARGEST_TRIALS = 1_000_000
 _MOST_TRIALS = 1_000_000
@@ -71,8 +72,8 @@ class SweepSettings:
 
     def __post_init__(self) -> None:
         for info in AXES:
-            given = map(_whole if info.is_whole else _plain, getattr(self, info.axis))
-            values = tuple(dict.fromkeys(map(info.spelled, given) if info.spelled else given))
+            entries = map(_whole if info.is_whole else _plain, getattr(self, info.axis))
+            values = tuple(dict.fromkeys(map(info.spelled, entries) if info.spelled else entries))
             if not values and info.name not in _MAY_BE_EMPTY:
                 raise InputError(f"no {info.axis} were given for the sweep; at least one is needed.")
             object.__setattr__(self, info.axis, values)
@@ -102,23 +103,15 @@ class SweepSettings:
         check_together(self.fidelity, *self.grasps)
 
 
-@final
-@dataclass(frozen=True)
-class Unit:
-    """Trials of one scenario, clearance, seed, carelessness and eye: they share layout and demonstration."""
-
-    trials: tuple[TrialSettings, ...]
-
-
 def check_grids(grids: Sequence[SweepSettings]) -> None:
     """Raise an `InputError` unless there is a grid, all have the same arm, time step and fidelity, and they are not
     larger than can be held."""
     if not grids:
         raise InputError("no grid was given for the sweep; at least one is needed.")
     for name in SHARED:
-        given = {getattr(grid, name): None for grid in grids}
-        if len(given) > 1:
-            raise InputError(f"{name} of a sweep is {' and '.join(map(str, given))}; run a sweep for each.")
+        values = {getattr(grid, name): None for grid in grids}
+        if len(values) > 1:
+            raise InputError(f"{name} of a sweep is {' and '.join(map(str, values))}; run a sweep for each.")
     most = sum(grid.trials * _per_seed(grid) for grid in grids)
     if most > _MOST_TRIALS:
         raise InputError(
@@ -164,11 +157,9 @@ def described(grids: Sequence[SweepSettings], loaded: Mapping[str, Scenario]) ->
 
 def _per_seed(grid: SweepSettings) -> int:
     """How many trials a grid has for one seed, if none is the same as another."""
-    ways = sum(len(_ways(eye, grid.noises)) for eye in grid.eyes)
-    told = sum(
-        len(_relations(grid, method)) * len(_looks(grid, method)) for method in grid.methods if not knows_truth(method)
-    )
-    trials = len(grid.careless) * len(grid.levels) * ways * told + sum(map(knows_truth, grid.methods))
+    ways = len(_ways(grid))
+    inputs = sum(len(_corrector_inputs(grid, method)) for method in grid.methods if not knows_truth(method))
+    trials = len(grid.careless) * len(grid.levels) * ways * inputs + sum(map(knows_truth, grid.methods))
     return (
         len(grid.scenarios)
         * max(1, len(grid.clearances_mm))
@@ -194,44 +185,35 @@ def _trials(
 ) -> Iterator[TrialSettings]:
     same: dict[str, Any] = {name: getattr(grid, name) for name in SHARED}
     same |= {"scenario": given, "clearance_mm": clearance_mm, "seed": seed, "salt": salt}
-
-    def trial(
-        method: str,
-        level: _Level,
-        careless: float,
-        way: tuple[str, str],
-        told: tuple[str, int],
-        plain: Sequence[Any],
-    ) -> TrialSettings:
-        mm, deg = level_pair(level, way[0])
-        eye, noise = way
-        others: dict[str, Any] = {info.name: value for info, value in zip(_PLAIN, plain, strict=True)}
-        others |= {"level_mm": mm, "level_deg": deg, "careless": careless, "eye": eye, "noise": noise}
-        return TrialSettings(**same, **others, relations=told[0], looks=told[1], method=method)
-
-    ways = [way for eye in grid.eyes for way in _ways(eye, grid.noises)]
-    plain = list(product(*(getattr(grid, info.axis) for info in _PLAIN)))
+    names = [info.name for info in _PLAIN]
+    values = product(*(getattr(grid, info.axis) for info in _PLAIN))
+    plain: list[dict[str, Any]] = [dict(zip(names, each, strict=True)) for each in values]
+    ways = _ways(grid)
+    truth: dict[str, Any] = {"level_mm": 0.0, "level_deg": 0.0, "careless": 0.0}
     for method, others in product(filter(knows_truth, grid.methods), plain):
-        yield trial(method, 0.0, 0.0, ways[0], (TrialSettings.relations, TrialSettings.looks), others)
+        yield TrialSettings(**same, **others, **truth, **ways[0], method=method)
     for others, careless, level, way, method in product(plain, grid.careless, grid.levels, ways, grid.methods):
         if not knows_truth(method):
-            for told in product(_relations(grid, method), _looks(grid, method)):
-                yield trial(method, level, careless, way, told, others)
+            mm, deg = level_pair(level, way["eye"])
+            seen: dict[str, Any] = {"level_mm": mm, "level_deg": deg, "careless": careless}
+            for relations, looks in _corrector_inputs(grid, method):
+                yield TrialSettings(**same, **others, **seen, **way, relations=relations, looks=looks, method=method)
 
 
-def _relations(grid: SweepSettings, method: str) -> tuple[str, ...]:
-    """What a method is told of the contacts: once the right ones if it asks for none."""
-    return grid.relations if knows_relations(method) else (TrialSettings.relations,)
+def _corrector_inputs(grid: SweepSettings, method: str) -> list[tuple[str, int]]:
+    """What a method is told of the contacts, and how often it may look again.
+
+    Once the right contacts if it asks for none; never again if it cannot ask.
+    """
+    relations = grid.relations if knows_relations(method) else (TrialSettings.relations,)
+    looks = grid.looks if may_look(method) else (TrialSettings.looks,)
+    return list(product(relations, looks))
 
 
-def _looks(grid: SweepSettings, method: str) -> tuple[int, ...]:
-    """How often a method may look again: never if it cannot ask."""
-    return grid.looks if may_look(method) else (TrialSettings.looks,)
-
-
-def _ways(eye: str, noises: tuple[str, ...]) -> list[tuple[str, str]]:
-    """Eye and noise model, of every way of seeing that an eye stands for."""
-    return [(eye, RANGE)] if eye == RANGE else [(eye, noise) for noise in noises]
+def _ways(grid: SweepSettings) -> list[dict[str, Any]]:
+    """Eye and noise model, of every way of seeing; a range finder has no noise model."""
+    noises = {eye: (RANGE,) if eye == RANGE else grid.noises for eye in grid.eyes}
+    return [{"eye": eye, "noise": noise} for eye in grid.eyes for noise in noises[eye]]
 
 
 def _described(grid: SweepSettings, loaded: Mapping[str, Scenario]) -> dict[str, Any]:

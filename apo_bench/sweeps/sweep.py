@@ -12,19 +12,21 @@ from apo_bench.records.run.run_file import run_record
 from apo_bench.records.run.run_folder import RunFolder
 from apo_bench.records.salt import salt_of_sweep
 from apo_bench.records.setting_columns import trial_key
+from apo_bench.records.settings import level_pair
 from apo_bench.records.short_names import CORRECTOR
 from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.physics import physics
-from apo_bench.sweeps.dispatch import Executor, check_limit
-from apo_bench.sweeps.environment_lock import EnvironmentLock, Names, environment_lock, names_of
-from apo_bench.sweeps.grid import SweepSettings, Unit, check_grids, described, load_all, units
-from apo_bench.sweeps.local.pool import spread
+from apo_bench.sweeps.grid import SweepSettings, check_grids, described, load_all, units
+from apo_bench.sweeps.local.pool import run_locally
 from apo_bench.sweeps.progress import progress
-from apo_bench.sweeps.stopping import Check, listening
-from apo_bench.sweeps.worker import Timing, in_time
+from apo_bench.sweeps.work.dispatch import Executor, check_limit
+from apo_bench.sweeps.work.environment_lock import EnvironmentLock, Names, environment_lock
+from apo_bench.sweeps.work.messages import Unit
+from apo_bench.sweeps.work.stopping import Check, listening
+from apo_bench.sweeps.work.worker import Timing, row_within_limit
 from apo_bench.trial.fingerprint import code_files, content_pieces, spec_hash
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations
 
@@ -74,7 +76,7 @@ def run_sweep(
         KeyboardInterrupt: After Ctrl-C or a signal, when the rows of the trials that had ended were written.
     """
     grids = (grids,) if isinstance(grids, SweepSettings) else tuple(grids)
-    _check_spread(workers, limit_s, backend, address)
+    _check_executor(workers, limit_s, backend, address)
     here = workers is None and backend == "local"
     check_grids(grids)
     names = names_of(grids)
@@ -90,13 +92,28 @@ def run_sweep(
         with progress(sum(len(unit.trials) for unit in work)) as count:
 
             def emit(row: Row, timing: Timing) -> None:
-                kept = row if here else in_time(row, timing, limit_s)
+                kept = row if here else row_within_limit(row, timing, limit_s)
                 store.append(kept, timing)
                 count(kept)
 
             execute = _executor(backend, address)
             execute(work, lock, workers=workers, limit_s=limit_s, emit=emit, check=check)
         return store.rows()
+
+
+def names_of(grids: Sequence[SweepSettings]) -> Names:
+    """What grids name; all have the same arm."""
+    noises: dict[str, float] = {}
+    for grid in grids:
+        highest = max(max(level_pair(level)) for level in grid.levels)
+        noises |= {noise: max(highest, noises.get(noise, 0.0)) for noise in grid.noises}
+    return Names(
+        arm=grids[0].arm,
+        scenarios=tuple(dict.fromkeys(name for grid in grids for name in grid.scenarios)),
+        methods=tuple(dict.fromkeys(name for grid in grids for name in grid.methods)),
+        relations=tuple(dict.fromkeys(name for grid in grids for name in grid.relations)),
+        noises=noises,
+    )
 
 
 def _kept_in(cache: str | Path | None) -> str | None:
@@ -106,10 +123,10 @@ def _kept_in(cache: str | Path | None) -> str | None:
 
 def _executor(backend: str, address: str | None) -> Executor:
     if backend == "local":
-        return spread
-    from apo_bench.sweeps.ray.backend import spread as spread_on_ray
+        return run_locally
+    from apo_bench.sweeps.ray.backend import run_on_ray
 
-    return partial(spread_on_ray, address=address)
+    return partial(run_on_ray, address=address)
 
 
 def _left(
@@ -139,7 +156,7 @@ def _left(
     return left
 
 
-def _check_spread(workers: int | None, limit_s: float, backend: str, address: str | None) -> None:
+def _check_executor(workers: int | None, limit_s: float, backend: str, address: str | None) -> None:
     if workers is not None and not 1 <= workers <= _LARGEST_WORKERS:
         raise InputError(f"{workers} workers were given; a whole number from 1 to {_LARGEST_WORKERS} is allowed.")
     check_limit(limit_s)

@@ -29,7 +29,7 @@ _COUNTS = {"trials": (1, LARGEST_TRIALS), "seed": SETTINGS["seed"].range}
 _ALONE = {SETTINGS[name].keyword: SETTINGS[name] for name in SHARED}
 """One for the whole sweep: they stand at the top of the file only."""
 _MOST_ENTRIES = 1000
-KEYS = (*_SEVERAL, *_COUNTS)
+SWEEP_KEYS = (*_SEVERAL, *_COUNTS)
 
 
 def is_sweep_file(given: str) -> bool:
@@ -53,13 +53,13 @@ def read_sweep(path: str | Path, overrides: Mapping[str, Any] | None = None) -> 
     Raises:
         InputError: Anything in the file that is not as described.
     """
-    top = read_toml(path, "sweep file").fields(("scenarios",), (*KEYS[1:], *_ALONE, "also"))
-    tables = [entry.fields((), KEYS) for entry in _tables(top["also"])] if "also" in top else []
+    top = read_toml(path, "sweep file").fields(("scenarios",), (*SWEEP_KEYS[1:], *_ALONE, "also"))
+    tables = [entry.fields((), SWEEP_KEYS) for entry in _tables(top["also"])] if "also" in top else []
     first = {key: _value(key, node) for key, node in top.items() if key != "also"}
     further = [first | {key: _value(key, node) for key, node in table.items()} for table in tables]
     names = [str(path), *(f"{path}, also {i}" for i in range(1, len(tables) + 1))]
     return tuple(
-        _grid(name, {**said, **(overrides or {})}) for name, said in zip(names, (first, *further), strict=True)
+        _grid(name, {**values, **(overrides or {})}) for name, values in zip(names, (first, *further), strict=True)
     )
 
 
@@ -69,9 +69,9 @@ def _tables(node: JsonNode) -> Sequence[JsonNode]:
     return _few(node.items("also"), node)
 
 
-def _grid(name: str, said: Mapping[str, Any]) -> SweepSettings:
+def _grid(name: str, values: Mapping[str, Any]) -> SweepSettings:
     try:
-        return SweepSettings(**in_python(said))
+        return SweepSettings(**in_python(values))
     except InputError as error:
         raise InputError(f"{name}: {error}") from error
 

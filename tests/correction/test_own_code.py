@@ -38,8 +38,8 @@ from apo_bench.io.processes import descendants
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import build_scene
-from apo_bench.sweeps.environment_lock import EnvironmentLock
-from apo_bench.sweeps.worker import Worker
+from apo_bench.sweeps.work.environment_lock import EnvironmentLock
+from apo_bench.sweeps.work.worker import Worker
 from apo_bench.trial.trial import run_trial
 from tests import scenes
 
@@ -397,7 +397,7 @@ def worker(folder: Path) -> Iterator[Worker]:
 
 
 def rows(worker: Worker, *methods: str) -> dict[str, dict[str, Any]]:
-    from apo_bench.sweeps.grid import Unit
+    from apo_bench.sweeps.work.messages import Unit
 
     asked = [TrialSettings("block_on_block", careless=0.0, method=method, seed=424243) for method in methods]
     made = [dict(said[0]) for kind, *said in worker.run(Unit(tuple(asked))) if kind == "row"]

@@ -13,7 +13,7 @@ from apo_bench.records.run.checked import TIMING_FIELDS, row_of, timing_of, unwr
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import build_scene
-from apo_bench.sweeps.worker import timing
+from apo_bench.sweeps.work.worker import timing
 from apo_bench.trial.row import lost, misbehaved
 from apo_bench.trial.trial import run_trial
 

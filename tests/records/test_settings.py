@@ -22,7 +22,7 @@ from apo_bench.records.setting_columns import KEY, setting_columns, settings_of
 from apo_bench.records.settings import LEVEL, SETTINGS, TrialSettings
 from apo_bench.report.comparison.compare import compare
 from apo_bench.sweeps.grid import SweepSettings
-from apo_bench.sweeps.sweep_file import KEYS
+from apo_bench.sweeps.sweep_file import SWEEP_KEYS
 from apo_bench.trial.trial import run_trial
 
 ROOT = Path(__file__).parents[2]
@@ -47,7 +47,7 @@ def test_sweeps_have_an_axis_or_one_value_of_every_setting() -> None:
         alone = name in ("seed", "salt")
         assert bool(info.axis) + info.shared + level + alone == 1
         assert (LEVEL.axis if level else info.axis or name) in here | {"salt"}
-        assert not info.axis or info.axis in KEYS
+        assert not info.axis or info.axis in SWEEP_KEYS
 
 
 def test_every_setting_is_an_option_of_replay_and_sweep() -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import pytest
 
 from apo_bench.records.settings import TrialSettings
-from apo_bench.sweeps import dispatch
-from apo_bench.sweeps.dispatch import STARTING_S, Dispatch, Job
-from apo_bench.sweeps.environment_lock import EnvironmentLock, versions
-from apo_bench.sweeps.grid import Unit
-from apo_bench.sweeps.worker import in_time, timing
+from apo_bench.sweeps.work import dispatch
+from apo_bench.sweeps.work.dispatch import STARTING_S, Dispatch, Job
+from apo_bench.sweeps.work.environment_lock import EnvironmentLock, versions
+from apo_bench.sweeps.work.messages import Unit
+from apo_bench.sweeps.work.worker import row_within_limit, timing
 from apo_bench.trial.row import lost, misbehaved
 
 LIMIT_S = 10.0
@@ -74,6 +74,6 @@ def test_what_a_late_row_says() -> None:
     died = lost(TRIAL, "", "worker_died")
     raised = misbehaved(TRIAL, "", "ok", "it raised")
     took = {name: timing(row, 0.1, 4.0, 7.0, {}) for name, row in (("died", died), ("raised", raised))}
-    assert in_time(raised, took["raised"], 11.0) is raised
-    assert in_time(raised, took["raised"], 10.9) == lost(TRIAL, "", "time_limit")
-    assert in_time(died, took["died"], 10.9) is died
+    assert row_within_limit(raised, took["raised"], 11.0) is raised
+    assert row_within_limit(raised, took["raised"], 10.9) == lost(TRIAL, "", "time_limit")
+    assert row_within_limit(died, took["died"], 10.9) is died

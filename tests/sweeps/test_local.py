@@ -29,13 +29,14 @@ from apo_bench.report.report import report
 from apo_bench.report.run.facts import limits_of
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.sweeps.environment_lock import EnvironmentLock, versions
-from apo_bench.sweeps.grid import SweepSettings, Unit, load_all, units
+from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.sweeps.local import pool
-from apo_bench.sweeps.local.pool import FALSE_STARTS, spread
-from apo_bench.sweeps.stopping import Stopped, listening
+from apo_bench.sweeps.local.pool import FALSE_STARTS, run_locally
 from apo_bench.sweeps.sweep import run_sweep
-from apo_bench.sweeps.worker import Worker
+from apo_bench.sweeps.work.environment_lock import EnvironmentLock, versions
+from apo_bench.sweeps.work.messages import Unit
+from apo_bench.sweeps.work.stopping import Stopped, listening
+from apo_bench.sweeps.work.worker import Worker
 from apo_bench.trial.fingerprint import content_hash
 from apo_bench.trial.row import lost, misbehaved
 from tests import pages
@@ -326,7 +327,9 @@ def test_what_a_worker_refuses_ends_the_sweep() -> None:
     asked = grid("raises")
     lock = EnvironmentLock({"block_on_block": "0123456789abcdef"}, versions())
     with pytest.raises(InputError, match="has other code or other files"):
-        spread(tuple(units([asked], load_all([asked]))), lock, workers=1, limit_s=60.0, emit=lambda row, timing: None)
+        run_locally(
+            tuple(units([asked], load_all([asked]))), lock, workers=1, limit_s=60.0, emit=lambda row, timing: None
+        )
 
 
 @dataclass(frozen=True)
@@ -345,7 +348,9 @@ def test_processes_that_cannot_begin_are_given_up(monkeypatch: pytest.MonkeyPatc
     real = pool.Process
     monkeypatch.setattr(pool, "Process", lambda *given: real(Deadly()))  # type: ignore[arg-type]
     with pytest.raises(RuntimeError, match="worker processes end with exit code 5 before they have begun a trial"):
-        spread(tuple(units([asked], load_all([asked]))), lock, workers=1, limit_s=60.0, emit=lambda row, timing: None)
+        run_locally(
+            tuple(units([asked], load_all([asked]))), lock, workers=1, limit_s=60.0, emit=lambda row, timing: None
+        )
     assert FALSE_STARTS == 3
 
 
@@ -384,9 +389,9 @@ def test_processes_that_cannot_begin_any_more_cost_the_trials_of_own_correctors(
     work = tuple(units([asked], load_all([asked])))
     if "none" in methods:
         with pytest.raises(RuntimeError, match="before they have begun a trial"):
-            spread(work, lock, workers=1, limit_s=60.0, emit=emit)
+            run_locally(work, lock, workers=1, limit_s=60.0, emit=emit)
     else:
-        spread(work, lock, workers=1, limit_s=60.0, emit=emit)
+        run_locally(work, lock, workers=1, limit_s=60.0, emit=emit)
         assert [row["failure_code"] for row in rows] == ["raised", "worker_died"]
 
 

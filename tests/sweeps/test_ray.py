@@ -27,14 +27,15 @@ from apo_bench.records.row import Row
 from apo_bench.records.setting_columns import row_key
 from apo_bench.resources import folder
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.sweeps import dispatch
-from apo_bench.sweeps.dispatch import Dispatch
-from apo_bench.sweeps.environment_lock import EnvironmentLock, environment_lock, names_of
-from apo_bench.sweeps.grid import SweepSettings, Unit, load_all, units
+from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.sweeps.ray import backend as on_ray
 from apo_bench.sweeps.ray import pool, task
 from apo_bench.sweeps.ray.runtime_files import runtime_files
-from apo_bench.sweeps.sweep import run_sweep
+from apo_bench.sweeps.sweep import names_of, run_sweep
+from apo_bench.sweeps.work import dispatch
+from apo_bench.sweeps.work.dispatch import Dispatch
+from apo_bench.sweeps.work.environment_lock import EnvironmentLock, environment_lock
+from apo_bench.sweeps.work.messages import Unit
 
 SPEC = SweepSettings(("carried_bridge",), levels=(1.0,), careless=(0.0,), methods=("none", "paper"), trials=5)
 NODE = {"num_cpus": 1, "object_store_memory": 80 * 2**20, "include_dashboard": False}
@@ -212,7 +213,7 @@ def test_a_trial_that_ends_its_worker_or_hangs_is_one_failed_row(cluster: Any, o
     spec = replace(SPEC, scenarios=("mine.toml",), methods=methods, trials=1)
     work, lock = lock_of(spec)
     rows: list[Row] = []
-    on_ray.spread(
+    on_ray.run_on_ray(
         work,
         lock,
         workers=None,
@@ -235,7 +236,7 @@ def test_nodes_with_other_packages_or_code_are_refused(cluster: Any) -> None:
     work, lock = lock_of(SPEC)
     other = replace(lock, versions={**lock.versions, "mujoco": "3.0.0"})
     with pytest.raises(InputError, match=rf"the node '{socket.gethostname()}' .* mujoco .* 3\.0\.0"):
-        on_ray.spread(work, other, workers=1, limit_s=60.0, emit=refuse_row, address=cluster.address)
+        on_ray.run_on_ray(work, other, workers=1, limit_s=60.0, emit=refuse_row, address=cluster.address)
 
 
 def refuse_row(row: Row, timing: dict[str, Any]) -> None:

@@ -29,8 +29,9 @@ from apo_bench.records.short_names import CORRECTORS
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps import sweep as runner
-from apo_bench.sweeps import worker
-from apo_bench.sweeps.grid import SweepSettings, Unit, load_all, units
+from apo_bench.sweeps.grid import SweepSettings, load_all, units
+from apo_bench.sweeps.work import worker
+from apo_bench.sweeps.work.messages import Unit
 from apo_bench.trial import kept_demonstrations, trial
 from apo_bench.trial import row as row_module
 from apo_bench.trial.fingerprint import spec_hash

@@ -60,7 +60,7 @@ def reached(start: Path, *, tables: bool = True) -> set[str]:
 
 
 def test_all_that_a_worker_can_reach_counts() -> None:
-    run_through = reached(PACKAGE / "sweeps" / "worker.py")
+    run_through = reached(PACKAGE / "sweeps" / "work" / "worker.py")
     assert {
         *("simulation/execution/controller.py", "judging/verdict.py", "recognition/contacts.py"),
         "correction/baselines/track.py",

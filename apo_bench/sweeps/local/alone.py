@@ -6,10 +6,10 @@ from functools import partial
 from typing import Any
 
 from apo_bench.records.row import Row
-from apo_bench.sweeps.dispatch import STARTING_S, check_limit
 from apo_bench.sweeps.local.pool import GOING_S
 from apo_bench.sweeps.local.process import Process
-from apo_bench.sweeps.stopping import Check, listening
+from apo_bench.sweeps.work.dispatch import STARTING_S, check_limit
+from apo_bench.sweeps.work.stopping import Check, listening
 from apo_bench.trial.request import Request
 from apo_bench.trial.run_request import Say, checked_request, lost_request, work_on
 

@@ -5,12 +5,12 @@ from collections.abc import Sequence
 from multiprocessing import connection
 from typing import Any, final
 
-from apo_bench.sweeps.dispatch import Dispatch, Job
-from apo_bench.sweeps.environment_lock import EnvironmentLock
-from apo_bench.sweeps.grid import Unit
 from apo_bench.sweeps.local.process import Process
-from apo_bench.sweeps.stopping import Check, never
-from apo_bench.sweeps.worker import Emit, Worker
+from apo_bench.sweeps.work.dispatch import Dispatch, Job
+from apo_bench.sweeps.work.environment_lock import EnvironmentLock
+from apo_bench.sweeps.work.messages import Unit
+from apo_bench.sweeps.work.stopping import Check, never
+from apo_bench.sweeps.work.worker import Emit, Worker
 
 _TURN_S = 0.5
 """How often the clock and the signals are looked at while nothing else happens."""
@@ -23,7 +23,7 @@ GRACE_S = 5.0
 FALSE_STARTS = 3
 
 
-def spread(
+def run_locally(
     work: Sequence[Unit],
     lock: EnvironmentLock,
     *,

@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import final
 
 from apo_bench.errors import InputError
-from apo_bench.sweeps.environment_lock import EnvironmentLock
-from apo_bench.sweeps.grid import Unit
 from apo_bench.sweeps.local.pool import GOING_S, GRACE_S
 from apo_bench.sweeps.local.process import Process
 from apo_bench.sweeps.ray.driver import ClusterPlan, drive
 from apo_bench.sweeps.ray.runtime_files import runtime_files
-from apo_bench.sweeps.stopping import Check, never
-from apo_bench.sweeps.worker import Emit
+from apo_bench.sweeps.work.environment_lock import EnvironmentLock
+from apo_bench.sweeps.work.messages import Unit
+from apo_bench.sweeps.work.stopping import Check, never
+from apo_bench.sweeps.work.worker import Emit
 
 _TURN_S = 0.2
 JOINING_S = 30.0
@@ -62,7 +62,7 @@ def check_ray(address: str | None) -> None:
         ) from error
 
 
-def spread(
+def run_on_ray(
     work: Sequence[Unit],
     lock: EnvironmentLock,
     *,

@@ -16,14 +16,13 @@ from pathlib import Path
 from typing import Any, final
 
 from apo_bench.errors import InputError
-from apo_bench.sweeps.dispatch import Dispatch
-from apo_bench.sweeps.environment_lock import EnvironmentLock
-from apo_bench.sweeps.grid import Unit
 from apo_bench.sweeps.local.pool import GRACE_S
 from apo_bench.sweeps.local.process import THREADS
-from apo_bench.sweeps.messages import Message, last_message
 from apo_bench.sweeps.ray.pool import DEATHS, FALSE_STARTS_OF_TASKS, RayPool
 from apo_bench.sweeps.ray.task import made_task
+from apo_bench.sweeps.work.dispatch import Dispatch
+from apo_bench.sweeps.work.environment_lock import EnvironmentLock
+from apo_bench.sweeps.work.messages import Message, Unit, last_message
 
 _OBJECT_STORE = 100 * 2**20
 """Bytes, of a cluster that is started here; rows are small."""

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any, final
 
-from apo_bench.sweeps.dispatch import STARTING_S, Dispatch, Job
+from apo_bench.sweeps.work.dispatch import STARTING_S, Dispatch, Job
 
 _TURN_S = 0.2
 _AHEAD = 32

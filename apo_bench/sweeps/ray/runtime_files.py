@@ -10,7 +10,7 @@ from pathlib import Path
 from apo_bench.observation.presets import noise_path
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.sweeps.environment_lock import Names
+from apo_bench.sweeps.work.environment_lock import Names
 
 _NAMED_FILE = re.compile(r"""\bfile\s*=\s*["']([^"']+)["']""")
 """In MJCF: meshes, textures and what is included."""

@@ -7,10 +7,9 @@ from collections.abc import Callable, Iterator
 from functools import lru_cache
 
 from apo_bench.errors import InputError
-from apo_bench.sweeps.environment_lock import EnvironmentLock
-from apo_bench.sweeps.grid import Unit
-from apo_bench.sweeps.messages import Message, last_message
-from apo_bench.sweeps.worker import Worker
+from apo_bench.sweeps.work.environment_lock import EnvironmentLock
+from apo_bench.sweeps.work.messages import Message, Unit, last_message
+from apo_bench.sweeps.work.worker import Worker
 
 
 def made_task() -> Callable[[bytes, bytes], Iterator[Message]]:

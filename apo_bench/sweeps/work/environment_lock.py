@@ -1,7 +1,7 @@
 """The environment lock of a sweep: what all its rows are made with, wherever they are made."""
 
 import platform
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib import metadata
 from importlib.util import find_spec
@@ -15,11 +15,9 @@ from apo_bench.observation.relations import make_relations
 from apo_bench.records.limits import CORRECTOR_LIMIT_S
 from apo_bench.records.method import parsed, with_simulated
 from apo_bench.records.relations import RECOGNISED
-from apo_bench.records.settings import level_pair
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.sweeps.grid import SweepSettings
 from apo_bench.trial.fingerprint import content_hash, noise_content, own_content
 
 _PACKAGES = (
@@ -99,9 +97,9 @@ class EnvironmentLock:
         for given in self.names.scenarios:
             self.check_content(given, content_hash(load_scenario(given), given, arm.files))
 
-    def check_content(self, given: str, found: str) -> None:
+    def check_content(self, given: str, content: str) -> None:
         """Raise an `InputError` unless a scenario, and the code that runs it, are the same here."""
-        if found != self.content[given]:
+        if content != self.content[given]:
             raise InputError(
                 f"a worker on '{platform.node()}' has other code or other files for '{given}' than the process that "
                 "started the sweep; install the same everywhere, or start the same command again if a file was changed."
@@ -116,21 +114,6 @@ class EnvironmentLock:
                     f"a worker on '{platform.node()}' has {package} {here.get(package)}, the process that started the "
                     f"sweep {version}; install the same everywhere."
                 )
-
-
-def names_of(grids: Sequence[SweepSettings]) -> Names:
-    """What grids name; all have the same arm."""
-    noises: dict[str, float] = {}
-    for grid in grids:
-        highest = max(max(level_pair(level)) for level in grid.levels)
-        noises |= {noise: max(highest, noises.get(noise, 0.0)) for noise in grid.noises}
-    return Names(
-        arm=grids[0].arm,
-        scenarios=tuple(dict.fromkeys(name for grid in grids for name in grid.scenarios)),
-        methods=tuple(dict.fromkeys(name for grid in grids for name in grid.methods)),
-        relations=tuple(dict.fromkeys(name for grid in grids for name in grid.relations)),
-        noises=noises,
-    )
 
 
 def environment_lock(

@@ -10,11 +10,10 @@ from typing import Any, Protocol, final
 from apo_bench.errors import InputError
 from apo_bench.records.method import is_own
 from apo_bench.records.settings import TrialSettings
-from apo_bench.sweeps.environment_lock import EnvironmentLock
-from apo_bench.sweeps.grid import Unit
-from apo_bench.sweeps.messages import Message, checked
-from apo_bench.sweeps.stopping import Check
-from apo_bench.sweeps.worker import Emit, timing
+from apo_bench.sweeps.work.environment_lock import EnvironmentLock
+from apo_bench.sweeps.work.messages import Message, Unit, checked
+from apo_bench.sweeps.work.stopping import Check
+from apo_bench.sweeps.work.worker import Emit, timing
 from apo_bench.trial.row import lost
 
 STARTING_S = 300.0

@@ -1,4 +1,6 @@
-"""What a worker says while it works, whichever executor it has: tuples whose first item is a word.
+"""What a worker is given, and what it says while it works, whichever executor it has.
+
+Messages are tuples whose first item is a word:
 
 ("began",)              a trial begins; its scene is compiled and its corrector imported, so its time counts now
 ("row", row, timing)    it has ended
@@ -8,11 +10,21 @@
 """
 
 import traceback
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, final
 
 from apo_bench.errors import InputError
+from apo_bench.records.settings import TrialSettings
 
 Message = tuple[Any, ...]
+
+
+@final
+@dataclass(frozen=True)
+class Unit:
+    """Trials of one scenario, clearance, seed, carelessness and eye: they share layout and demonstration."""
+
+    trials: tuple[TrialSettings, ...]
 
 
 def last_message(error: Exception) -> Message:
@@ -29,9 +41,9 @@ def checked(message: Message) -> Message:
         InputError: The request cannot be honoured.
         RuntimeError: A trial could not be run.
     """
-    kind, *said = message
+    kind, *content = message
     if kind == "refused":
-        raise InputError(*said)
+        raise InputError(*content)
     if kind == "failed":
-        raise RuntimeError(*said)
+        raise RuntimeError(*content)
     return message

@@ -1,12 +1,10 @@
 """What a worker does, in whatever process on whatever machine: units of work become rows."""
 
-from __future__ import annotations
-
 import platform
 import time
 from collections.abc import Callable, Iterator, Mapping
 from functools import partial
-from typing import TYPE_CHECKING, Any, final
+from typing import Any, final
 
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.reached import Outcome
@@ -20,17 +18,14 @@ from apo_bench.records.setting_columns import KEY, row_key
 from apo_bench.records.settings import TrialSettings
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.sweeps.messages import Message
+from apo_bench.sweeps.work.environment_lock import EnvironmentLock
+from apo_bench.sweeps.work.messages import Message, Unit
 from apo_bench.trial.fingerprint import content_hash
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations, demonstration_of
 from apo_bench.trial.row import result
 from apo_bench.trial.scene import scene_key, scene_of
 from apo_bench.trial.stages import SimulatedDemonstration
 from apo_bench.trial.trial import trial_row
-
-if TYPE_CHECKING:
-    from apo_bench.sweeps.environment_lock import EnvironmentLock
-    from apo_bench.sweeps.grid import Unit
 
 Timing = dict[str, Any]
 """One line of `timing.jsonl`: what no specification determines."""
@@ -82,10 +77,11 @@ class Worker:
             key = (spec.careless, spec.eye)
             if key not in demonstrations:
                 demonstrations[key] = demonstration_of(spec, scene, self._kept)
-            shown = time.perf_counter()
+            demonstrate_s = time.perf_counter() - start
+            start = time.perf_counter()
             row = trial_row(spec, scene, demonstrations[key], content, method=method, cache=cache)
-            ended = time.perf_counter()
-            yield "row", row, timing(row, compile_s, shown - start, ended - shown, {"worker": self._number})
+            trial_s = time.perf_counter() - start
+            yield "row", row, timing(row, compile_s, demonstrate_s, trial_s, {"worker": self._number})
 
     def close(self) -> None:
         """End the processes of correctors."""
@@ -108,7 +104,7 @@ class Worker:
         return self._scenes[key]
 
 
-def in_time(row: Row, timing: Timing, limit_s: float) -> Row:
+def row_within_limit(row: Row, timing: Timing, limit_s: float) -> Row:
     """The row, or the failed row of a trial that took longer than the limit and ended before anyone looked."""
     took_s = (timing["demonstrate_s"] or 0.0) + (timing["trial_s"] or 0.0)
     if took_s <= limit_s or row["failure_stage"] == "worker":
