@@ -17,6 +17,7 @@ of the face (`RoundFace.frame`), and the equations of the paper take these as we
 anything within it is allowed, there are `WALLS` planes in place of two.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -49,6 +50,12 @@ def lowered_observation(observation: Observation) -> Observation:
     """An observation of such an assembly; the same if nothing is round."""
     low = lowered(observation.assembly)
     return observation if low is observation.assembly else replace(observation, assembly=low)
+
+
+def lowered_together(observations: Sequence[Observation]) -> Sequence[Observation]:
+    """Observations of one assembly, each as `lowered_observation` has it."""
+    alike = bool(observations) and lowered(observations[0].assembly) is observations[0].assembly
+    return observations if alike else [lowered_observation(one) for one in observations]
 
 
 @remembered

@@ -10,10 +10,11 @@ nothing that was seen tells them apart.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from math import sqrt
+from math import isfinite, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtrc
 
 from apo_bench.assembly.correction_record import Consistency, Suspect
 from apo_bench.assembly.equations import pattern
@@ -92,9 +93,7 @@ def fit_deviation(assembly: Assembly, play_m: float) -> Array:
 
 def p_value(chi_square: float, freedom: int) -> float:
     """The chance of a chi-square at least as large; 1 where nothing is tested."""
-    from scipy.special import chdtrc
-
-    if not np.isfinite(chi_square):
+    if not isfinite(chi_square):
         return 0.0
     return float(chdtrc(freedom, chi_square)) if freedom else 1.0
 

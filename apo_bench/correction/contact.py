@@ -13,14 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.correction_record import Consistency, Correction, Iterate, Suspect
-from apo_bench.assembly.equations import largest, pattern
 from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.lowering import lowered_observation
+from apo_bench.assembly.lowering import lowered_observation, lowered_together
 from apo_bench.correction.consistency import TEST_LEVEL
 from apo_bench.correction.ending import opposing, refused_correction, status_sentence
 from apo_bench.correction.problem import Problem, Solved, problem
-from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE, NearestGoals
-from apo_bench.correction.starts import best_start, turned_far, turned_words
+from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE
+from apo_bench.correction.starts import best_start, turned_words
 from apo_bench.errors import InputError
 
 Doubt = Literal["apply", "warn", "refuse", "drop"]
@@ -70,63 +69,53 @@ class ContactCorrector:
         Raises:
             InputError: As of one.
         """
-        observations = [lowered_observation(one) for one in observations]
-        seen = [one for one in observations if one.seen.all()]
-        alone = any(6 * len(one.goals) > LARGEST_DENSE or one.shared or one.tails for one in seen)
-        batches = [[one] for one in seen] if alone else [seen] if seen else []
-        made = iter([one for batch in batches for one in self._corrected(batch)])
-        return [next(made) if one.seen.all() else refused_correction(one) for one in observations]
+        observations = lowered_together(observations)
+        made = [None if one.seen.all() else refused_correction(one) for one in observations]
+        whole = [i for i, correction in enumerate(made) if correction is None]
+        alone = any(6 * len(one.goals) > LARGEST_DENSE or one.shared or one.tails for one in observations)
+        for batch in ([i] for i in whole) if alone else [whole] if whole else []:
+            for i, correction in zip(batch, self._corrected([observations[i] for i in batch]), strict=True):
+                made[i] = correction
+        return [correction for correction in made if correction is not None]
 
     def leaving_out(self, observation: Observation, dropped: tuple[str, ...]) -> Correction:
         """Correct an observation by all contacts but those of some relations."""
         asked = problem((lowered_observation(observation),), self.level, self.compiled)
-        kept = asked.without(dropped)
-        solved = asked.solve(kept)[0]
-        before_m = largest(asked.measured(None)[0])
-        return opposing(
-            asked.observation, self._report(asked.observation, solved, kept, solved.test, None, dropped, before_m)
-        )
+        solved = asked.solve(asked.without(dropped))[0]
+        (before_m,) = asked.seen_gap_m()
+        return opposing(asked.observation, self._report(asked, 0, solved, before_m, dropped))
 
     def _corrected(self, observations: Sequence[Observation]) -> list[Correction]:
         """Correct a batch, lowered, every operation seen: all at once, then by itself what is in doubt."""
         asked = problem(observations, self.level, self.compiled)
-        every = np.ones(len(asked.exact), dtype=np.bool_)
-        before_m = np.abs(asked.measured(None)[0]).max(axis=1, initial=0.0).tolist()
-        solved = asked.solve(every)
-        far = turned_far(asked.goals, np.array([one.found.goals for one in solved])).tolist()
         made = []
-        for i, one in enumerate(solved):
-            sure = (one.test.passes or self.doubt == "apply") and not far[i] and not one.away.any()
-            if sure and _status(one.found, largest(one.gaps), observations[i].gap_m) == "converged":
-                made.append(self._report(observations[i], one, every, one.test, None, (), before_m[i]))
+        for i, (before_m, solved) in enumerate(zip(asked.seen_gap_m(), asked.solve(asked.every), strict=True)):
+            sure = (solved.test.passes or self.doubt == "apply") and not solved.far and not solved.away
+            if sure and _status(solved, observations[i].gap_m) == "converged":
+                made.append(self._report(asked, i, solved, before_m))
             else:
-                made.append(self._in_doubt(asked.only(i), one, every, before_m[i]))
+                made.append(self._in_doubt(asked.only(i), solved, before_m))
         return made
 
-    def _in_doubt(self, asked: Problem, first: Solved, every: NDArray[np.bool_], before_m: float) -> Correction:
+    def _in_doubt(self, asked: Problem, first: Solved, before_m: float) -> Correction:
         """Correct an observation whose first solution is none, or far, or fails the test: other starts, suspects."""
         if self.elsewhere:
             asked, first = best_start(asked, first)
         solved = first
         test = first.test
-        gap_m = asked.observation.gap_m
-        lost = not first.found.at_rest and largest(first.gaps) <= gap_m
-        if not test.passes and self.doubt != "apply" and first.found.finite and not lost:
-            test = replace(test, suspects=asked.suspects(every))
-        kept = every
+        lost = not first.at_rest and first.worst_m <= asked.observation.gap_m
+        if not test.passes and self.doubt != "apply" and first.finite and not lost:
+            test = replace(test, suspects=asked.suspects(asked.every))
+        kept = asked.every
         dropped = tuple[str, ...]()
-        after = test
-        while self.doubt == "drop" and not after.passes and solved.found.finite and len(dropped) < DROPS:
+        while self.doubt == "drop" and not solved.test.passes and solved.finite and len(dropped) < DROPS:
             worst = asked.suspects(kept) if dropped else test.suspects
             if not worst:
                 break
             dropped += (self._most_suspect(asked, kept, worst[0]),)
             kept = asked.without(dropped)
             solved = asked.solve(kept)[0]
-            after = solved.test
-        turned = turned_words(asked, solved.found.goals)
-        last = after if dropped else None
-        report = self._report(asked.observation, solved, kept, test, last, dropped, before_m, turned)
+        report = self._report(asked, 0, solved, before_m, dropped, test, turned_words(asked, solved.goals))
         return opposing(asked.observation, report)
 
     def _most_suspect(self, asked: Problem, kept: NDArray[np.bool_], worst: Suspect) -> str:
@@ -136,33 +125,38 @@ class ContactCorrector:
 
     def _report(
         self,
-        observation: Observation,
+        asked: Problem,
+        i: int,
         solved: Solved,
-        kept: NDArray[np.bool_],
-        test: Consistency,
-        after: Consistency | None,
-        dropped: tuple[str, ...],
         before_m: float,
+        dropped: tuple[str, ...] = (),
+        first: Consistency | None = None,
         turned: str = "",
     ) -> Correction:
-        found = solved.found
+        """The correction of observation i.
+
+        Args:
+            first: The test before anything was dropped; None if that is the one of what was solved.
+        """
+        gap_m = asked.observations[i].gap_m
         rank = solved.rank
-        status = _status(found, largest(solved.gaps[kept]), observation.gap_m)
-        if status == "converged" and self.doubt in ("refuse", "drop") and not (after or test).passes:
+        test = first or solved.test
+        status = _status(solved, gap_m)
+        if status == "converged" and self.doubt in ("refuse", "drop") and not solved.test.passes:
             status = "doubtful"
         of = f"every contact but those of {', '.join(dropped)}" if dropped else "every contact"
         doubts = "" if self.doubt == "apply" else _doubts(test, dropped)
         return Correction(
-            goals=found.goals,
+            goals=solved.goals,
             status=status,
-            sentence=status_sentence(status, observation.gap_m, of) + turned + doubts,
-            freed=pattern(observation.assembly).freed,
+            sentence=status_sentence(status, gap_m, of) + turned + doubts,
+            freed=asked.laid.pattern.freed,
             gap_before_m=before_m,
-            gap_after_m=largest(solved.gaps),
+            gap_after_m=solved.worst_m,
             rank=rank,
-            trace=tuple([Iterate(gap_m, rank, step) for gap_m, step in found.turns.tolist() if step == step]),
+            trace=tuple([Iterate(open_m, rank, step) for open_m, step in solved.trace]),
             test=test,
-            test_after=after,
+            test_after=solved.test if dropped and first else None,
             covariance=solved.covariance if status == "converged" else None,
             dropped=dropped,
         )
@@ -175,11 +169,11 @@ contact_drop = ContactCorrector("drop")
 contact_fast = contact
 
 
-def _status(found: NearestGoals, left_m: float, gap_m: float) -> str:
-    if not found.finite:
+def _status(solved: Solved, gap_m: float) -> str:
+    if not solved.finite:
         return "not_finite"
-    if left_m <= gap_m:
-        return "converged" if found.at_rest else "not_converged"
+    if solved.kept_m <= gap_m:
+        return "converged" if solved.at_rest else "not_converged"
     return "inconsistent"
 
 

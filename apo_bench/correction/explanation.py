@@ -130,8 +130,8 @@ def explain(observation: Observation, goals: Array, dropped: Collection[str] = (
     if 6 * n > LARGEST_POSTERIOR:
         raise _too_many(n)
     asked = problem((replace(observation, goals=goals, shared=()),))
-    system = asked.compact.only(0)
-    kept = asked.exact & asked.without(tuple(dropped))
+    system = asked.laid.system.only(0)
+    kept = asked.demands.exact & asked.without(tuple(dropped))
     xi = pose.log(pose.inverse(observation.goals) @ goals)
     Jr = right_jacobian(xi)
     B = Jr @ asked.L[0]

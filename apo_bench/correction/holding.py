@@ -109,7 +109,7 @@ def by_relation(assembly: Assembly, system: CompactEquations, Jt: Array, kept: N
     operations = []
     for arc in arcs:
         said = [i for i in arc if kept[i]]
-        operations.append(frozenset(int(j) for j in system.columns[said].ravel() if j < system.n))
+        operations.append(frozenset(int(j) for j in system.words.columns[said].ravel() if j < system.n))
     return RelationEquations(np.where(np.repeat(kept, 3), Jt, 0.0), arcs, tuple(operations))
 
 

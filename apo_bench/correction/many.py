@@ -12,7 +12,7 @@ from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.contact import ContactCorrector, contact
 from apo_bench.errors import InputError
 
-BATCH = 64
+BATCH = 128
 """Observations that are solved together: more would leave the cache of the processor."""
 
 
@@ -49,6 +49,7 @@ def _odd_one(observations: Sequence[Observation]) -> int | None:
     for i, one in enumerate(observations):
         if one.assembly is not first.assembly or one.play_m != first.play_m or one.start.keys() != first.start.keys():
             return i
-    starts = np.array([[one.start[part] for part in first.start] for one in observations])
-    odd = np.flatnonzero((starts != starts[0]).reshape(len(starts), -1).any(axis=1))
+    poses = [one.start[part] for one in observations for part in first.start]
+    starts = np.concatenate([np.zeros((0, 4)), *poses]).reshape(len(observations), -1)
+    odd = np.flatnonzero((starts != starts[0]).any(axis=1))
     return int(odd[0]) if len(odd) else None

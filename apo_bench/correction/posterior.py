@@ -12,7 +12,6 @@ from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg.lapack import dgeqp3, dorgqr, dpstrf
 
 from apo_bench.correction.solvers import sparse
@@ -22,6 +21,8 @@ LARGEST_POSTERIOR = 600
 """Unknowns above which free directions are not spelled out: a basis of them is a dense matrix."""
 UNCLEAR = (1e-14, 1e-9)
 """Squares of pivots, in parts of the largest: with none between these, rounding is told from rank quickly."""
+_BLOCK = 32
+"""Columns that LAPACK treats at once, of large matrices."""
 RANK_CUT_OFF = 1e-7
 """Singular values below this part of the largest one are rounding, at a solution."""
 
@@ -77,7 +78,7 @@ def jacobian_rank(Jt: Any) -> int:
     return int(np.count_nonzero(w > RANK_CUT_OFF * w[0]))
 
 
-def projections(Jt: Any) -> tuple[NDArray[np.intp], Array | None]:
+def projections(Jt: Any) -> tuple[list[int], Array | None]:
     """The rank of each of b transposed Jacobians at a solution, and the projection onto what it leaves free.
 
     An orthonormal basis Q of what the columns of Jt span comes from its QR decomposition, the longest column that is
@@ -87,31 +88,32 @@ def projections(Jt: Any) -> tuple[NDArray[np.intp], Array | None]:
         Jt: (b, 6 n, 3 c), or a list of sparse matrices.
 
     Returns:
-        (b,), and (b, 6 n, 6 n), None above `LARGEST_POSTERIOR` unknowns.
+        b numbers, and (b, 6 n, 6 n), None above `LARGEST_POSTERIOR` unknowns.
     """
     unknowns = Jt[0].shape[0]
     if unknowns > LARGEST_POSTERIOR:
-        return np.array([jacobian_rank(one) for one in Jt]), None
-    one = np.eye(unknowns)
-    rank = np.zeros(len(Jt), dtype=np.intp)
+        return [jacobian_rank(one) for one in Jt], None
+    rank = []
     P = np.empty((len(Jt), unknowns, unknowns))
     for i, each in enumerate(Jt):
         matrix = each if isinstance(each, np.ndarray) else each.toarray()
         basis = _row_space(matrix) if matrix.size else matrix
-        rank[i] = basis.shape[1]
-        np.subtract(one, basis @ basis.T, out=P[i])
+        rank.append(basis.shape[1])
+        np.matmul(basis, basis.T, out=P[i])
+    np.negative(P, out=P)
+    P.reshape(len(Jt), -1)[:, :: unknowns + 1] += 1.0
     return rank, P
 
 
 def _row_space(Jt: Array) -> Array:
     """An orthonormal basis of the columns of Jt, (6 n, rank)."""
-    QR, _, reflectors, _, _ = dgeqp3(Jt)
+    QR, _, reflectors, _, _ = dgeqp3(Jt, lwork=2 * Jt.shape[1] + _BLOCK * (Jt.shape[1] + 1))
     lengths = np.square(QR.diagonal())
     rank = int(np.count_nonzero(lengths > UNCLEAR[0] * lengths[0]))
     if rank and not lengths[rank - 1] > UNCLEAR[1] * lengths[0]:
         U, w, _ = np.linalg.svd(Jt, full_matrices=False)
         return np.asarray(U[:, w > RANK_CUT_OFF * w[0]])
-    return np.asarray(dorgqr(QR[:, :rank], reflectors[:rank])[0])
+    return np.asarray(dorgqr(QR[:, :rank], reflectors[:rank], lwork=_BLOCK * max(rank, 1))[0])
 
 
 def marginals(B: Array, free: Array) -> Array:

@@ -9,38 +9,25 @@ to the one nearest to what was seen is taken, in the metric of the noise.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator
-from math import cos, radians
 
 import numpy as np
-from numpy.typing import NDArray
 
 from apo_bench.assembly.equations import largest, pattern
 from apo_bench.assembly.opposing import looking_away
 from apo_bench.correction.posterior import LARGEST_POSTERIOR
-from apo_bench.correction.problem import Problem, Solved, problem
+from apo_bench.correction.problem import FAR_DEG, Problem, Solved, problem
 from apo_bench.correction.robust.inferred import inferred_goals
-from apo_bench.correction.solvers.compact import laid_contacts
 from apo_bench.correction.solvers.curved import descended
 from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE, nearest_goals
+from apo_bench.correction.solvers.laid import laid_contacts
 from apo_bench.correction.solvers.whitened import correction_to, scales
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.symmetry import symmetries
 
-_FAR_DEG = 45.0
-"""A goal that is turned further is turned far. Of 320 corrections at 8 mm and degrees, over the eight scenarios, none
-turned a goal by more than 33 degrees; every one that was longer than the truth, at 25 and 40, did by 56 or more."""
-_FAR = 1.0 + 2.0 * cos(radians(_FAR_DEG))
-"""The trace of such a turn."""
 _SHORTER = 1.0 - 1e-6
 """Squared lengths of two corrections differ if their ratio is below: the rest is rounding."""
 _MOST = 8
 """Operations of which starts are made."""
-
-
-def turned_far(observed: Array, goals: Array) -> NDArray[np.bool_]:
-    """Whether a correction turns a goal so far that a local minimum is to be feared: (*, n, 4, 4) -> (*,)."""
-    traces = np.einsum("...ij,...ij->...", observed[..., :3, :3], goals[..., :3, :3])
-    return np.asarray(traces.min(axis=-1, initial=3.0) < _FAR)
 
 
 def best_start(asked: Problem, first: Solved) -> tuple[Problem, Solved]:
@@ -52,21 +39,19 @@ def best_start(asked: Problem, first: Solved) -> tuple[Problem, Solved]:
         first: What comes of beginning with what was seen.
     """
     observed = asked.goals[0]
-    every = np.ones(len(asked.exact), dtype=np.bool_)
     usable = _holds(asked, first)
-    far = bool(turned_far(observed, first.found.goals))
-    if not far and (usable or _faces_oppose(asked, observed, first.found.goals)):
+    if not first.far and (usable or _faces_oppose(asked, observed, first.goals)):
         return asked, first
     if 6 * len(observed) > LARGEST_POSTERIOR:
         return asked, first
     usable = usable and _is_flush(asked, first)
-    length = float(first.found.z @ first.found.z) * _SHORTER if usable else np.inf
+    length = float(first.z @ first.z) * _SHORTER if usable else np.inf
     for goals in _solutions(asked, _starts(asked, first)):
         begun = _begun_at(asked, goals)
         if begun.begin is None or np.square(begun.begin).sum() >= length:
             break
-        solved = begun.solve(every)[0]
-        if solved.found.z @ solved.found.z < length and _holds(begun, solved) and _is_flush(begun, solved):
+        solved = begun.solve(begun.every)[0]
+        if solved.z @ solved.z < length and _holds(begun, solved) and _is_flush(begun, solved):
             return begun, solved
     return asked, first
 
@@ -77,15 +62,14 @@ def turned_words(asked: Problem, goals: Array) -> str:
         return ""
     R = np.swapaxes(asked.observation.goals[:, :3, :3], 1, 2) @ goals[:, :3, :3]
     angles = np.degrees(np.arccos(np.clip((np.trace(R, axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)))
-    far = [f"operation {k + 1} by {angle:.0f} degrees" for k, angle in enumerate(angles) if angle > _FAR_DEG]
+    far = [f"operation {k + 1} by {angle:.0f} degrees" for k, angle in enumerate(angles) if angle > FAR_DEG]
     return f"; seen turned: {', '.join(far)}" if far else ""
 
 
 def _holds(asked: Problem, solved: Solved) -> bool:
     """Whether every contact holds with faces that look at each other."""
-    found = solved.found
-    holds = found.at_rest and found.finite and largest(solved.gaps) <= asked.observation.gap_m
-    return bool(holds and _faces_oppose(asked, found.goals))
+    holds = solved.at_rest and solved.finite and solved.worst_m <= asked.observation.gap_m
+    return bool(holds and _faces_oppose(asked, solved.goals))
 
 
 def _faces_oppose(asked: Problem, *goals: Array) -> bool:
@@ -95,13 +79,13 @@ def _faces_oppose(asked: Problem, *goals: Array) -> bool:
 
 def _is_flush(asked: Problem, solved: Solved) -> bool:
     """Whether contacts also hold with vertices laid where the goals are: seen edge-on, they lie on one line."""
-    goals = solved.found.goals
+    goals = solved.goals
     return largest(_begun_at(asked, goals).measured(goals[None])[0]) <= asked.observation.gap_m
 
 
 def _begun_at(asked: Problem, goals: Array) -> Problem:
     """The same, begun with goals, (n, 4, 4), and vertices laid there."""
-    return problem(asked.observations, asked.level, asked.compiled, goals[None])
+    return problem(asked.observations, asked.level, asked.kernels is not None, goals[None])
 
 
 def _starts(asked: Problem, first: Solved) -> Array:
@@ -127,11 +111,11 @@ def _doubted(asked: Problem, first: Solved) -> Collection[int]:
     n = len(asked.observation.goals)
     if n <= _MOST:
         return range(n)
-    bad = looking_away(observation.assembly, observation.start, first.found.goals)
+    bad = looking_away(observation.assembly, observation.start, first.goals)
     bad |= ~(first.gaps <= observation.gap_m)
     letters = pattern(observation.assembly).letters[bad] - len(observation.assembly.solids)
     counts = np.bincount(letters[(letters >= 0) & (letters < n)], minlength=n)
-    turned = np.einsum("nij,nij->n", observation.goals[:, :3, :3], first.found.goals[:, :3, :3])
+    turned = np.einsum("nij,nij->n", observation.goals[:, :3, :3], first.goals[:, :3, :3])
     return sorted(np.lexsort((turned, -counts))[:_MOST].tolist())
 
 
@@ -140,13 +124,13 @@ def _solutions(asked: Problem, starts: Array) -> Iterator[Array]:
     observation = asked.observation
     (b, n, *_) = starts.shape
     L = scales(observation.covariance)
-    every = asked.compact
-    laid = laid_contacts(observation.assembly, every.start, every.plane, starts)
-    system = laid.system.among(asked.exact)
+    start = np.array([observation.start[part] for part in observation.assembly.solids]).reshape(-1, 4, 4)
+    laid = laid_contacts(observation.assembly, start, asked.demands.plane, starts)
+    system = laid.system.among(asked.demands.exact)
     z = correction_to(observation.goals, L, starts)
     if 6 * n <= LARGEST_DENSE:
         seen = np.broadcast_to(observation.goals, starts.shape)
-        found = [nearest_goals(system, seen, np.broadcast_to(L, (b, *L.shape)), None, z, asked.compiled)]
+        found = [nearest_goals(system, seen, np.broadcast_to(L, (b, *L.shape)), None, z, asked.kernels)]
     else:
         each = (system.only(i) for i in range(b))
         found = [nearest_goals(part, observation.goals, L, None, at) for part, at in zip(each, z, strict=True)]

@@ -6,7 +6,6 @@ It is timed from the equations and a covariance to goals at rest and their rank,
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
 
@@ -47,7 +46,7 @@ def dense(task: Task) -> Run:
 
     def one_of_one(system: CompactEquations, seen: Array, L: Array) -> NearestGoals:
         found = nearest_goals(system, seen[None], L[None])
-        return replace(found, goals=found.goals[0], Jt=found.Jt[0])
+        return found.at(0)
 
     return _whole(task, one_of_one)
 

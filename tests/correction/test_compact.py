@@ -63,7 +63,7 @@ def test_normal_equations_of_examples(build: Callable[[], scenes.Scene]) -> None
 def test_a_motion_parameter_that_occurs_twice_adds_up() -> None:
     scene = long_words()
     _, small = both(scene)
-    twice = [c for c in range(len(small)) if np.count_nonzero(small.columns[c] == 2) == 2]
+    twice = [c for c in range(len(small)) if np.count_nonzero(small.words.columns[c] == 2) == 2]
     assert twice
     T = scene.goals
     by = 1e-6
@@ -106,13 +106,13 @@ def test_leading_axes_are_single_calls(lead: tuple[int, ...]) -> None:
     B = rng.standard_normal((*lead, n, 6, 6))
     e, blocks = small.blocks(T, B)
     Jt = small.gathered(blocks)
-    words = small.words(T)
+    words = small.words.products(small.constants, T)
     assert Jt.shape == (*lead, 6 * n, 3 * len(small))
     for at in np.ndindex(lead):
         one_e, one_blocks = small.blocks(T[at], B[at])
         assert_allclose(e[at], one_e, rtol=0, atol=1e-15)
         assert_allclose(Jt[at], small.gathered(one_blocks), rtol=0, atol=1e-14)
-        assert_allclose(words[at], small.words(T[at]), rtol=0, atol=1e-15)
+        assert_allclose(words[at], small.words.products(small.constants, T[at]), rtol=0, atol=1e-15)
         assert_allclose(small.residual(T[at]), one_e, rtol=0, atol=1e-16)
 
 
@@ -154,7 +154,8 @@ def test_words_are_relative_poses(seed: int) -> None:
     _, small = both(scene)
     assume(len(small))
     history = placements(scene.assembly, scene.start, scene.goals)
-    for (contact, made, _), word in zip(scene.assembly.relations(), small.words(scene.goals), strict=True):
+    words = small.words.products(small.constants, scene.goals)
+    for (contact, made, _), word in zip(scene.assembly.relations(), words, strict=True):
         a, b = (history[made][end.part] for end in contact)
         assert_allclose(word, pose.inverse(a) @ b, rtol=0, atol=1e-12)
 
@@ -176,7 +177,8 @@ def test_the_word_of_a_contact_is_that_of_its_odls() -> None:
     scene = scenes.pockets()
     _, small = both(scene)
     last = scene.assembly.odls()[-1]
-    assert_allclose(small.words(scene.goals)[-1], pose.inverse(product(last["cube3"], scene.goals)), atol=1e-15)
+    words = small.words.products(small.constants, scene.goals)
+    assert_allclose(words[-1], pose.inverse(product(last["cube3"], scene.goals)), atol=1e-15)
 
 
 def test_no_contacts_and_no_operations() -> None:

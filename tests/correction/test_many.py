@@ -15,7 +15,8 @@ from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Gap
 from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.many import BATCH, correct_many
-from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, laid_contacts
+from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
+from apo_bench.correction.solvers.laid import laid_contacts
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array

@@ -84,7 +84,7 @@ def test_the_length_that_play_leaves_is_that_of_soft_contacts():
     for name in ("stick_in_tower", "pocket_table"):
         seen = replace(look(name, 0), play_m=PLAY_M)
         asked = problem((seen,))
-        system = asked.compact.only(0)
+        system = asked.laid.system.only(0)
         slack_m = fit_deviation(seen.assembly, seen.play_m)
         exact = nearest_goals(system, seen.goals, asked.L[0])
         soft = nearest_goals(system, seen.goals, asked.L[0], slack_m)

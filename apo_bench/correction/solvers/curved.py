@@ -47,7 +47,7 @@ def descended(system: CompactEquations, observed: Array, L: Array, goals: Array)
         curvature, axes = np.linalg.eigh((N.T @ bent + bent.T @ N) / 2.0)
         slope = axes.T @ (N.T @ z + bent.T @ towards)
         step = towards - N @ (axes @ (slope / np.maximum(np.abs(curvature), _FLAT)))
-        z = z + shortened_step(step[None], L[None])[0]
+        z = z + shortened_step(step, L)
         if np.abs(step).max() < STEP:
             break
     return np.asarray(observed @ exp_and_jacobian((L @ z.reshape(-1, 6, 1))[..., 0])[0])

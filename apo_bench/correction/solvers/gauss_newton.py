@@ -18,14 +18,14 @@ how the linear equations are solved is said by a `LinearStep`: dense or sparse m
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Any, NamedTuple, final
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.correction.solvers.compact import CompactEquations
-from apo_bench.correction.solvers.kernels import kernels
+from apo_bench.correction.solvers.kernels import Kernels
 from apo_bench.correction.solvers.linear_step import NEXT, SURE, DenseStep, LinearStep, turn_of
 from apo_bench.correction.solvers.sparse import SparseStep
 from apo_bench.geometry.arrays import Array
@@ -46,17 +46,8 @@ LARGEST_DENSE = 72
 SMALLEST = 1e-300
 
 
-class SolverTurn(NamedTuple):
-    """One turn of the solver: the largest |e| before it, [m], and the length of its step, in standard deviations."""
-
-    gap_m: float
-    step: float
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class NearestGoals:
-    """The result of the solver, for each observation."""
+class NearestGoals(NamedTuple):
+    """The result of the solver: of each observation of a batch, (b, ..), or of one."""
 
     goals: Array
     """(*, n, 4, 4); the seen ones, if a number was not finite on the way."""
@@ -73,28 +64,21 @@ class NearestGoals:
     """(*,)."""
     finite: NDArray[np.bool_]
     """(*,)."""
-    turns: Array
-    """(*, turns, 2): as `SolverTurn` has them; NaN after the last turn of an observation."""
-
-    @property
-    def trace(self) -> tuple[SolverTurn, ...]:
-        """The turns of one observation; of several, the largest numbers of each turn."""
-        turns = self.turns.reshape(-1, *self.turns.shape[-2:])
-        going = turns[:, ~np.isnan(turns[..., 1]).all(axis=0)]
-        return tuple(SolverTurn(gap, step) for gap, step in np.fmax.reduce(going, axis=0).tolist())
+    forms: Array
+    """(*, c, 4): n D_a^-1 D_b of each contact: e of any vertex is this times it."""
+    trace: Sequence[Any]
+    """The turns, of a batch those of each observation: the largest |e| before it, [m], and the largest component of its
+    step, in standard deviations."""
 
     def at(self, i: int) -> NearestGoals:
         """Those of one observation of a batch."""
-        return NearestGoals(*(x[i] for x in self.arrays()))
+        return NearestGoals(*[x[i] for x in self])
 
     def batch(self) -> NearestGoals:
         """Those of one observation as a batch."""
-        fields: list[Any] = [[x] if hasattr(x, "nnz") else x[None] for x in self.arrays()]
+        fields: list[Any] = [[x] if hasattr(x, "nnz") else np.asarray(x)[None] for x in self[:-1]]
+        fields.append([self.trace])
         return NearestGoals(*fields)
-
-    def arrays(self) -> tuple[Any, ...]:
-        """Every field."""
-        return self.goals, self.z, self.e, self.Jt, self.B, self.at_rest, self.finite, self.turns
 
 
 def nearest_goals(
@@ -103,27 +87,23 @@ def nearest_goals(
     L: Array,
     soft_m: Array | None = None,
     begin: Array | None = None,
-    compiled: bool = False,
+    kernels: Kernels | None = None,
 ) -> NearestGoals:
     """Change all goals as little as the contacts ask for.
 
     Args:
-        goals: (*, n, 4, 4), what was seen, world frame, [m].
+        goals: (n, 4, 4), or (b, n, 4, 4), what was seen, world frame, [m].
         L: (*, n, 6, 6), L L^t the covariance of the body twists, [m, rad]; or (*, n, 6, 6 n), of all of them together.
         soft_m: None demands the contacts; otherwise the standard deviation of every equation, (3 c,), [m], 0 for those
             that are demanded, and |z|^2 + |e / soft_m|^2 is least.
         begin: (*, 6 n), the correction to begin with, in standard deviations; None stands for no correction.
-        compiled: Whether kernels are used where Numba is installed.
+        kernels: What is used in place of NumPy.
     """
-    lead = goals.shape[:-3]
-    n = system.n
-    b = math.prod(lead)
-    factor = np.broadcast_to(L, (*lead, *L.shape[-3:])).reshape(b, *L.shape[-3:])
-    z = None if begin is None else begin.reshape(b, 6 * n)
-    found = batch_goals(system, goals.reshape(b, n, 4, 4), factor, soft_m, z, compiled, sparse=False if lead else None)
-    if not lead:
-        return found.at(0)
-    return found if lead == (b,) else NearestGoals(*(x.reshape((*lead, *x.shape[1:])) for x in found.arrays()))
+    if goals.ndim == 4:
+        L = np.broadcast_to(L, (len(goals), *L.shape[-3:]))
+        return batch_goals(system, goals, L, soft_m, begin, kernels, sparse=False)
+    z = None if begin is None else begin[None]
+    return batch_goals(system, goals[None], L[None], soft_m, z, kernels).at(0)
 
 
 def batch_goals(
@@ -132,7 +112,7 @@ def batch_goals(
     L: Array,
     soft_m: Array | None = None,
     begin: Array | None = None,
-    compiled: bool = False,
+    kernels: Kernels | None = None,
     sparse: bool | None = None,
 ) -> NearestGoals:
     """`nearest_goals` of a batch: observed (b, n, 4, 4), L (b, n, 6, 6) or (b, n, 6, 6 n).
@@ -149,7 +129,7 @@ def batch_goals(
     if sparse:
         step = SparseStep(system, observed, L, soft_m)
     else:
-        step = DenseStep(system, observed, L, soft_m, kernels() if compiled else None)
+        step = DenseStep(system, observed, L, soft_m, kernels)
     return _nearest(step, z)
 
 
@@ -160,70 +140,71 @@ def _nearest(step: LinearStep, z: Array) -> NearestGoals:
         z: (b, 6 n), where to begin; overwritten.
     """
     b = len(z)
-    count = 0
+    traces = [list[tuple[float, float]]() for _ in range(b)]
     at_rest = np.zeros(b, dtype=np.bool_)
     finite = np.ones(b, dtype=np.bool_)
-    before = np.full(b, np.inf)
-    turns = np.full((MOST_TURNS, b, 2), np.nan)
-    going = np.arange(b)
-    step.linearise(z, going)
-    while len(going) and count < MOST_TURNS:
-        row_size = step.row_size[going]
-        gap2 = step.gap2[going]
-        sound = np.isfinite(row_size + gap2)
-        if not sound.all():
-            finite[going[~sound]] = False
-            going = going[sound]
-            row_size = row_size[sound]
-            gap2 = gap2[sound]
-        if not len(going):
+    going = list(range(b))
+    rows = np.arange(b)
+    sure, following = step.settled
+    step.linearise(z, rows)
+    for turn in range(MOST_TURNS):
+        gap_m, gap2, row_size = step.sizes.tolist()
+        if not math.isfinite(sum(gap2) + sum(row_size)):
+            finite[[o for o in going if not math.isfinite(gap2[o] + row_size[o])]] = False
+            going = [o for o in going if finite[o]]
+        if not going:
             break
+        if len(going) < len(rows):
+            rows = np.array(going)
         # The step to the shortest z on the linearised contacts, J J^t damped by mu.
-        change, length, turned = step.change(z, damping(row_size, gap2, count), going)
-        turns[count, going, 0] = step.gap_m[going]
-        turns[count, going, 1] = length
-        rest = settles(length, before[going], *step.settled)
-        z[going] += _shortened(change, np.where(rest, 0.0, turned))
-        step.linearise(z, going)
-        at_rest[going] = rest
-        before[going] = length
-        going = going[~rest]
-        count += 1
+        most = min(1.0, FALL**turn)
+        mu = np.array([damping(row_size[o], gap2[o], most) for o in going])
+        change, length, turned = step.change(z, mu, rows)
+        left = []
+        for i, (o, size, angle) in enumerate(zip(going, length.tolist(), turned.tolist(), strict=True)):
+            if size < sure and settles(size, traces[o][-1][1] if turn else math.inf, sure, following):
+                at_rest[o] = True
+            else:
+                left.append(o)
+                if angle > LARGEST_TURN:
+                    change[i] *= LARGEST_TURN / angle
+            traces[o].append((gap_m[o], size))
+        going = left
+        if len(rows) == b:
+            z += change
+        else:
+            z[rows] += change
+        step.linearise(z, rows)
     if not finite.all():
         z[~finite] = 0.0
         step.leave_alone(~finite)
-    return NearestGoals(step.T, z, step.e, step.Jt, step.B, at_rest, finite, np.swapaxes(turns[:count], 0, 1))
+    return NearestGoals(step.T, z, step.e, step.Jt, step.B, at_rest, finite, step.forms, traces)
 
 
-def damping(row_size: Array, gap2: Array, turn: int) -> Array:
-    """mu, (b,), which is added to the diagonal of J J^t.
+def damping(row_size: float, gap2: float, most: float) -> float:
+    """mu, which is added to the diagonal of J J^t.
 
     Args:
-        row_size: (b,), the mean square of the rows of J.
-        gap2: (b,), the mean square of what the equations that are demanded leave.
+        row_size: The mean square of the rows of J.
+        gap2: The mean square of what the equations that are demanded leave.
+        most: What gap2 counts at most, per `row_size`.
     """
-    size = np.maximum(row_size, SMALLEST)
-    share = np.maximum(DAMPING * np.minimum(gap2 / size, min(1.0, FALL**turn)), SQUARED_GAP_FLOOR)
-    return np.maximum(share * size, SMALLEST)
+    size = max(row_size, SMALLEST)
+    share = max(DAMPING * min(gap2 / size, most), SQUARED_GAP_FLOOR)
+    return max(share * size, SMALLEST)
 
 
-def settles(size: Array, before: Array, sure: float = SURE, following: float = NEXT) -> NDArray[np.bool_]:
+def settles(size: float, before: float, sure: float = SURE, following: float = NEXT) -> bool:
     """Whether the step after this one is too short to matter: near a solution steps shrink by a constant factor.
 
     Args:
         sure: Steps shorter than this shrink by a constant factor: the solver rests, too, if the next one would be
             shorter than `following`. Longer ones are not trusted: rounding turns redundant contacts into noise there.
     """
-    return np.asarray((size < STEP) | ((size < sure) & (size * size < following * before)))
+    return size < STEP or (size < sure and size * size < following * before)
 
 
 def shortened_step(step: Array, L: Array) -> Array:
-    """Steps (b, 6 n), shortened where a goal of an observation would turn further than `LARGEST_TURN`."""
-    return _shortened(step, turn_of(step, L))
-
-
-def _shortened(step: Array, turned: Array) -> Array:
-    """The same of steps of which it is known how far they turn a goal at most, (b,), [rad]."""
-    if (turned <= LARGEST_TURN).all():
-        return step
-    return step * np.minimum(1.0, LARGEST_TURN / np.maximum(turned, SMALLEST))[:, None]
+    """A step (6 n,), shortened if a goal would turn further than `LARGEST_TURN`."""
+    (turned,) = turn_of(step[None], L[None]).tolist()
+    return step * (LARGEST_TURN / turned) if turned > LARGEST_TURN else step

@@ -19,7 +19,7 @@ from apo_bench.assembly.lowering import lowered
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.posterior import LARGEST_POSTERIOR, jacobian_rank
 from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
-from apo_bench.correction.solvers.gauss_newton import NearestGoals, damping, settles, shortened_step
+from apo_bench.correction.solvers.gauss_newton import FALL, NearestGoals, damping, settles, shortened_step
 from apo_bench.correction.solvers.linear_step import shortest
 from apo_bench.correction.solvers.whitened import pulled, spread
 from apo_bench.errors import InputError
@@ -31,8 +31,8 @@ _BLIND = 1e-7
 _EXACT = 1e-10
 """How far the program may violate an inequality, in standard deviations."""
 _TURNS = 200
-_SETTLED = 60
-"""The turn as which the equations are damped: they hold already."""
+_SETTLED = FALL**60
+"""The equations are damped as after so many turns: they hold already."""
 _SLOWEST = 1.0 / 64.0
 _GROWS = 1.05
 """The least part of a step that is made, and how much larger that part may be than the one before."""
@@ -119,7 +119,7 @@ def nearest_between(
         )
     known = jacobian_rank(start.Jt)
     before = np.inf
-    turns = list(start.turns)
+    trace = list(start.trace)
     pace = 1.0
     z = start.z
     T = start.goals
@@ -137,11 +137,11 @@ def nearest_between(
         u, room = _program(J_wall, free, inequalities.low - ahead, inequalities.high - ahead)
         step = nearest + free @ u - z
         length = float(np.abs(step).max(initial=0.0))
-        turns.append(np.array([np.abs(e).max(initial=0.0), length]))
-        over = bool(settles(np.array(length), np.array(before)))
+        trace.append((float(np.abs(e).max(initial=0.0)), length))
+        over = settles(length, before)
         rest = over and room
         pace = _paced(pace, step, last)
-        last = step if rest else shortened_step(step[None], L[None])[0]
+        last = step if rest else shortened_step(step, L)
         z = z + (step if rest else pace * last)
         D, Jr = exp_and_jacobian(spread(L, z))
         T = observed @ D
@@ -149,7 +149,7 @@ def nearest_between(
         before = length
         if over:
             break
-    return NearestGoals(T, z, system.residual(T), Jt, B, np.array(rest), np.array(True), np.array(turns))
+    return NearestGoals(T, z, system.residual(T), Jt, B, np.array(rest), np.array(True), system.forms(T), trace)
 
 
 def _settled(e: Array, Jt: Array, z: Array) -> Array:
@@ -158,7 +158,7 @@ def _settled(e: Array, Jt: Array, z: Array) -> Array:
         return np.zeros(len(z))
     J = Jt.T[None]
     m = len(e)
-    mu = damping(np.array([np.square(J).sum() / m]), np.array([e @ e / m]), _SETTLED)
+    mu = damping(float(np.square(J).sum()) / m, float(e @ e) / m, _SETTLED)
     return np.asarray(shortest(J, e[None], z[None], np.full((1, m), mu))[0])
 
 

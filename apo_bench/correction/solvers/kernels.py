@@ -46,6 +46,12 @@ def kernels() -> Kernels | None:
         return None
 
 
+def owned(x: _Array) -> _Array:
+    """An array made contiguous and writable: the compiled code knows one kind of array."""
+    known = x.flags
+    return x if known.c_contiguous and known.writeable else np.array(x, dtype=np.float64, order="C")
+
+
 def linearised(
     words: _Index,
     factors: _Array,
@@ -65,22 +71,21 @@ def linearised(
     B: _Array,
     e: _Array,
     J: _Array,
-    gap_m: _Array,
-    gap2: _Array,
-    row_size: _Array,
+    full: _Array,
+    sizes: _Array,
 ) -> None:
     """Goals T = T_seen exp(L z), the equations e there and their derivative J by z (Eq. 14), of some observations.
 
     Args:
-        words: (3, c, w): letters, columns and inverse (0 or 1) of `CompactEquations`.
+        words: (3, c, w): letters, columns and inverse (0 or 1) of `Words`.
         factors: (2, p + n + 1, 4, 4): all matrices, and their inverses; those of the goals are overwritten.
         points: (b, c, 3, 4); observed (b, n, 4, 4); L (b, n, 6, 6); z (b, 6 n).
         soft2: (3 c,), the variance of each equation, 0 of those that are demanded.
         rows: Which observations.
         series: `geometry.twist.SERIES`; `adjoints` is `geometry.twist.ADJOINTS`.
         six: (6, 6, 6), scratch, as are behind (w + 1, 3, 4) and forms (w + 1, 4).
-        T: (b, n, 4, 4), overwritten, as are B (b, n, 6, 6), J_r L, e (b, 3 c) and J (b, 3 c, 6 n), and their sizes as
-            `LinearStep` has them, (b,) each.
+        T: (b, n, 4, 4), overwritten, as are B (b, n, 6, 6), J_r L, e (b, 3 c), J (b, 3 c, 6 n), full (b, c, 4),
+            n D_a^-1 D_b, and sizes (3, b) as `LinearStep` has them.
     """
     n = observed.shape[1]
     c = len(plane)
@@ -150,9 +155,8 @@ def linearised(
                     factors[1, first + k, i, j] = T[o, k, j, i]
                     t -= T[o, k, j, i] * T[o, k, j, 3]
                 factors[1, first + k, i, 3] = t
-        gap_m[o] = 0.0
-        gap2[o] = 0.0
-        row_size[o] = 0.0
+        for i in range(3):
+            sizes[i, o] = 0.0
         for i in range(c):
             last = w
             while last > 0 and words[0, i, last - 1] == first + n:  # padding
@@ -177,8 +181,8 @@ def linearised(
                 for q in range(4):
                     t += plane[i, q] * behind[0, r, q]
                 e[o, 3 * i + r] = t
-                gap_m[o] = max(gap_m[o], abs(t))
-                gap2[o] += t * t / (3 * c) if soft2[3 * i + r] == 0.0 else 0.0
+                sizes[0, o] = max(sizes[0, o], abs(t))
+                sizes[1, o] += t * t / (3 * c) if soft2[3 * i + r] == 0.0 else 0.0
             # forms[j] = n F_1 .. F_j = (a, .). A letter T has p behind and a before itself: its rows are
             # (a h, p x a) B of points p with last number h; T^-1 stays on the other side, with the opposite sign.
             for d in range(4):
@@ -202,9 +206,11 @@ def linearised(
                             turn = sign * (behind[at, r, x] * forms[at, y] - behind[at, r, y] * forms[at, x])
                             for q in range(6):
                                 J[o, 3 * i + r, 6 * k + q] += shift * B[o, k, d, q] + turn * B[o, k, 3 + d, q]
+            for d in range(4):
+                full[o, i, d] = forms[last, d]
             for r in range(3 * i, 3 * i + 3):
                 for q in range(6 * n):
-                    row_size[o] += J[o, r, q] * J[o, r, q] / (3 * c)
+                    sizes[2, o] += J[o, r, q] * J[o, r, q] / (3 * c)
 
 
 def change(

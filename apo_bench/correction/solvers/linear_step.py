@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
-from apo_bench.correction.solvers.kernels import Kernels
+from apo_bench.correction.solvers.kernels import Kernels, owned
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import ADJOINTS, SERIES, exp_and_jacobian
 
@@ -32,18 +32,18 @@ class LinearStep(Protocol):
     """(b, n, 6, 6) or (b, n, 6, 6 n): what a change of z makes of the body twists at T."""
     e: Array
     """(b, 3 c), [m]."""
-    gap_m: Array
-    """(b,): the largest |e|."""
-    gap2: Array
-    """(b,): the mean square of e of the equations that are demanded."""
-    row_size: Array
-    """(b,): the mean square of the rows of J."""
+    sizes: Array
+    """(3, b): the largest |e|, [m], the mean square of e of the equations that are demanded, that of the rows of J."""
     settled: tuple[float, float]
     """`sure` and `following` of `gauss_newton.settles`."""
 
     @property
     def Jt(self) -> Any:
         """(b, 6 n, 3 c)."""
+
+    @property
+    def forms(self) -> Array:
+        """(b, c, 4): n D_a^-1 D_b of each contact."""
 
     def linearise(self, z: Array, rows: Rows) -> None:
         """Linearise some observations at their z, (b, 6 n)."""
@@ -79,25 +79,30 @@ class DenseStep:
         self.B = np.empty(L.shape)
         self.e = np.empty((b, m))
         self._J = np.empty((b, m, 6 * n))
-        self.gap_m, self.gap2, self.row_size = np.empty((3, b))
+        self.sizes = np.empty((3, b))
         self._kernels = kernels if L.shape[-1] == 6 else None
         if self._kernels is not None:
             points = system.points if system.points.ndim == 4 else np.tile(system.points, (b, 1, 1, 1))
-            self._words, self._factors = system.for_kernels()
-            self._plane, self._points, self._observed, self._L = map(_own, (system.plane, points, observed, L))
-            self._soft2 = _own(self._soft2)
-            width = system.letters.shape[1]
+            self._observed, self._L = owned(observed), owned(L)
+            self._soft2 = owned(self._soft2)
+            self._contacts = system.words.table, np.array(system.constants), owned(system.plane), owned(points)
+            width = system.words.letters.shape[1]
             self._scratch = np.empty((6, 6, 6)), np.empty((width + 1, 3, 4)), np.empty((width + 1, 4))
             self._factor = np.empty((m, m)), np.empty(m)
+            self._forms = np.empty((b, len(system), 4))
 
     @property
     def Jt(self) -> Array:
         return np.swapaxes(self._J, 1, 2)
 
+    @property
+    def forms(self) -> Array:
+        return self._system.forms(self.T) if self._kernels is None else self._forms
+
     def linearise(self, z: Array, rows: Rows) -> None:
         if self._kernels is not None:
-            seen = self._words, self._factors, self._plane, self._points, self._observed, self._L, self._soft2
-            out = self.T, self.B, self.e, self._J, self.gap_m, self.gap2, self.row_size
+            seen = *self._contacts, self._observed, self._L, self._soft2
+            out = self.T, self.B, self.e, self._J, self._forms, self.sizes
             self._kernels.linearised(*seen, z, rows, SERIES, ADJOINTS, *self._scratch, *out)
             return
         # T = T_seen exp(xi) and B = J_r(xi) L, with xi = L z.
@@ -112,9 +117,9 @@ class DenseStep:
         self.B[some] = B
         self.e[some] = e
         self._J[some] = np.swapaxes(Jt, 1, 2)
-        self.gap_m[some] = np.abs(e).max(axis=1, initial=0.0)
-        self.gap2[some] = (e * e) @ (self._soft2 == 0.0) / m
-        self.row_size[some] = np.einsum("bij,bij->b", Jt, Jt) / m
+        self.sizes[0, some] = np.abs(e).max(axis=1, initial=0.0)
+        self.sizes[1, some] = (e * e) @ (self._soft2 == 0.0) / m
+        self.sizes[2, some] = np.einsum("bij,bij->b", Jt, Jt) / m
 
     def change(self, z: Array, mu: Array, rows: Rows) -> tuple[Array, Array, Array]:
         if self._kernels is not None:
@@ -134,8 +139,12 @@ class DenseStep:
         return slice(None) if len(rows) == len(self.T) else rows
 
     def leave_alone(self, which: NDArray[np.bool_]) -> None:
-        self.T[which], self.B[which], self._J[which] = self._observed[which], self._L[which], 0.0
+        self.T[which] = self._observed[which]
+        self.B[which] = self._L[which]
+        self._J[which] = 0.0
         self.e[which] = self._system.only(np.flatnonzero(which)).residual(self.T[which])
+        if self._kernels is not None:
+            self._forms[which] = self._system.forms(self.T[which])
 
 
 def shortest(J: Array, e: Array, z: Array, added: Array) -> Array:
@@ -163,9 +172,3 @@ def turn_of(step: Array, L: Array) -> Array:
     """How far steps (b, 6 n) of z turn a goal at most, (b,), [rad]."""
     turned = twists(step, L[:, :, 3:])
     return np.asarray(np.sqrt((turned * turned).sum(axis=2).max(axis=1, initial=0.0)))
-
-
-def _own(x: Array) -> Array:
-    """An array made contiguous and writable: the compiled code knows one kind of array."""
-    known = x.flags
-    return x if known.c_contiguous and known.writeable else np.array(x, dtype=np.float64, order="C")

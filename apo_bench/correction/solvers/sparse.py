@@ -72,8 +72,8 @@ class Incidence:
 
 def incidence(system: CompactEquations) -> Incidence:
     """The letters of a system that are unknown."""
-    contact, letter = np.nonzero(system.columns < system.n)
-    return Incidence(contact, letter, system.columns[contact, letter], len(system), system.n)
+    contact, letter = np.nonzero(system.words.columns < system.n)
+    return Incidence(contact, letter, system.words.columns[contact, letter], len(system), system.n)
 
 
 def sparse_solver(where: Incidence) -> _Solver:
@@ -105,16 +105,18 @@ class SparseStep:
         self.e = np.zeros((1, len(self._soft2)))
         self.T = observed
         self.B = L
-        self.gap_m, self.gap2, self.row_size = np.zeros((3, 1))
+        self.sizes = np.zeros((3, 1))
         self._blocks = np.zeros((len(self._where.contact), 6, 3))
 
     @property
     def Jt(self) -> list[Any]:
         return [self._where.matrix(self._blocks).T]
 
+    @property
+    def forms(self) -> Array:
+        return self._system.forms(self.T)
+
     def linearise(self, z: Array, rows: NDArray[np.intp]) -> None:
-        if not len(rows):
-            return
         # T = T_seen exp(xi) and B = J_r(xi) L, with xi = L z.
         D, Jr = exp_and_jacobian(twists(z, self._L))
         self.T = self._observed @ D
@@ -122,13 +124,11 @@ class SparseStep:
         e, every = self._system.blocks(self.T[0], self.B[0])
         self.e = e[None]
         self._blocks = every[self._where.contact, self._where.letter]
-        self.gap_m[0] = np.abs(e).max(initial=0.0)
-        self.gap2[0] = (e * e) @ (self._soft2 == 0.0) / max(len(e), 1)
-        self.row_size[0] = np.square(self._blocks).sum() / max(len(e), 1)
+        self.sizes[0] = np.abs(e).max(initial=0.0)
+        self.sizes[1] = (e * e) @ (self._soft2 == 0.0) / max(len(e), 1)
+        self.sizes[2] = np.square(self._blocks).sum() / max(len(e), 1)
 
     def change(self, z: Array, mu: Array, rows: NDArray[np.intp]) -> tuple[Array, Array, Array]:
-        if not len(rows):
-            return z[rows], mu, mu
         wanted = self._where.times(self._blocks, z[0]) - self.e[0]
         step = self._solve(mu[0] + self._soft2, self._blocks, wanted)[None] - z
         return step, np.abs(step).max(axis=1, initial=0.0), turn_of(step, self._L)
