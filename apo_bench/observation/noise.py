@@ -1,17 +1,21 @@
-"""What a noise model is, and how to name one."""
+"""What a noise model is, and how to name one, or to take a plain function `(goals, rng) -> goals` for one."""
 
 import inspect
 import math
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from types import MappingProxyType
-from typing import Any
+from typing import Any, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError, failed, unknown
+from apo_bench.geometry.arrays import Array
 from apo_bench.names import resolve
+from apo_bench.observation.models.isotropic import floored
 from apo_bench.observation.models.level import Level
 from apo_bench.observation.presets import noise_path, presets
 
@@ -24,16 +28,20 @@ NOISES = MappingProxyType(
     {
         "isotropic": "apo_bench.observation.models.isotropic:Isotropic",
         "anisotropic": "apo_bench.observation.models.anisotropic:Anisotropic",
-        "per-part": "apo_bench.observation.models.per_part:PerPart",
+        "per-part": "apo_bench.observation.models.isotropic:PerPart",
         "camera": "apo_bench.observation.models.anisotropic:Sighted",
-        "heavy-tailed": "apo_bench.observation.models.heavy_tailed:HeavyTailed",
+        "heavy-tailed": "apo_bench.observation.models.isotropic:HeavyTailed",
         "outliers": "apo_bench.observation.models.outliers:Outliers",
-        "bias": "apo_bench.observation.models.bias:Bias",
-        "bias-view": "apo_bench.observation.models.bias:BiasView",
-        "correlated": "apo_bench.observation.models.correlated:Correlated",
+        "bias": "apo_bench.observation.models.shared:Bias",
+        "bias-view": "apo_bench.observation.models.shared:BiasView",
+        "correlated": "apo_bench.observation.models.shared:Correlated",
         "symmetric": "apo_bench.observation.models.symmetric:Symmetric",
     }
 )
+
+
+_LIMITS = {"deviation_mm": 10000.0, "deviation_deg": 180.0}
+"""What a function declares as attributes, and the largest that is allowed."""
 
 
 def make_noise(given: Any, level: Level) -> Noise:
@@ -64,25 +72,23 @@ def make_noise(given: Any, level: Level) -> Noise:
     model = resolve(given, NOISES, "noise model")
     name = given if isinstance(given, str) else getattr(model, "__name__", type(model).__name__)
     try:
-        return _made(model, name, level)
+        return _noise(model, name, level)
     except InputError:
         raise
     except Exception as error:
         raise failed(f"the noise model '{name}'", error) from error
 
 
-def _made(model: Any, name: str, level: Level) -> Noise:
+def _noise(model: Any, name: str, level: Level) -> Noise:
     """What can be called, from what a name stands for."""
     if isinstance(model, type):
         _check(model, 1, f"the noise model '{name}' is a class that cannot be made with one argument, the level")
         model = model(level)
     if _takes(model, 2) and (hasattr(model, "deviation_mm") or not _takes(model, 3)):
-        from apo_bench.observation.models.plain import declared
-
         return declared(model, name)
     _check(model, 3, f"the noise model '{name}' cannot be called with (assembly, shown, rng)")
-    made: Noise = model
-    return made
+    noise: Noise = model
+    return noise
 
 
 def _unknown(given: str, names: Iterable[str]) -> str:
@@ -92,8 +98,8 @@ def _unknown(given: str, names: Iterable[str]) -> str:
             f"unknown noise model '{given}'; did you mean 'empirical:{given}'? That takes residuals, which "
             "`apo-bench noise fit --residuals` writes; its --out writes a noise file, whose name ends in .toml."
         )
-    said = unknown("noise model", given, (*names, "empirical:FILE.csv", "FILE.toml"))
-    return said + " Or give your own as 'package.module:name'."
+    sentence = unknown("noise model", given, (*names, "empirical:FILE.csv", "FILE.toml"))
+    return sentence + " Or give your own as 'package.module:name'."
 
 
 def _takes(model: Any, arguments: int) -> bool:
@@ -108,3 +114,49 @@ def _takes(model: Any, arguments: int) -> bool:
 def _check(model: Any, arguments: int, complaint: str) -> None:
     if not _takes(model, arguments):
         raise InputError(f"{complaint}; give a function (assembly, shown, rng) -> Observation.")
+
+
+@final
+@dataclass(frozen=True)
+class Plain:
+    """The function's goals, all of them seen, with the deviations that it declares along and about every axis."""
+
+    function: Callable[[Array, np.random.Generator], ArrayLike]
+    """(n, 4, 4), world frame, [m], and chance; returns as many goals. It is given a copy."""
+    deviation_mm: float
+    deviation_deg: float
+
+    def __post_init__(self) -> None:
+        for field, largest in _LIMITS.items():
+            given = getattr(self, field)
+            number = isinstance(given, int | float | np.floating | np.integer) and not isinstance(given, bool)
+            if not number or not math.isfinite(given) or not 0.0 <= given <= largest:
+                raise InputError(
+                    f"the noise model '{self.__name__}' declares {field} {given!r}; a number from 0 to {largest:g} is "
+                    "allowed."
+                )
+
+    @property
+    def __name__(self) -> str:
+        return str(getattr(self.function, "__name__", type(self.function).__name__))
+
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
+        goals = np.array(self.function(demonstration.goals.copy(), rng), dtype=np.float64)
+        sigma = np.repeat([self.deviation_mm * 1e-3, np.radians(self.deviation_deg)], 3)
+        stated = floored(np.diag(sigma**2) + demonstration.careless)
+        return Observation(assembly, demonstration.start, goals, stated, np.ones(len(assembly), dtype=np.bool_))
+
+
+def declared(function: Any, name: str) -> Plain:
+    """A function with what it declares as its attributes `deviation_mm` and `deviation_deg`.
+
+    Raises:
+        InputError: It declares none, or what makes no sense.
+    """
+    missing = [field for field in _LIMITS if not hasattr(function, field)]
+    if missing:
+        raise InputError(
+            f"the noise model '{name}' is a function (goals, rng) that does not say how large its errors are; set "
+            f"{' and '.join(f'{name}.{field}' for field in missing)}, or give (assembly, shown, rng) -> Observation."
+        )
+    return Plain(function, function.deviation_mm, function.deviation_deg)

@@ -10,7 +10,14 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.empirical import Empirical, empirical_noise
-from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST, ConstantError, Fitted, MeasuredNoise, ViewNoise
+from apo_bench.observation.models.fitted import (
+    LEAST_FREEDOM,
+    SMALLEST_SCALE,
+    ConstantError,
+    Fitted,
+    MeasuredNoise,
+    ViewNoise,
+)
 from apo_bench.observation.models.level import Level
 from apo_bench.observation.models.tails import Split, Tail
 from apo_bench.observation.presets import noise_path
@@ -144,7 +151,7 @@ def _split(node: JsonNode, unit: str, largest: float) -> Split:
     keys = node.fields((f"limit_{unit}", *(key for pair in tails for key in pair)))
     limit = _number(keys[f"limit_{unit}"], 1e-3, largest)
     across, along = (
-        Tail(_number(keys[scale], 0.9 * SMALLEST * limit, limit), _number(keys[freedom], LEAST_FREEDOM, math.inf))
+        Tail(_number(keys[scale], 0.9 * SMALLEST_SCALE * limit, limit), _number(keys[freedom], LEAST_FREEDOM, math.inf))
         for scale, freedom in tails
     )
     return Split(across, along, limit)

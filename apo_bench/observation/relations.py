@@ -35,7 +35,7 @@ Relations = Callable[[Assembly, Poses, Array, np.random.Generator], Assembly]
 _OPPOSED_RAD = math.radians(10.0)
 """Faces look at each other if one normal is this near to the opposite of the other."""
 TOUCHING_M = 0.5e-3
-NEAR_M = 15e-3
+NEAR_FACES_M = 15e-3
 """Faces that are closer touch, or nearly; faces that are farther apart nobody takes for a contact."""
 _COVERED_M2 = 25e-6
 """Faces that cover less of each other do not meet, (5 mm)^2."""
@@ -124,7 +124,7 @@ def false(assembly: Assembly, start: Poses, goals: Array, rng: np.random.Generat
     each other at all; an assembly without even those is left as it is.
     """
     pairs = list(_facing(assembly, start, goals))
-    near = [pair for pair in pairs if pair.covered and pair.apart_m < NEAR_M]
+    near = [pair for pair in pairs if pair.covered and pair.apart_m < NEAR_FACES_M]
     if near:
         chosen = near[int(rng.integers(len(near)))]
     elif pairs:
@@ -148,8 +148,7 @@ class Shifted:
         k, contact = _any(assembly, rng)
         part, old = contact.environment
         sign = (1.0, -1.0)[int(rng.integers(2))]
-        face = assembly.face_of(contact.environment)
-        new = _moved(face, f"{old}_shifted", _across(face, rng) * self.size_m * sign)
+        new = _moved(assembly.face_of(contact.environment), f"{old}_shifted", self.size_m * sign, rng)
         instead = Contact(contact.manipulated, PartFace(part, new.name))
         solids = {**assembly.solids, part: _with_face(assembly.solids[part], new)}
         contacts = tuple(instead if c == contact else c for c in assembly.operations[k].contacts)
@@ -191,12 +190,12 @@ def _facing(assembly: Assembly, start: Poses, goals: Array) -> Iterator[_Pair]:
                         if apart is not None and contact not in assembly.operations[k].contacts:
                             area = overlap(a, poses[part], b, poses[other]).area
                             yield _Pair(k, contact, apart, area > _COVERED_M2)
-                for one, another in round_pairs(assembly.solids[part], assembly.solids[other]):
-                    contact = Contact(PartFace(part, one.name), PartFace(other, another.name))
-                    found = measure_round(one, poses[part], another, poses[other])
-                    near = found.angle_rad < _OPPOSED_RAD and found.gap_m > TOUCHING_M
+                for c, d in round_pairs(assembly.solids[part], assembly.solids[other]):
+                    contact = Contact(PartFace(part, c.name), PartFace(other, d.name))
+                    measured = measure_round(c, poses[part], d, poses[other])
+                    near = measured.angle_rad < _OPPOSED_RAD and measured.gap_m > TOUCHING_M
                     if near and contact not in assembly.operations[k].contacts:
-                        yield _Pair(k, contact, found.gap_m, found.share > _SHARED)
+                        yield _Pair(k, contact, measured.gap_m, measured.share > _SHARED)
 
 
 def _apart(a: Face, T_a: Array, b: Face, T_b: Array) -> float | None:
@@ -207,17 +206,13 @@ def _apart(a: Face, T_a: Array, b: Face, T_b: Array) -> float | None:
     return apart if apart > TOUCHING_M else None
 
 
-def _across(face: Face | RoundFace, rng: np.random.Generator) -> Array:
-    """The normal of a flat face; any direction across the axis of a round one, (3,)."""
-    if isinstance(face, Face):
-        return face.normal
-    turn = rng.uniform(0.0, 2.0 * math.pi)
-    return np.asarray(math.cos(turn) * face.frame[:3, 0] + math.sin(turn) * face.frame[:3, 1])
-
-
-def _moved(face: Face | RoundFace, name: str, by: Array) -> Face | RoundFace:
+def _moved(face: Face | RoundFace, name: str, size_m: float, rng: np.random.Generator) -> Face | RoundFace:
+    """A flat face moved along its normal, a round one across its axis in any direction."""
     if isinstance(face, RoundFace):
-        return replace(face, name=name, point=face.point + by)
+        turn = rng.uniform(0.0, 2.0 * math.pi)
+        across = math.cos(turn) * face.frame[:3, 0] + math.sin(turn) * face.frame[:3, 1]
+        return replace(face, name=name, point=face.point + across * size_m)
+    by = face.normal * size_m
     return Face(name, face.outline + by, tuple(hole + by for hole in face.holes), face.fit)
 
 

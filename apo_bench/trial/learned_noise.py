@@ -16,7 +16,7 @@ from apo_bench.correction.learning.likelihood import LearnedNoise, Shown, learn_
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.observation.fitting.components import COMPONENTS, factors, view_ways
+from apo_bench.observation.fitting.components import COMPONENTS, component_factors, view_ways
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.fitted import ConstantError, MeasuredNoise, ViewNoise, view_frame
 from apo_bench.observation.models.residuals import INLIER_MM, TURNED_DEG
@@ -73,7 +73,7 @@ def learn(observations: Sequence[Observation], camera: Camera, source: str, *, c
         n = len(one.goals)
         unseen = frozenset(np.flatnonzero(~one.seen).tolist())
         others = [gross ^ {k} for k in range(n) if k not in unseen]
-        F = factors(camera, correction.goals, P)
+        F = component_factors(camera, correction.goals, P)
         ways = view_ways(correction.goals, P)
         shown.append(Shown(readings(one, correction.goals, [gross, *others]), F, ways, n, unseen))
     start = [typical[0 if component.unit == "mm" else 1] for component in COMPONENTS]

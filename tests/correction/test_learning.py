@@ -19,8 +19,8 @@ from apo_bench.correction.learning.likelihood import Shown
 from apo_bench.errors import InputError
 from apo_bench.files.json_forms import observation_form, write_form
 from apo_bench.geometry import pose
-from apo_bench.observation.fitting.components import COMPONENTS, factors, view_ways
-from apo_bench.observation.models.anisotropic import ACROSS, ALONG, IN_IMAGE, OUT_OF_IMAGE
+from apo_bench.observation.fitting.components import COMPONENTS, component_factors, view_ways
+from apo_bench.observation.models.anisotropic import ACROSS_SIGHT, ALONG_SIGHT, IN_IMAGE, OUT_OF_IMAGE
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.fitted import view_frame
 from apo_bench.observation.noise import Level, make_noise
@@ -73,7 +73,7 @@ def test_the_deviations_and_the_rate_of_outliers_come_back() -> None:
     """36 demonstrations: the truth is within four fifths of an interval beyond its ends, and intervals are short."""
     observations, realised = many(GROSS, False)
     found = learn(observations, Camera(), "made").noise
-    for estimate, true in zip(found.deviations, (ACROSS, ALONG, OUT_OF_IMAGE, IN_IMAGE), strict=False):
+    for estimate, true in zip(found.deviations, (ACROSS_SIGHT, ALONG_SIGHT, OUT_OF_IMAGE, IN_IMAGE), strict=False):
         assert estimate.value == pytest.approx(true, rel=0.2)
         assert estimate.low < estimate.value < estimate.high < 1.5 * estimate.low
     assert found.deviations[4].low == found.deviations[5].low == 0.0
@@ -115,7 +115,7 @@ def test_the_slope_of_the_likelihood_is_that_of_its_values() -> None:
     for seed in range(3):
         observation, _ = seen("stick_in_tower", seed, gross=0.5)
         goals = np.array(shown("stick_in_tower", seed).goals)
-        F = factors(camera, goals, view_frame(camera, [goals]))
+        F = component_factors(camera, goals, view_frame(camera, [goals]))
         ways = view_ways(goals, view_frame(camera, [goals]))
         some = readings(observation, goals, [(), (1,), (0, 2)])
         prepared.append(likelihood._prepared(Shown(some, F, ways, 3)))

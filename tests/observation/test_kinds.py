@@ -15,14 +15,12 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.symmetry import symmetries
-from apo_bench.observation.models import bias
+from apo_bench.observation.models import shared
 from apo_bench.observation.models.anisotropic import Sighted, line_of_sight
-from apo_bench.observation.models.bias import Bias, BiasView
-from apo_bench.observation.models.camera import DISTANCE_M, WORKSPACE_MIDDLE_M, Camera
-from apo_bench.observation.models.correlated import CORRELATION, Correlated
-from apo_bench.observation.models.heavy_tailed import FREEDOM, HeavyTailed
-from apo_bench.observation.models.isotropic import Isotropic
-from apo_bench.observation.models.outliers import MISSES, OUTLIERS, TIMES, UNSEEN_DEVIATION, Outliers, last_seen
+from apo_bench.observation.models.camera import CAMERA_DISTANCE_M, WORKSPACE_MIDDLE_M, Camera
+from apo_bench.observation.models.isotropic import FREEDOM, HeavyTailed, Isotropic
+from apo_bench.observation.models.outliers import MISSES, OUTLIER_TIMES, OUTLIERS, UNSEEN_DEVIATION, Outliers, last_seen
+from apo_bench.observation.models.shared import CORRELATION, Bias, BiasView, Correlated
 from apo_bench.observation.models.symmetric import WORSE, AnyTurn, Symmetric
 from apo_bench.observation.noise import NOISES, Level, Noise, make_noise
 from apo_bench.observation.observing import observe
@@ -46,7 +44,7 @@ def test_the_default_camera_looks_at_the_middle_as_anisotropic_does() -> None:
     T = Camera().T_world_camera
     assert_allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-15)
     assert np.linalg.det(T[:3, :3]) == pytest.approx(1.0)
-    assert_allclose(T[:3, 3] + DISTANCE_M * T[:3, 2], WORKSPACE_MIDDLE_M, atol=1e-15)
+    assert_allclose(T[:3, 3] + CAMERA_DISTANCE_M * T[:3, 2], WORKSPACE_MIDDLE_M, atol=1e-15)
     assert_allclose(T[:3, 2], line_of_sight(), atol=1e-15)
     assert T[2, 0] == 0.0
     assert T[2, 1] < 0.0  # y points down
@@ -137,7 +135,7 @@ def test_outliers_and_misses_are_as_frequent_and_as_large_as_declared() -> None:
     n = len(unit)
     for share, found in ((OUTLIERS, gross.mean()), (MISSES, 1 - seen.mean())):
         assert abs(found - share) < 5 * np.sqrt(share * (1 - share) / n)
-    for chosen, times in ((seen & ~gross, 1.0), (seen & gross, TIMES)):
+    for chosen, times in ((seen & ~gross, 1.0), (seen & gross, OUTLIER_TIMES)):
         rms = np.sqrt(np.mean(unit[chosen] ** 2))
         assert abs(rms / times - 1) < 5 / np.sqrt(12 * chosen.sum())
 
@@ -194,7 +192,7 @@ def test_the_same_operations_are_missed_at_every_level_but_zero() -> None:
 
 
 def test_a_part_has_one_bias_in_all_its_operations(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bias, "OWN", 0.0)
+    monkeypatch.setattr(shared, "OWN", 0.0)
     for seed in range(20):
         xi = twists(see(Bias(LEVEL), seed))
         assert_allclose(xi[CUBE_TWICE[0]], xi[CUBE_TWICE[1]], atol=1e-12)
@@ -203,7 +201,7 @@ def test_a_part_has_one_bias_in_all_its_operations(monkeypatch: pytest.MonkeyPat
 
 def test_a_bias_of_the_view_leaves_parts_to_each_other_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
     """Every displacement in the world, T_seen T^-1, is the same; about the middle it is as large as the level."""
-    monkeypatch.setattr(bias, "OWN", 0.0)
+    monkeypatch.setattr(shared, "OWN", 0.0)
     size = []
     for seed in range(400):
         seen = see(BiasView(LEVEL), seed)

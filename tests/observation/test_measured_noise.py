@@ -224,7 +224,7 @@ def test_residuals_of_turned_parts_are_left_out(folder: Path, tmp_path: Path) ->
 
 
 def test_many_residuals_are_thinned(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("apo_bench.observation.models.empirical.MOST_ROWS", 150)
+    monkeypatch.setattr("apo_bench.observation.models.empirical.MOST_RESIDUALS", 150)
     lines = residuals_text(residuals_of(folder, WHOLE)).splitlines()
     whole = (folder / "whole.csv").read_text(encoding="utf-8").splitlines()
     assert lines == [whole[0], *whole[1::3]]

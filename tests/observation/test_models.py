@@ -11,9 +11,15 @@ from numpy.testing import assert_allclose, assert_array_equal
 from apo_bench.assembly.goals import Observation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.observation.models.anisotropic import ACROSS, ALONG, IN_IMAGE, OUT_OF_IMAGE, Anisotropic, line_of_sight
-from apo_bench.observation.models.isotropic import Isotropic
-from apo_bench.observation.models.per_part import LEAST, MOST, PerPart, factors
+from apo_bench.observation.models.anisotropic import (
+    ACROSS_SIGHT,
+    ALONG_SIGHT,
+    IN_IMAGE,
+    OUT_OF_IMAGE,
+    Anisotropic,
+    line_of_sight,
+)
+from apo_bench.observation.models.isotropic import LEAST_FACTOR, MOST_FACTOR, Isotropic, PerPart, part_factors
 from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.observation.observing import observe
 from tests import scenes
@@ -58,7 +64,7 @@ def test_draws_differ_along_the_sight_and_across_it() -> None:
         world.append(np.stack([np.einsum("nij,nj->ni", R, half) for half in (xi[:, :3], xi[:, 3:])]))
     for half, (along, across), sigma in zip(
         np.concatenate(world, axis=1),
-        ((ALONG, ACROSS), (IN_IMAGE, OUT_OF_IMAGE)),
+        ((ALONG_SIGHT, ACROSS_SIGHT), (IN_IMAGE, OUT_OF_IMAGE)),
         (3e-3, np.radians(6.0)),
         strict=True,
     ):
@@ -82,9 +88,12 @@ def test_the_line_of_sight_is_fixed_in_the_world() -> None:
 def test_the_geometric_mean_is_that_of_isotropic() -> None:
     """Determinants: 0.91 of the level for positions, the level itself for turns."""
     seen = see(Anisotropic(LEVEL), 0)
-    for half, expected in ((slice(0, 3), (ALONG * ACROSS**2) ** (1 / 3) * 3e-3), (slice(3, 6), np.radians(6.0))):
+    for half, expected in (
+        (slice(0, 3), (ALONG_SIGHT * ACROSS_SIGHT**2) ** (1 / 3) * 3e-3),
+        (slice(3, 6), np.radians(6.0)),
+    ):
         assert_allclose(np.linalg.det(seen.covariance[:, half, half]) ** (1 / 6), expected, rtol=1e-9)
-    assert_allclose((ALONG * ACROSS**2) ** (1 / 3), 0.909, atol=1e-3)
+    assert_allclose((ALONG_SIGHT * ACROSS_SIGHT**2) ** (1 / 3), 0.909, atol=1e-3)
 
 
 def test_a_part_is_as_bad_in_every_operation() -> None:
@@ -95,7 +104,7 @@ def test_a_part_is_as_bad_in_every_operation() -> None:
     assert_allclose(ratio, np.tile(ratio[:, :1], (1, 6)), rtol=1e-6)
     rng = np.random.default_rng(8)
     rng.standard_normal((3, 6))
-    factor = factors(TOWER.assembly.solids, rng)
+    factor = part_factors(TOWER.assembly.solids, rng)
     assert_allclose(ratio[:, 0], [factor[o.main] for o in TOWER.assembly.operations], rtol=1e-6)
     assert_allclose(seen.covariance, ratio[:, :1, None] ** 2 * plain.covariance, rtol=1e-6)
 
@@ -103,8 +112,8 @@ def test_a_part_is_as_bad_in_every_operation() -> None:
 def test_factors_are_log_uniform() -> None:
     from scipy.stats import kstest
 
-    drawn = np.log(list(factors([str(i) for i in range(2000)], np.random.default_rng(2)).values()))
-    assert kstest(drawn, "uniform", (np.log(LEAST), np.log(MOST) - np.log(LEAST))).pvalue > 1e-3
+    drawn = np.log(list(part_factors([str(i) for i in range(2000)], np.random.default_rng(2)).values()))
+    assert kstest(drawn, "uniform", (np.log(LEAST_FACTOR), np.log(MOST_FACTOR) - np.log(LEAST_FACTOR))).pvalue > 1e-3
 
 
 @pytest.mark.parametrize(

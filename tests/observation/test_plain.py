@@ -15,8 +15,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.isotropic import COVARIANCE_FLOOR
-from apo_bench.observation.models.plain import Plain
-from apo_bench.observation.noise import NOISES, Level, make_noise
+from apo_bench.observation.noise import NOISES, Level, Plain, make_noise
 from apo_bench.observation.observing import observe
 from apo_bench.observation.presets import presets
 from apo_bench.show.noise_card import draw_errors, facts, listed_models, model_description, noise_card

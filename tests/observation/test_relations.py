@@ -14,7 +14,7 @@ from apo_bench.assembly.graph import relation_graph
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.errors import InputError
 from apo_bench.observation.relations import (
-    NEAR_M,
+    NEAR_FACES_M,
     TOUCHING_M,
     Shifted,
     culprit,
@@ -85,7 +85,7 @@ def test_a_false_contact_is_plausible(name: str) -> None:
         apart = system.gaps(s.goals)[[r.contact == contact and r.made == made for r in wrong.relations()]]
         assert apart > TOUCHING_M
         if name in ("carried_bridge", "pocket_table"):
-            assert apart < NEAR_M
+            assert apart < NEAR_FACES_M
 
 
 def test_the_culprit_is_the_relation_of_the_graph_that_is_told() -> None:

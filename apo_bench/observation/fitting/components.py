@@ -10,7 +10,7 @@ from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.fitted import LEVEL_UNITS
 
 
-class Component(NamedTuple):
+class NoiseComponent(NamedTuple):
     """A part of the noise with one unknown deviation."""
 
     name: str
@@ -19,16 +19,16 @@ class Component(NamedTuple):
 
 
 COMPONENTS = (
-    Component("across the ray", "mm"),
-    Component("along the ray", "mm"),
-    Component("tilt, across the ray", "deg"),
-    Component("turn about the ray", "deg"),
-    Component("shift of the whole view", "mm"),
-    Component("turn of the whole view", "deg"),
+    NoiseComponent("across the ray", "mm"),
+    NoiseComponent("along the ray", "mm"),
+    NoiseComponent("tilt, across the ray", "deg"),
+    NoiseComponent("turn about the ray", "deg"),
+    NoiseComponent("shift of the whole view", "mm"),
+    NoiseComponent("turn of the whole view", "deg"),
 )
 
 
-def factors(camera: Camera, goals: Array, P: Array) -> tuple[Array, ...]:
+def component_factors(camera: Camera, goals: Array, P: Array) -> tuple[Array, ...]:
     """F of each of `COMPONENTS`, (6 n, r): the body twists of goals (n, 4, 4), in mm and deg, are F e if it is 1.
 
     Args:

@@ -7,7 +7,7 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
-from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST, MeasuredNoise
+from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST_SCALE, MeasuredNoise
 from apo_bench.observation.models.residuals import INLIER_MM, TURNED_DEG, Residuals
 from apo_bench.observation.models.tails import Split, log_density_across, log_density_along, of_numbers
 
@@ -81,10 +81,10 @@ def fit_split(errors: Array, limit: float, name: str = "errors") -> Split:
 
     r = np.linalg.norm(errors[:, :2], axis=1)
     x = errors[:, 2]
-    if max(np.median(r), np.median(np.abs(x))) <= SMALLEST * limit:
+    if max(np.median(r), np.median(np.abs(x))) <= SMALLEST_SCALE * limit:
         raise InputError(
             f"the {name} that were estimated are the true ones, or nearly: half of them are off by less than "
-            f"{SMALLEST * limit:g}; give the estimates of an estimator."
+            f"{SMALLEST_SCALE * limit:g}; give the estimates of an estimator."
         )
 
     def surprise(at: Array) -> float:
@@ -92,9 +92,9 @@ def fit_split(errors: Array, limit: float, name: str = "errors") -> Split:
         seen = log_density_across(split.across, r).mean() + log_density_along(split.along, x).mean()
         return float(np.log(max(split.inside, 1e-300)) - seen)
 
-    low = np.log(SMALLEST * limit)
+    low = np.log(SMALLEST_SCALE * limit)
     high = np.log(limit)
-    start = [np.log(max(size, SMALLEST * limit)) for size in (np.median(r) / 1.18, np.median(np.abs(x)) / 0.675)]
+    start = [np.log(max(size, SMALLEST_SCALE * limit)) for size in (np.median(r) / 1.18, np.median(np.abs(x)) / 0.675)]
     best = minimize(
         surprise,
         [start[0], 0.15, start[1], 0.15],

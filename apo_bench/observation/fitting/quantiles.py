@@ -6,7 +6,7 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
-from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST
+from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST_SCALE
 from apo_bench.observation.models.tails import Split, Tail, of_numbers
 
 LOWER_QUARTILE_OF_THREE = 1.10115
@@ -45,7 +45,7 @@ def split_of_quantiles(across: Mapping[float, float], along: Mapping[float, floa
         return np.asarray(np.log(np.concatenate(found)) - target)
 
     start = [np.log(np.median([*across.values()])), 0.3, np.log(np.median([*along.values()])), 0.3]
-    low = [np.log(SMALLEST * limit), 0.0] * 2
+    low = [np.log(SMALLEST_SCALE * limit), 0.0] * 2
     best = least_squares(off, start, bounds=(low, [np.log(limit), 1.0 / LEAST_FREEDOM] * 2), diff_step=1e-4)
     return of_numbers(best.x, limit)
 

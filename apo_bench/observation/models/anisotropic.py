@@ -9,12 +9,18 @@ from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.observation.models.camera import AZIMUTH_DEG, DISTANCE_M, ELEVATION_DEG, WORKSPACE_MIDDLE_M, Camera
+from apo_bench.observation.models.camera import (
+    CAMERA_AZIMUTH_DEG,
+    CAMERA_DISTANCE_M,
+    CAMERA_ELEVATION_DEG,
+    WORKSPACE_MIDDLE_M,
+    Camera,
+)
 from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Facts, Level
 
-ALONG = 3.0
-ACROSS = 0.5
+ALONG_SIGHT = 3.0
+ACROSS_SIGHT = 0.5
 """Standard deviation of a position over the level, along the line of sight and across it."""
 OUT_OF_IMAGE = 2.0**0.5
 IN_IMAGE = 0.5
@@ -40,22 +46,23 @@ class Anisotropic:
         title="worse along one line of sight, the same for all parts",
         formula=(
             "T_seen = T exp(xi), xi = (R_seen^t S1 e, R^t S2 e')",
-            f"S1 = L ({ACROSS:g} (I - s s^t) + {ALONG:g} s s^t)",
+            f"S1 = L ({ACROSS_SIGHT:g} (I - s s^t) + {ALONG_SIGHT:g} s s^t)",
             f"S2 = L ({OUT_OF_IMAGE:.3g} (I - s s^t) + {IN_IMAGE:g} s s^t)",
         ),
         frame="of the world, in which the line of sight s is fixed",
         parameters=(
-            f"s = down from {ELEVATION_DEG:g} deg above the table, {AZIMUTH_DEG:g} deg from the x axis",
-            f"{ALONG:g} and {ACROSS:g}: position over the level, along s and across it",
+            f"s = down from {CAMERA_ELEVATION_DEG:g} deg above the table, {CAMERA_AZIMUTH_DEG:g} deg from the x axis",
+            f"{ALONG_SIGHT:g} and {ACROSS_SIGHT:g}: position over the level, along s and across it",
             f"{OUT_OF_IMAGE:.3g} and {IN_IMAGE:g}: turn over the level, about axes across s and about s",
         ),
         states="R^t S S R with R as seen, which is exact",
     )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
+        # As in the docstring: first the turn, w = R^t S2 e'; then the shift in the frame that is seen, R_seen^t S1 e.
         sight = line_of_sight()
         unit = rng.standard_normal((len(assembly), 6))
-        place = self.level.mm * 1e-3 * _stretch(sight, ALONG, ACROSS)
+        place = self.level.mm * 1e-3 * _stretch(sight, ALONG_SIGHT, ACROSS_SIGHT)
         turn = np.radians(self.level.deg) * _stretch(sight, IN_IMAGE, OUT_OF_IMAGE)
         rotation = np.zeros((len(assembly), 6))
         rotation[:, 3:] = np.einsum("nji,nj->ni", demonstration.goals[:, :3, :3], unit[:, 3:] @ turn)
@@ -78,8 +85,8 @@ class Sighted:
 
     level: Level
     camera: Camera = field(default_factory=Camera)
-    across: float = ACROSS
-    along: float = ALONG
+    across: float = ACROSS_SIGHT
+    along: float = ALONG_SIGHT
     tilt: float = OUT_OF_IMAGE
     about: float = IN_IMAGE
 
@@ -87,15 +94,16 @@ class Sighted:
         title="a camera with a place: errors along, across and about the ray to each part",
         formula=(
             "T_seen = T exp(xi), xi = (R_seen^t F d, R^t F w)",
-            f"d = L ({ACROSS:g} e1, {ACROSS:g} e2, {ALONG:g} e3), w = L ({OUT_OF_IMAGE:.3g} e4, "
+            f"d = L ({ACROSS_SIGHT:g} e1, {ACROSS_SIGHT:g} e2, {ALONG_SIGHT:g} e3), w = L ({OUT_OF_IMAGE:.3g} e4, "
             f"{OUT_OF_IMAGE:.3g} e5, {IN_IMAGE:g} e6)",
         ),
         frame="F of the ray from the camera to the origin of the part: the axes of the camera (OpenCV), turned the "
         "shortest way until z is the ray",
         parameters=(
-            f"camera = {DISTANCE_M:g} m from ({', '.join(f'{x:g}' for x in WORKSPACE_MIDDLE_M)}) m in the world, at "
-            f"which it looks, {ELEVATION_DEG:g} deg above the table and {AZIMUTH_DEG:g} deg from the x axis",
-            f"across = {ACROSS:g}, along = {ALONG:g}: of the position over the level, per axis",
+            f"camera = {CAMERA_DISTANCE_M:g} m from ({', '.join(f'{x:g}' for x in WORKSPACE_MIDDLE_M)}) m in the "
+            f"world, at which it looks, {CAMERA_ELEVATION_DEG:g} deg above the table and {CAMERA_AZIMUTH_DEG:g} deg "
+            "from the x axis",
+            f"across = {ACROSS_SIGHT:g}, along = {ALONG_SIGHT:g}: of the position over the level, per axis",
             f"tilt = {OUT_OF_IMAGE:.3g}, about = {IN_IMAGE:g}: of the turn over the level, per axis out of the image, "
             "and in it",
         ),
@@ -114,9 +122,7 @@ class Sighted:
 
 def line_of_sight() -> Array:
     """The direction in which the camera looks, world frame, (3,), of length 1: obliquely down."""
-    up = np.radians(ELEVATION_DEG)
-    round_z = np.radians(AZIMUTH_DEG)
-    return -np.array([np.cos(up) * np.cos(round_z), np.cos(up) * np.sin(round_z), np.sin(up)])
+    return Camera().T_world_camera[:3, 2]
 
 
 def _stretch(axis: Array, along: float, across: float) -> Array:

@@ -14,12 +14,11 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.pose import is_rigid
 
-WORKSPACE_MIDDLE_M = np.array([0.12, 0.0, 0.03])
+WORKSPACE_MIDDLE_M = frozen([0.12, 0.0, 0.03], 3)
 """What the default camera looks at, in the world, [m]: the middle of where assemblies stand on the table."""
-WORKSPACE_MIDDLE_M.flags.writeable = False
-DISTANCE_M = 0.9
-ELEVATION_DEG = 40.0
-AZIMUTH_DEG = 25.0
+CAMERA_DISTANCE_M = 0.9
+CAMERA_ELEVATION_DEG = 40.0
+CAMERA_AZIMUTH_DEG = 25.0
 """How far from there it stands, how high above the table, and how far from the x axis of the world."""
 _BEHIND = 1e-9
 """A ray whose cosine with the optical axis is this near to -1 has no shortest turn."""
@@ -27,13 +26,13 @@ _BEHIND = 1e-9
 
 def _default_pose() -> Array:
     """T_world_camera of the default camera, (4, 4): obliquely from above, its x axis level."""
-    up = np.radians(ELEVATION_DEG)
-    round_z = np.radians(AZIMUTH_DEG)
+    up = np.radians(CAMERA_ELEVATION_DEG)
+    round_z = np.radians(CAMERA_AZIMUTH_DEG)
     z = -np.array([np.cos(up) * np.cos(round_z), np.cos(up) * np.sin(round_z), np.sin(up)])
     x = np.array([-np.sin(round_z), np.cos(round_z), 0.0])
     T = np.eye(4)
     T[:3, :3] = np.column_stack([x, np.cross(z, x), z])
-    T[:3, 3] = WORKSPACE_MIDDLE_M - DISTANCE_M * z
+    T[:3, 3] = WORKSPACE_MIDDLE_M - CAMERA_DISTANCE_M * z
     return T
 
 

@@ -22,7 +22,7 @@ from apo_bench.observation.models.residuals import Residuals
 _KINDS = _INLIER, _TURNED, _OUTLIER, _MISSED = "inlier", "turned", "outlier", "missed"
 _ERRORS = ("x_mm", "y_mm", "along_mm", "turn_x_deg", "turn_y_deg", "turn_along_deg")
 _COLUMNS = ("scene_id", "im_id", "obj_id", "kind", *_ERRORS)
-MOST_ROWS = 8000
+MOST_RESIDUALS = 8000
 """A file holds no more residuals; of more, every so-many-th is written."""
 _LARGEST_MM = 1e5
 _LARGEST_DEG = 180.01
@@ -111,7 +111,7 @@ def empirical_noise(path: Path, level: Level) -> Empirical:
 
 def residuals_text(residuals: Residuals) -> str:
     """A file of residuals: one row for every part that was there, mm and degrees in the frame of its ray."""
-    every = -(-len(residuals.where) // MOST_ROWS)
+    every = -(-len(residuals.where) // MOST_RESIDUALS)
     lines = [",".join(_COLUMNS)]
     for k in range(0, len(residuals.where), every):
         kind = _kind_of(residuals, k)

@@ -21,7 +21,7 @@ from apo_bench.observation.models.level import Facts, Level
 from apo_bench.observation.models.outliers import UNSEEN_DEVIATION, last_seen
 from apo_bench.observation.models.tails import Split
 
-SMALLEST = 1e-4
+SMALLEST_SCALE = 1e-4
 LEAST_FREEDOM = 0.5
 """Least scale, as a part of the limit, and least degrees of freedom, of a tail that is fitted or read."""
 
@@ -162,7 +162,7 @@ def view_error(camera: Camera, goals: Array, sigma: Array) -> SharedError:
 def view_frame(camera: Camera, goals: Sequence[Array]) -> Array:
     """The axes of a camera in the middle of all goals, (4, 4), world, [m]."""
     P = camera.T_world_camera.copy()
-    P[:3, 3] = np.concatenate([one[:, :3, 3] for one in goals]).mean(axis=0)
+    P[:3, 3] = np.concatenate([T[:, :3, 3] for T in goals]).mean(axis=0)
     return P
 
 

@@ -11,18 +11,17 @@ from apo_bench.assembly.goals import Demonstration, Observation, Poses
 from apo_bench.assembly.outlier_model import measured_rates
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Facts, Level
 
 OUTLIERS = 0.1
 MISSES = 0.02
 """Share of operations that are seen quite wrongly, and that are not seen."""
-TIMES = 10.0
+OUTLIER_TIMES = 10.0
 """An outlier errs by so many times the level."""
-UNSEEN_DEVIATION = np.repeat([0.5, np.pi / 2.0], 3)
+UNSEEN_DEVIATION = frozen(np.repeat([0.5, np.pi / 2.0], 3), 6)
 """Standard deviation that is stated of what was not seen, [m, rad]."""
-UNSEEN_DEVIATION.flags.writeable = False
 
 
 @final
@@ -38,7 +37,7 @@ class Outliers:
     level: Level
     outliers: float = OUTLIERS
     misses: float = MISSES
-    times: float = TIMES
+    times: float = OUTLIER_TIMES
 
     FACTS: ClassVar[Facts] = Facts(
         title="gross outliers that do not say so, and operations that are missed",
@@ -47,11 +46,11 @@ class Outliers:
         parameters=(
             f"p = {OUTLIERS:g}: share of outliers among what is seen",
             f"q = {MISSES:g}: share of misses",
-            f"m = {TIMES:g}: an outlier errs m times as much",
+            f"m = {OUTLIER_TIMES:g}: an outlier errs m times as much",
         ),
         states=(
             f"L^2, the covariance of what is no outlier; that of all errors is 1 + p (m^2 - 1) = "
-            f"{1.0 + OUTLIERS * (TIMES**2 - 1.0):g} times as large"
+            f"{1.0 + OUTLIERS * (OUTLIER_TIMES**2 - 1.0):g} times as large"
         ),
         notes=(
             f"A missed operation has the pose at which its part was seen last, or started, with "

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from apo_bench.errors import InputError
 from apo_bench.files.bop import PoseRows
+from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.camera import Camera
 
@@ -108,14 +109,14 @@ def match_residuals(estimates: PoseRows, truth: PoseRows, scene: int | None = No
     partner = match_rows(estimates, truth)
     found = partner >= 0
     n = len(partner)
-    asked = len(estimates.where) if scene is None else int(np.sum(estimates.where[:, 0] == scene))
-    there = np.zeros((n, 4, 4))
-    there[:] = np.eye(4)
+    given = len(estimates.where) if scene is None else int(np.sum(estimates.where[:, 0] == scene))
+    there = np.tile(np.eye(4), (n, 1, 1))
     there[:, :3, 3] = truth.t_mm * 1e-3
     F = Camera(np.eye(4)).frames(there)[found]
     R = truth.R[found]
     R_seen = estimates.R[partner[found]]
-    turn = Rotation.from_matrix(_nearest(R_seen) @ np.swapaxes(_nearest(R), 1, 2)).as_rotvec(degrees=True)
+    right = pose.nearest_rotations(R)
+    turn = Rotation.from_matrix(pose.nearest_rotations(R_seen) @ np.swapaxes(right, 1, 2)).as_rotvec(degrees=True)
     shift = np.full((n, 3), np.nan)
     turned = np.full((n, 3), np.nan)
     shift[found] = np.einsum("nji,nj->ni", F, estimates.t_mm[partner[found]] - truth.t_mm[found])
@@ -128,7 +129,7 @@ def match_residuals(estimates: PoseRows, truth: PoseRows, scene: int | None = No
         turn_deg=turned,
         trace_deg=trace,
         score=np.where(found, estimates.score[partner], np.nan),
-        surplus=asked - int(found.sum()),
+        surplus=given - int(found.sum()),
         absent=_absent(estimates.where, truth.where, scene),
         distance_mm=float(np.median(np.linalg.norm(truth.t_mm, axis=1))),
     )
@@ -136,8 +137,8 @@ def match_residuals(estimates: PoseRows, truth: PoseRows, scene: int | None = No
 
 def _absent(estimates: Any, truth: Any, scene: int | None) -> int:
     """How many estimates are of objects that are not in their image; those of images without truth do not count."""
-    asked = estimates if scene is None else estimates[estimates[:, 0] == scene]
-    return int(np.sum(_among(asked[:, :2], truth[:, :2]) & ~_among(asked, truth)))
+    of_scene = estimates if scene is None else estimates[estimates[:, 0] == scene]
+    return int(np.sum(_among(of_scene[:, :2], truth[:, :2]) & ~_among(of_scene, truth)))
 
 
 def _among(rows: Any, known: Any) -> NDArray[np.bool_]:
@@ -145,12 +146,6 @@ def _among(rows: Any, known: Any) -> NDArray[np.bool_]:
     _, key = np.unique(np.concatenate([known, rows]), axis=0, return_inverse=True)
     key = key.reshape(-1)
     return np.isin(key[len(known) :], key[: len(known)])
-
-
-def _nearest(R: Array) -> Array:
-    """The rotations that are nearest to matrices (n, 3, 3), in the sense of least squares."""
-    U, _, Vt = np.linalg.svd(R)
-    return np.asarray(U @ Vt)
 
 
 def match_rows(estimates: PoseRows, truth: PoseRows) -> NDArray[np.int64]:
@@ -170,17 +165,13 @@ def match_rows(estimates: PoseRows, truth: PoseRows) -> NDArray[np.int64]:
 def _groups(truth: Any, estimates: Any) -> Iterator[tuple[Any, Any]]:
     """Rows of the truth and of the estimates that are of one object in one image, where there are both."""
     _, key = np.unique(np.concatenate([truth, estimates]), axis=0, return_inverse=True)
-    key = key.reshape(-1)
-    there = key[: len(truth)]
-    seen = key[len(truth) :]
-    by_truth = np.argsort(there, kind="stable")
-    by_estimate = np.argsort(seen, kind="stable")
-    common = np.intersect1d(there, seen)
-    for side in zip(
-        *(
-            np.stack([np.searchsorted(keys, common, "left"), np.searchsorted(keys, common, "right")], axis=1)
-            for keys in (there[by_truth], seen[by_estimate])
-        ),
-        strict=True,
-    ):
-        yield by_truth[slice(*side[0])], by_estimate[slice(*side[1])]
+    there, seen = (_rows_by_key(keys) for keys in np.split(key.reshape(-1), [len(truth)]))
+    for each in sorted(there.keys() & seen.keys()):
+        yield there[each], seen[each]
+
+
+def _rows_by_key(keys: Any) -> dict[int, Any]:
+    """Key -> the rows that have it, in their order."""
+    order = np.argsort(keys, kind="stable")
+    each, first = np.unique(keys[order], return_index=True)
+    return dict(zip(each.tolist(), np.split(order, first[1:]), strict=True)) if len(keys) else {}

@@ -74,19 +74,21 @@ class Split:
 
     def cdf_along(self, a: ArrayLike) -> Array:
         """The cumulative distribution of the size of the error along."""
-        a = np.minimum(np.asarray(a, dtype=np.float64), self.limit)[..., None]
-        top = np.arcsinh(a / self.along.scale)
-        x = self.along.scale * np.sinh(top * _X)
-        w = top * _W * np.hypot(self.along.scale, x) * np.exp(log_density_along(self.along, x))
+        x, w, _ = self._nodes_to(a)
         return np.sum(w * _below_across(self.across, self._left(x, self.limit)), axis=-1) / self.inside
 
     def cdf_length(self, r: ArrayLike) -> Array:
         """The cumulative distribution of the length of the whole error."""
-        r = np.minimum(np.asarray(r, dtype=np.float64), self.limit)[..., None]
-        top = np.arcsinh(r / self.along.scale)
+        x, w, end = self._nodes_to(r)
+        return np.sum(w * _below_across(self.across, self._left(x, end)), axis=-1) / self.inside
+
+    def _nodes_to(self, end: ArrayLike) -> tuple[Array, Array, Array]:
+        """As `_nodes`, from -end to end, (*, nodes) each, and the ends within the limit, (*, 1)."""
+        end = np.minimum(np.asarray(end, dtype=np.float64), self.limit)[..., None]
+        # x = s sinh(y), so dx = s cosh(y) dy = hypot(s, x) dy, and y runs to asinh(end / s).
+        top = np.arcsinh(end / self.along.scale)
         x = self.along.scale * np.sinh(top * _X)
-        w = top * _W * np.hypot(self.along.scale, x) * np.exp(log_density_along(self.along, x))
-        return np.sum(w * _below_across(self.across, self._left(x, r)), axis=-1) / self.inside
+        return x, top * _W * np.hypot(self.along.scale, x) * np.exp(log_density_along(self.along, x)), end
 
     def draw(self, n: int, rng: np.random.Generator) -> Array:
         """Errors (n, 3); what falls outside the limit is drawn anew."""
