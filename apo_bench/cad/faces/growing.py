@@ -1,5 +1,6 @@
 """Cylinders and cones in a mesh: grown from smooth parts of its surface, or from single edges in them."""
 
+from collections.abc import Iterable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -86,11 +87,13 @@ def _edges_of_pieces(facets: Facets, rows: Any) -> dict[int, list[int]]:
     return edges
 
 
-def _whole_starts(mesh: Mesh, facets: Facets, group: Any, inside: Any) -> list[tuple[Round, bool]]:
+def _whole_starts(mesh: Mesh, facets: Facets, group: Any, inside: Any) -> Iterator[tuple[Round | None, bool]]:
     """What all of a smooth surface may be: a cylinder, a cone."""
     points = mesh.corners[np.unique(facets.along[inside])]
-    starts = [(circle_through(points, axis_of(facets.normals[group], cone)), cone) for cone in (False, True)]
-    return [(start, cone) for start, cone in starts if start is not None]
+    for cone in (False, True):
+        first = circle_through(points, axis_of(facets.normals[group], cone))
+        if first is not None:
+            yield refined(first, points, cone), cone
 
 
 def _seed_cylinder(
@@ -136,13 +139,21 @@ def _seed_cone(
 
 
 def _grown(
-    mesh: Mesh, facets: Facets, among: Any, inside: Any, starts: list[tuple[Round, bool]], seed: int | None = None
+    mesh: Mesh,
+    facets: Facets,
+    among: Any,
+    inside: Any,
+    starts: Iterable[tuple[Round | None, bool]],
+    seed: int | None = None,
 ) -> FoundWall | None:
-    """The flat pieces on a surface, connected with a seed or all of them, and the surface fitted to them."""
+    """The flat pieces on a surface, connected with a seed or all of them, and the surface fitted to them.
+
+    Args:
+        inside: Which smooth edges may be used, (s,).
+        starts: Surfaces to begin with, and whether they are cones; the first one that holds is taken.
+    """
     for start, cone in starts:
-        surface: Round | None = start
-        if seed is None:
-            surface = refined(start, mesh.corners[np.unique(facets.along[inside])], cone)
+        surface = start
         # In turns: what lies on the surface, loosely at first, and the surface nearest to that, until nothing changes.
         count = 0
         loose = 3.0

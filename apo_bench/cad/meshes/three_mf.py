@@ -31,6 +31,7 @@ _DEEPEST_OBJECT = 8
 _METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 """All that 3MF allows; the others are unpacked without a limit."""
 _OBJECT = ("model", "resources", "object")
+_PLACES = ((*_OBJECT, "components", "component"), ("model", "build", "item"))
 _NO_NUMBER = "a number in the 3MF file cannot be read"
 
 
@@ -63,16 +64,20 @@ class _Model:
         self.unit = "millimeter"
         self.objects: dict[str, _Object] = {}
         self.items: list[_PlacedObject] = []
-        self._within: list[str] = []
+        self.within: list[str] = []
         self._open = _Object("")
         self._count = 0
 
     def start(self, tag: str, values: dict[str, str]) -> None:
         """An element begins."""
-        self._within.append(tag.rpartition("}")[2])
-        if len(self._within) > _DEEPEST_ELEMENT:
+        self.within.append(tag.rpartition("}")[2])
+        if len(self.within) > _DEEPEST_ELEMENT:
             _refuse(self.path, f"its elements are nested deeper than {_DEEPEST_ELEMENT}")
-        where = tuple(self._within)
+        where = tuple(self.within)
+        if where == _OBJECT or where in _PLACES:
+            self._count += 1
+            if self._count > _MOST_OBJECTS:
+                _refuse(self.path, f"it names more than {_MOST_OBJECTS:,} objects and places")
         if where == (*_OBJECT, "mesh", "vertices", "vertex"):
             self._open.coordinates.extend([float(values[axis]) for axis in "xyz"])
         elif where == (*_OBJECT, "mesh", "triangles", "triangle"):
@@ -81,22 +86,11 @@ class _Model:
             number = values.get("id", "")
             self._open = _Object(values.get("name", "") or f"object{number}")
             self.objects[number] = self._open
-            self._counted()
-        elif where in ((*_OBJECT, "components", "component"), ("model", "build", "item")):
+        elif where in _PLACES:
             owner = self.items if where[1] == "build" else self._open.components
             owner.append(_PlacedObject(values.get("objectid", ""), values.get("transform", "")))
-            self._counted()
         elif where == ("model",):
             self.unit = values.get("unit", self.unit)
-
-    def end(self, tag: str) -> None:
-        """An element ends."""
-        self._within.pop()
-
-    def _counted(self) -> None:
-        self._count += 1
-        if self._count > _MOST_OBJECTS:
-            _refuse(self.path, f"it names more than {_MOST_OBJECTS:,} objects and places")
 
 
 class _Size(NamedTuple):
@@ -139,7 +133,7 @@ def _read_model(path: Path, raw: bytes) -> _Model:
     model = _Model(path)
     parser = ParserCreate(namespace_separator="}", intern={})
     parser.StartElementHandler = model.start
-    parser.EndElementHandler = model.end
+    parser.EndElementHandler = lambda tag: model.within.pop()
     parser.StartDoctypeDeclHandler = lambda *_: _refuse(path, "it declares entities, which a 3MF file may not")
     size = 0
     try:

@@ -11,7 +11,7 @@ from apo_bench.cad.faces.fitted_region import plane_region, round_region
 from apo_bench.cad.meshes.shells import INSIDE_OUT, check_closed, check_uncrossed, has_three
 from apo_bench.cad.naming import with_names
 from apo_bench.cad.raw_solid import Mesh, RawSolid, Region, connected, put_together, square_to
-from apo_bench.cad.step.brep import TRIANGLES_RAD, BrepFace, BrepSolid
+from apo_bench.cad.step.open_cascade import TRIANGLES_RAD, BrepFace, BrepSolid
 from apo_bench.cad.step.strips import wall_strips
 from apo_bench.cad.step.surfaces import Flat, Wall, is_same, surface_of
 from apo_bench.errors import InputError

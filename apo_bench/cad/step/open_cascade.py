@@ -7,20 +7,53 @@ import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from apo_bench.cad.raw_solid import SolidPlace
-from apo_bench.cad.step.brep import TRIANGLES_RAD, BrepFace, BrepSolid
 from apo_bench.cad.step.step_tree import leaves_of, matrix_of, shapes_in
 from apo_bench.geometry.arrays import Array
 
 READER_BYTES = 2_000_000_000
 READER_S = 20
+TRIANGLES_RAD = 0.2
+"""The angle between neighbours on round walls, the same on walls around one axis."""
 _SAGITTA = 1e-2
 """Distance of triangles from the surface at most, as part of the size of the solid."""
 _MOST_SAMPLES = 600
+
+
+class BrepFace(NamedTuple):
+    """A face of a solid."""
+
+    kind: str
+    """`plane`, `cylinder`, `cone`, `sphere`, `torus`, `free` for what is stored as a spline; `none`: no triangles."""
+    point: Array
+    """Of the plane or the axis, [mm]; of a free one, points on it, (k, 3)."""
+    direction: Array
+    """Normal or axis; of a free one, its normals there, (k, 3)."""
+    radius: float
+    """At the point."""
+    slope: float
+    """By how much the radius grows along the axis."""
+    corners: Array
+    """(c, 3)."""
+    triangles: Any
+    """(t, 3), counter-clockwise seen from outside."""
+
+
+class BrepSolid(NamedTuple):
+    """A solid, or a shell that may be one."""
+
+    name: str
+    faces: tuple[BrepFace, ...]
+    size: float
+    """Volume, [mm^3]."""
+    centroid: Array
+    inertia: Array
+    """About the centroid, [mm^5]."""
+    places: tuple[SolidPlace, ...]
 
 
 def solids_of(path: Path) -> list[BrepSolid]:
@@ -34,10 +67,10 @@ def solids_of(path: Path) -> list[BrepSolid]:
 
 def _solids(name: str, shape: Any, places: tuple[SolidPlace, ...]) -> Iterator[BrepSolid]:
     """The solids in a shape, and its shells that belong to none."""
-    from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL, TopAbs_SOLID
+    from OCP import TopAbs
 
-    every = [*shapes_in(shape, TopAbs_SOLID), *shapes_in(shape, TopAbs_SHELL, TopAbs_SOLID)]
-    if not every and any(shapes_in(shape, TopAbs_FACE)):
+    every = [*shapes_in(shape, TopAbs.TopAbs_SOLID), *shapes_in(shape, TopAbs.TopAbs_SHELL, TopAbs.TopAbs_SOLID)]
+    if not every and any(shapes_in(shape, TopAbs.TopAbs_FACE)):
         every = [shape]
     for i, each in enumerate(every, start=1):
         own_name = name if len(every) == 1 else f"{name}_{i}"
@@ -46,54 +79,47 @@ def _solids(name: str, shape: Any, places: tuple[SolidPlace, ...]) -> Iterator[B
 
 def _mass_properties(shape: Any) -> tuple[float, Array, Array]:
     """Volume, centroid, inertia about it."""
-    from OCP.BRepGProp import BRepGProp
-    from OCP.GProp import GProp_GProps
+    from OCP import BRepGProp, GProp
 
-    properties = GProp_GProps()
-    BRepGProp.VolumeProperties_s(shape, properties)
+    properties = GProp.GProp_GProps()
+    BRepGProp.BRepGProp.VolumeProperties_s(shape, properties)
     J = properties.MatrixOfInertia()
     inertia = np.array([[J.Value(i, k) for k in range(1, 4)] for i in range(1, 4)])
     return properties.Mass(), _xyz(properties.CentreOfMass()), inertia
 
 
 def _faces(shape: Any) -> Iterator[BrepFace]:
-    from OCP.Bnd import Bnd_Box
-    from OCP.BRepBndLib import BRepBndLib
-    from OCP.BRepMesh import BRepMesh_IncrementalMesh
-    from OCP.TopAbs import TopAbs_FACE
-    from OCP.TopoDS import TopoDS
+    from OCP import Bnd, BRepBndLib, BRepMesh, TopAbs, TopoDS
 
-    box = Bnd_Box()
-    BRepBndLib.Add_s(shape, box, False)
+    box = Bnd.Bnd_Box()
+    BRepBndLib.BRepBndLib.Add_s(shape, box, False)
     size = float(np.sqrt(box.SquareExtent())) if not box.IsVoid() else 1.0
-    BRepMesh_IncrementalMesh(shape, _SAGITTA * size, False, TRIANGLES_RAD, False)
-    for each in shapes_in(shape, TopAbs_FACE):
-        yield _face(TopoDS.Face_s(each) if hasattr(TopoDS, "Face_s") else TopoDS.Face(each))
+    BRepMesh.BRepMesh_IncrementalMesh(shape, _SAGITTA * size, False, TRIANGLES_RAD, False)
+    for each in shapes_in(shape, TopAbs.TopAbs_FACE):
+        yield _face(TopoDS.TopoDS.Face_s(each) if hasattr(TopoDS.TopoDS, "Face_s") else TopoDS.TopoDS.Face(each))
 
 
 def _face(face: Any) -> BrepFace:
-    from OCP.BRep import BRep_Tool
-    from OCP.TopAbs import TopAbs_REVERSED
-    from OCP.TopLoc import TopLoc_Location
+    from OCP import BRep, TopAbs, TopLoc
 
-    location = TopLoc_Location()
-    mesh = BRep_Tool.Triangulation_s(face, location)
+    location = TopLoc.TopLoc_Location()
+    mesh = BRep.BRep_Tool.Triangulation_s(face, location)
     if mesh is None:
         return BrepFace("none", np.zeros(3), np.zeros(3), 0.0, 0.0, np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64))
     T = matrix_of(location.Transformation())
     nodes = np.array([_xyz(mesh.Node(i)) for i in range(1, mesh.NbNodes() + 1)])
     triangles = np.array([mesh.Triangle(i).Get() for i in range(1, mesh.NbTriangles() + 1)], dtype=np.int64) - 1
     triangles = triangles.reshape(-1, 3)
-    if face.Orientation() == TopAbs_REVERSED:
+    if face.Orientation() == TopAbs.TopAbs_REVERSED:
         triangles = triangles[:, ::-1]
     return BrepFace(*_surface(face, mesh, triangles), nodes @ T[:3, :3].T + T[:3, 3], triangles)
 
 
 def _surface(face: Any, mesh: Any, triangles: Any) -> tuple[str, Array, Array, float, float]:
     """Its kind and parameters."""
-    from OCP.BRepAdaptor import BRepAdaptor_Surface
+    from OCP import BRepAdaptor
 
-    surface = BRepAdaptor_Surface(face)
+    surface = BRepAdaptor.BRepAdaptor_Surface(face)
     kind = str(surface.GetType()).rsplit("_", 1)[-1].lower()
     if kind in ("plane", "cylinder", "cone"):
         shape = getattr(surface, kind.capitalize())()
@@ -107,7 +133,7 @@ def _surface(face: Any, mesh: Any, triangles: Any) -> tuple[str, Array, Array, f
 
 def _samples(surface: Any, mesh: Any, triangles: Any) -> tuple[Array, Array]:
     """Points on a surface and its normals there: at corners and middles of triangles."""
-    from OCP.gp import gp_Pnt, gp_Vec
+    from OCP import gp
 
     nodes = [mesh.UVNode(i) for i in range(1, mesh.NbNodes() + 1)]
     uv = np.array([(p.X(), p.Y()) for p in nodes])
@@ -115,9 +141,9 @@ def _samples(surface: Any, mesh: Any, triangles: Any) -> tuple[Array, Array]:
     points = []
     normals = []
     for u, v in every[:: -(-len(every) // _MOST_SAMPLES)]:
-        point = gp_Pnt()
-        along_u = gp_Vec()
-        along_v = gp_Vec()
+        point = gp.gp_Pnt()
+        along_u = gp.gp_Vec()
+        along_v = gp.gp_Vec()
         surface.D1(float(u), float(v), point, along_u, along_v)
         n = np.cross(_xyz(along_u), _xyz(along_v))
         if np.linalg.norm(n) > 1e-12:

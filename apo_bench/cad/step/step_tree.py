@@ -38,22 +38,17 @@ def leaves_of(path: Path) -> Iterator[Leaf]:
     Raises:
         ValueError: The file cannot be read.
     """
-    from OCP.collections import Sequence_TDF_Label
-    from OCP.IFSelect import IFSelect_RetDone
-    from OCP.STEPCAFControl import STEPCAFControl_Reader
-    from OCP.TCollection import TCollection_ExtendedString
-    from OCP.TDocStd import TDocStd_Document
-    from OCP.XCAFDoc import XCAFDoc_DocumentTool
+    from OCP import IFSelect, STEPCAFControl, TCollection, TDocStd, XCAFDoc, collections
 
-    document = TDocStd_Document(TCollection_ExtendedString("XCAF"))
-    reader = STEPCAFControl_Reader()
+    document = TDocStd.TDocStd_Document(TCollection.TCollection_ExtendedString("XCAF"))
+    reader = STEPCAFControl.STEPCAFControl_Reader()
     reader.SetNameMode(True)
     reader.SetColorMode(True)
-    if reader.ReadFile(str(path)) != IFSelect_RetDone or not reader.Transfer(document):
+    if reader.ReadFile(str(path)) != IFSelect.IFSelect_RetDone or not reader.Transfer(document):
         raise ValueError("no STEP file")
-    roots = Sequence_TDF_Label()
-    XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(roots)
-    colors = XCAFDoc_DocumentTool.ColorTool_s(document.Main())
+    roots = collections.Sequence_TDF_Label()
+    XCAFDoc.XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(roots)
+    colors = XCAFDoc.XCAFDoc_DocumentTool.ColorTool_s(document.Main())
     for root in roots:
         yield from _below(root, np.eye(4), path.stem, path.stem, colors)
 
@@ -64,38 +59,35 @@ def _below(label: Any, T: Array, product: str, name: str, colors: Any) -> Iterat
     Args:
         product, name: Of what it is in, for those that have none.
     """
-    from OCP.collections import Sequence_TDF_Label
-    from OCP.TDF import TDF_Label
-    from OCP.TopLoc import TopLoc_Location
-    from OCP.XCAFDoc import XCAFDoc_ShapeTool
+    from OCP import TDF, TopLoc, XCAFDoc, collections
 
     part = label
-    if XCAFDoc_ShapeTool.IsReference_s(label):
-        part = TDF_Label()
-        XCAFDoc_ShapeTool.GetReferredShape_s(label, part)
+    if XCAFDoc.XCAFDoc_ShapeTool.IsReference_s(label):
+        part = TDF.TDF_Label()
+        XCAFDoc.XCAFDoc_ShapeTool.GetReferredShape_s(label, part)
     own_name = _name(part)
     product = own_name or product
     name = _name(label) or own_name or name
-    here = T @ matrix_of(XCAFDoc_ShapeTool.GetLocation_s(label).Transformation())
-    if XCAFDoc_ShapeTool.IsAssembly_s(part):
-        inside = Sequence_TDF_Label()
-        XCAFDoc_ShapeTool.GetComponents_s(part, inside)
+    here = T @ matrix_of(XCAFDoc.XCAFDoc_ShapeTool.GetLocation_s(label).Transformation())
+    if XCAFDoc.XCAFDoc_ShapeTool.IsAssembly_s(part):
+        inside = collections.Sequence_TDF_Label()
+        XCAFDoc.XCAFDoc_ShapeTool.GetComponents_s(part, inside)
         for each in inside:
             yield from _below(each, here, product, name, colors)
         return
     # A shape in its own frame, so that all of its copies are one shape, and where that frame is.
-    placed = XCAFDoc_ShapeTool.GetShape_s(part)
-    shape = placed.Located(TopLoc_Location())
+    placed = XCAFDoc.XCAFDoc_ShapeTool.GetShape_s(part)
+    shape = placed.Located(TopLoc.TopLoc_Location())
     color = _color(label) or _color(part) or _color_of_faces(colors, shape)
     yield Leaf(product, name, shape, here @ matrix_of(placed.Location().Transformation()), color)
 
 
 def _name(label: Any) -> str:
     """As a person gave it, or empty."""
-    from OCP.TDataStd import TDataStd_Name
+    from OCP import TDataStd
 
-    attribute = TDataStd_Name()
-    if not label.FindAttribute(TDataStd_Name.GetID_s(), attribute):
+    attribute = TDataStd.TDataStd_Name()
+    if not label.FindAttribute(TDataStd.TDataStd_Name.GetID_s(), attribute):
         return ""
     text = "".join(c if c.isprintable() else " " for c in attribute.Get().ToExtString()).strip()
     return "" if _NO_NAME.fullmatch(text) else text
@@ -109,43 +101,48 @@ def matrix_of(transformation: Any) -> Array:
 
 def _color(label: Any) -> Rgb | None:
     """Of an entry of the tree."""
-    from OCP.XCAFDoc import XCAFDoc_ColorTool
+    from OCP import XCAFDoc
 
-    return _first_color(XCAFDoc_ColorTool.GetColor_s, label)
+    return _first_color(XCAFDoc.XCAFDoc_ColorTool.GetColor_s, label)
 
 
 def _first_color(get: Callable[[Any, Any, Any], bool], owner: Any) -> Rgb | None:
     """Of its surface, else of all of it."""
-    from OCP.Quantity import Quantity_Color
-    from OCP.XCAFDoc import XCAFDoc_ColorGen, XCAFDoc_ColorSurf
+    from OCP import Quantity, XCAFDoc
 
-    color = Quantity_Color()
-    return _rgb(color) if any(get(owner, kind, color) for kind in (XCAFDoc_ColorSurf, XCAFDoc_ColorGen)) else None
+    color = Quantity.Quantity_Color()
+    return (
+        _rgb(color)
+        if any(get(owner, kind, color) for kind in (XCAFDoc.XCAFDoc_ColorSurf, XCAFDoc.XCAFDoc_ColorGen))
+        else None
+    )
 
 
 def _color_of_faces(colors: Any, shape: Any) -> Rgb | None:
     """Of a shape, or what most of its coloured faces have, where it has none itself."""
-    from OCP.TopAbs import TopAbs_FACE
+    from OCP import TopAbs
 
     of_shape = _first_color(colors.GetColor, shape)
     if of_shape is not None:
         return of_shape
-    counts = Counter(color for face in shapes_in(shape, TopAbs_FACE) if (color := _first_color(colors.GetColor, face)))
+    counts = Counter(
+        color for face in shapes_in(shape, TopAbs.TopAbs_FACE) if (color := _first_color(colors.GetColor, face))
+    )
     return counts.most_common(1)[0][0] if counts else None
 
 
 def _rgb(color: Any) -> Rgb:
-    from OCP.Quantity import Quantity_TOC_sRGB
+    from OCP import Quantity
 
-    r, g, b = (float(np.clip(x, 0.0, 1.0)) for x in color.Values(Quantity_TOC_sRGB))
+    r, g, b = (float(np.clip(x, 0.0, 1.0)) for x in color.Values(Quantity.Quantity_TOC_sRGB))
     return r, g, b
 
 
 def shapes_in(shape: Any, kind: Any, outside: Any = None) -> Iterator[Any]:
     """Of one kind, those inside of another kind left out."""
-    from OCP.TopExp import TopExp_Explorer
+    from OCP import TopExp
 
-    explorer = TopExp_Explorer(shape, kind) if outside is None else TopExp_Explorer(shape, kind, outside)
+    explorer = TopExp.TopExp_Explorer(shape, kind) if outside is None else TopExp.TopExp_Explorer(shape, kind, outside)
     while explorer.More():
         yield explorer.Current()
         explorer.Next()

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.cad.faces.fitting import Round, axis_of, circle_through, refined
-from apo_bench.cad.step.brep import BrepFace
+from apo_bench.cad.step.open_cascade import BrepFace
 from apo_bench.geometry.arrays import Array
 
 _SPLINE_MM = 5e-4
