@@ -87,7 +87,7 @@ def tried(each: Foreign, folder: Path, unit: str | None, up: str, seeds: int, fi
         for contact in operation.contacts
     )
     cells.append(", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items())))
-    found = check_file(path, 0, fidelity)
+    found = tuple(check_file(path, 0, fidelity))
     wrong = tuple(finding.sentence for finding in found if not finding.ok)
     cells.append("no" if wrong else "yes")
     if any(finding.what in ("file", "gripper") and not finding.ok for finding in found):

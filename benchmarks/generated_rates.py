@@ -100,7 +100,7 @@ def measured(folder: Path, assemblies: int, seeds: int, known: Sequence[Line]) -
 
 def checked(name: str, path: Path) -> Line:
     """What `scenario check` finds before any trial; if nothing is wrong, what the scenario has."""
-    found = check_file(path, seeds=0)
+    found = tuple(check_file(path, seeds=0))
     wrong = [each.sentence for each in found if not each.ok]
     cells = (name, CHECK, "", str(int(not wrong)), "", "", "", "; ".join(wrong) or found[0].sentence)
     return dict(zip(COLUMNS, cells, strict=True))

@@ -119,5 +119,9 @@ def scenario_check(
         raise InputError(f"--seeds {seeds} was given; 0 to 1000 are allowed.")
     check("fidelity", fidelity)
 
-    if not all(finding.ok for finding in check_file(file, seeds, fidelity, typer.echo)):
+    is_well = True
+    for finding in check_file(file, seeds, fidelity):
+        typer.echo(finding)
+        is_well &= finding.ok
+    if not is_well:
         raise typer.Exit(NO_RESULT)

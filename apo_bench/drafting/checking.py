@@ -2,7 +2,7 @@
 
 import re
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from itertools import product
 from pathlib import Path
@@ -64,23 +64,15 @@ class Finding(NamedTuple):
         return f"{'ok' if self.ok else 'wrong':6} {self.what:8} {line}{self.sentence}"
 
 
-def check_file(
-    path: Path, seeds: int = 5, fidelity: str = "full", say: Callable[[Finding], None] = lambda finding: None
-) -> tuple[Finding, ...]:
-    """Look at a scenario file from its syntax to trials in which the robot knows the truth.
-
-    Args:
-        say: Called with each finding as soon as it is there.
+def check_file(path: Path, seeds: int = 5, fidelity: str = "full") -> Iterator[Finding]:
+    """Look at a scenario file from its syntax to trials in which the robot knows the truth; each finding at once.
 
     Raises:
         InputError: There is no such file.
     """
     text = read_bytes(path, "scenario file (.toml)").decode("utf-8", "replace")
-    findings = list[Finding]()
     for finding in _findings(path, seeds, fidelity):
-        findings.append(finding if finding.ok else finding._replace(line=line_of(text, finding.sentence)))
-        say(findings[-1])
-    return tuple(findings)
+        yield finding if finding.ok else finding._replace(line=line_of(text, finding.sentence))
 
 
 def line_of(text: str, sentence: str) -> int | None:

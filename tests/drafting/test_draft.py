@@ -160,6 +160,14 @@ def test_what_hangs_in_the_air_has_no_order(tmp_path: Path) -> None:
         draft(on_the_table(beside), ("pn",))
 
 
+def test_what_would_tip_over_has_no_order(tmp_path: Path) -> None:
+    base = extrude(rectangle(60, 60), 0, 20, bottom="bottom", top="top")
+    bar = extrude(rectangle(100, 20), 0, 10, bottom="bottom", top="top")
+    places = {"base": ("base", at(0, 0, 0)), "bar": ("bar", at(45, 0, 20))}
+    with pytest.raises(RuntimeError, match="'bar' would not keep its balance on what is there before it"):
+        draft(on_the_table(made(tmp_path, {"base": base, "bar": bar}, places)))
+
+
 def test_turns_are_those_that_a_scenario_file_reads() -> None:
     rng = np.random.default_rng(0)
     for turn in (*rng.uniform(-180, 180, (20, 3)), (10, 90, 30), (0, -90, 0), (90, 0, -90)):

@@ -6,8 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.cad.faces.facets import Facets
-from apo_bench.cad.faces.fitted_region import ON_WALL
-from apo_bench.cad.faces.fitting import Round, axis_of, circle_through, on_it, refined
+from apo_bench.cad.faces.fitting import ON_WALL, Round, axis_of, circle_through, on_it, refined
 from apo_bench.cad.raw_solid import Mesh, connected
 from apo_bench.geometry.arrays import Array
 

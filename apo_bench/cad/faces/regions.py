@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.cad.faces.facets import FLAT, Facets, facets_of
-from apo_bench.cad.faces.fitted_region import fitted_plane, round_region
+from apo_bench.cad.faces.fitting import fitted_plane, round_region
 from apo_bench.cad.faces.growing import FoundWall, smooth_groups, walls_of
 from apo_bench.cad.raw_solid import Mesh, Region, square_to
 from apo_bench.geometry.round_face import WHOLE_TURN

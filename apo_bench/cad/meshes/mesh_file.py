@@ -122,6 +122,4 @@ def _by_trimesh(path: Path, raw: bytes, kind: str) -> Mesh:
         raise InputError(f"{path}: this is no {kind.upper()} file that can be read; save the part again.") from error
     finally:
         log.setLevel(before)
-    if len(triangles) and (triangles.min() < 0 or triangles.max() >= len(corners)):
-        raise InputError(f"{path}: a triangle has a corner that the file does not hold; save the part again.")
     return Mesh(corners, triangles)

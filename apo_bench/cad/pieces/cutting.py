@@ -4,10 +4,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.cad.pieces.boring import bored, filling, least_pieces
 from apo_bench.cad.pieces.corners import corners_of, extremes, is_thick, without_near
 from apo_bench.cad.pieces.halving import at_shoulders, convex_parts, settled
-from apo_bench.cad.pieces.shafts import as_cylinders, with_round_shafts
+from apo_bench.cad.pieces.round_walls import as_cylinders, bored, filling, least_pieces, with_round_shafts
 from apo_bench.cad.raw_solid import Mesh, RawSolid
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array

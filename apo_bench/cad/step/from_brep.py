@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.cad.faces.facets import facets_of
-from apo_bench.cad.faces.fitted_region import plane_region, round_region
+from apo_bench.cad.faces.fitting import plane_region, round_region
 from apo_bench.cad.meshes.shells import INSIDE_OUT, check_closed, check_uncrossed, has_three
 from apo_bench.cad.naming import with_names
 from apo_bench.cad.raw_solid import Mesh, RawSolid, Region, connected, put_together, square_to

@@ -4,8 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.faces.fitted_region import border_of
-from apo_bench.cad.faces.fitting import Round
+from apo_bench.cad.faces.fitting import Round, border_of
 from apo_bench.cad.raw_solid import Mesh, square_to
 from apo_bench.geometry.arrays import Array
 

@@ -1,4 +1,8 @@
-"""Round holes: filled before a solid is cut, then cut out of its pieces as wedges that touch the wall, [mm]."""
+"""Round walls of pieces, [mm].
+
+Holes are filled before a solid is cut, then cut out of its pieces as wedges that touch the wall. Pieces of shafts get
+as many corners around the axis as the wall needs, or are true cylinders.
+"""
 
 from collections.abc import Iterator, Sequence
 from itertools import combinations
@@ -9,7 +13,11 @@ import numpy as np
 from apo_bench.cad.pieces.corners import SAME_CORNER_MM, corners_of, extremes, is_thick, without_near
 from apo_bench.cad.raw_solid import Mesh, Region
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.hull import sides_of
+from apo_bench.geometry.hull import Cylinder, Hull, cylinder_hull, sides_of
+from apo_bench.parts.allowed import THINNEST_M, WIDEST_M
+
+_WIDER = 1.6
+"""A gap between corners of a ring that is so much wider than most belongs to no wall."""
 
 
 def filling(mesh: Mesh, bore: Region) -> Any:
@@ -107,3 +115,74 @@ def _around(part: Any, bore: Region) -> Iterator[Any]:
         wedge = wedge.trim_by_plane(wall, float((wall @ at + bore.radii[0]) / np.linalg.norm(wall)))
         if not wedge.is_empty():
             yield wedge
+
+
+def with_round_shafts(corners: Array, shafts: Sequence[Region]) -> Array:
+    """A piece with as many corners on a shaft as its wall needs: new ones on whole circles, more on other ones."""
+    from scipy.spatial import ConvexHull
+
+    added = []
+    dropped = np.zeros(len(corners), dtype=bool)
+    for shaft in sorted(shafts, key=lambda shaft: -int(_on_wall(corners, shaft).sum())):
+        height, _, angle = shaft.polar(corners)
+        on = _on_wall(corners, shaft) & ~dropped
+        if on.sum() < 3:
+            continue
+        count = sides_of(1e-3 * max(shaft.radii))
+        for h in np.unique(np.round(height[on], 3)):
+            mine = on & (np.abs(height - h) < 2e-3)
+            angles, is_whole = _around_axis(np.sort(angle[mine]), count)
+            dropped |= mine & is_whole
+            if len(angles):
+                level = float(height[mine].mean())
+                added.append(shaft.around(level, float(shaft.radius_at(level)), angles))
+    if not added:
+        return corners
+    every = without_near(np.concatenate([corners[~dropped], *added]))
+    return np.asarray(every[np.sort(ConvexHull(every).vertices)])
+
+
+def _on_wall(corners: Array, shaft: Region) -> Any:
+    height, distance, _ = shaft.polar(corners)
+    on = np.abs(distance - shaft.radius_at(height)) < max(1e-5 * max(shaft.radii), SAME_CORNER_MM)
+    within = (height > shaft.span[0] - SAME_CORNER_MM) & (height < shaft.span[1] + SAME_CORNER_MM)
+    return on & within & (distance > SAME_CORNER_MM)
+
+
+def _around_axis(ring: Array, count: int) -> tuple[Array, bool]:
+    """Angles of corners that a wall of so many sides needs beside those of a ring; whether they stand for all of it."""
+    if len(ring) < 3:
+        return ring[:0], False
+    gaps = np.diff(np.append(ring, ring[0] + 2.0 * np.pi))
+    usual = float(np.median(gaps))
+    if len(ring) >= 6 and gaps.max() < _WIDER * usual:
+        return 2.0 * np.pi * (np.arange(count) + 0.5) / count, True
+    # A wall that is part of a circle: each of its gaps is cut into equal ones, none wider than a side may be.
+    added = [ring[:0]]
+    for a, gap in zip(ring, gaps, strict=True):
+        n = int(np.ceil(gap / (2.0 * np.pi / count) - 1e-9))
+        if gap < _WIDER * usual and n > 1:
+            added.append(a + gap * np.arange(1, n) / n)
+    return np.concatenate(added), False
+
+
+def as_cylinders(pieces: list[Hull], shafts: Sequence[Region]) -> Iterator[Hull]:
+    """Pieces, as true cylinders where all of their corners are on the ends of one."""
+    cylinders = [s for s in shafts if s.kind == "cylinder" and THINNEST_M <= 1e-3 * s.radii[0] <= WIDEST_M]
+    for piece in pieces:
+        yield next((whole for shaft in cylinders if (whole := _as_cylinder(piece, shaft)) is not None), piece)
+
+
+def _as_cylinder(piece: Hull, shaft: Region) -> Hull | None:
+    corners = 1e3 * piece.corners
+    radius = shaft.radii[0]
+    height, distance, _ = shaft.polar(corners)
+    low = float(height.min())
+    high = float(height.max())
+    if len(corners) < 16 or 5e-4 * (high - low) < THINNEST_M:
+        return None
+    level = np.minimum(height - low, high - height) < SAME_CORNER_MM
+    if not (level & (np.abs(distance - radius) < 1e-5 * radius + 1e-5)).all():
+        return None
+    center = 1e-3 * (shaft.point + (low + high) / 2.0 * shaft.direction)
+    return cylinder_hull("", Cylinder(center, shaft.direction, 1e-3 * radius, 5e-4 * (high - low)))

@@ -1,0 +1,112 @@
+"""What an import rests on: corners, outlines and walls to the last digit, and logs that stay as they were."""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from manifold3d import Manifold
+
+from apo_bench.cad.importing import _why_not, import_part, raw_solids
+from apo_bench.cad.pieces.corners import corners_of, without_near
+from apo_bench.cad.step.from_brep import raw_of
+from apo_bench.cad.step.open_cascade import BrepFace, BrepSolid
+from apo_bench.errors import InputError
+from apo_bench.geometry.solid import Face
+from apo_bench.parts import load_part
+from tests.cad.made import block, disc, rod, write_stl, write_triangles
+
+
+def triangles(mesh: Any) -> Any:
+    raw = mesh.to_mesh()
+    return np.asarray(raw.vert_properties)[:, :3][np.asarray(raw.tri_verts)]
+
+
+def test_the_earlier_one_of_two_near_corners_stays() -> None:
+    points = np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [0.0, 0.0, 1e-4], [5.0, 0.0, 1.0]])
+    np.testing.assert_array_equal(without_near(points), points[[0, 1, 3]])
+
+
+def test_corners_of_a_body_have_all_their_digits() -> None:
+    corners = corners_of(Manifold.cube((0.1, 0.2, 0.3)))
+    expected = np.array(np.meshgrid([0.0, 0.1], [0.0, 0.2], [0.0, 0.3])).reshape(3, -1).T
+    np.testing.assert_allclose(sorted(corners.tolist()), sorted(expected.tolist()), rtol=0.0, atol=1e-12)
+
+
+def test_a_face_whose_hole_crosses_its_border_is_no_face() -> None:
+    square = 1e-2 * np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+    hole = 0.2 * square[::-1]
+    solid = load_part("block")
+    beside = hole + np.array([0.01, 0.0, 0.0])
+    assert _why_not(solid, Face("top", square, (beside,))) == "its outline crosses itself"
+    assert _why_not(solid, Face("top", square, (hole,))) != "its outline crosses itself"
+
+
+def test_corners_that_nearly_meet_are_joined_and_it_is_said(tmp_path: Path) -> None:
+    near = triangles(block(20, 20, 20)).astype(np.float32)
+    near[0, 0, 0] = np.nextafter(near[0, 0, 0], np.float32(100.0))
+    _, (raw,) = raw_solids(write_triangles(near, tmp_path / "a.stl"), None)
+    assert raw.mended == ("corners within 2e-06 mm were joined",)
+    assert raw.mesh.volume == pytest.approx(8000.0)
+
+
+def test_a_part_of_three_metres_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"longest side is 3000 mm .* parts of 1 mm to 2 m are allowed"):
+        raw_solids(write_stl(block(30, 30, 30), tmp_path / "a.stl", 0.1), "m")
+
+
+def test_a_corner_that_is_not_there_is_refused_and_logs_stay_as_they_were(tmp_path: Path) -> None:
+    path = tmp_path / "a.obj"
+    path.write_text("v 0 0 0\nv 10 0 0\nv 0 10 0\nv 0 0 10\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 5\n")
+    log = logging.getLogger("trimesh")
+    before = log.level
+    log.setLevel(logging.WARNING)
+    try:
+        with pytest.raises(InputError, match="no OBJ file that can be read"):
+            raw_solids(path, "mm")
+        assert log.level == logging.WARNING
+    finally:
+        log.setLevel(before)
+
+
+def drilled(hole: bool) -> BrepSolid:
+    """A cylinder, or a block with a hole, as the reader of STEP files gives it; its wall has corners at half height."""
+    low = rod(5.0, 10.0)
+    body = block(30, 20, 20) - low - rod(5.0, 10.0, (0, 0, 10)) if hole else low + rod(5.0, 10.0, (0, 0, 10))
+    corners = triangles(body).astype(np.float64)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = across / np.linalg.norm(across, axis=1)[:, None]
+    middle = corners.mean(axis=1)
+    wall = (np.hypot(middle[:, 0], middle[:, 1]) < 5.1) & (np.abs(normals[:, 2]) < 0.1)
+    index = np.arange(3 * len(corners)).reshape(-1, 3)
+    z = np.array([0.0, 0.0, 1.0])
+    round_face = BrepFace("cylinder", np.zeros(3), z, 5.0, 0.0, corners[wall].reshape(-1, 3), index[: wall.sum()])
+    flat = [
+        BrepFace("plane", p[0], n, 0.0, 0.0, p, index[:1]) for p, n in zip(corners[~wall], normals[~wall], strict=True)
+    ]
+    return BrepSolid("a", (round_face, *flat), float(body.volume()), np.array([0.0, 0.0, 10.0]), np.eye(3), ())
+
+
+@pytest.mark.parametrize("hole", [False, True])
+def test_a_wall_of_a_step_file_becomes_strips_that_look_out_of_the_part(hole: bool, tmp_path: Path) -> None:
+    solid = drilled(hole)
+    raw = raw_of(tmp_path / "a.step", solid)
+    assert raw.mesh.volume == pytest.approx(solid.size, rel=1e-7)
+    (wall,) = (region for region in raw.regions if region.is_round)
+    assert (wall.hole, wall.is_whole, wall.square) == (hole, True, True)
+    assert wall.radii == (5.0, 5.0)
+    heights = np.unique(np.round(raw.mesh.corners[np.unique(raw.mesh.triangles[wall.triangles])][:, 2], 6))
+    assert heights.tolist() == [0.0, 20.0]
+    outward = raw.mesh.across[wall.triangles] * raw.mesh.corners[raw.mesh.triangles[wall.triangles]].mean(axis=1)
+    assert (np.sign(outward[:, :2].sum(axis=1)) == (-1.0 if hole else 1.0)).all()
+
+
+def test_free_radius_of_a_blind_hole_and_volume_of_its_part(tmp_path: Path) -> None:
+    mesh = block(40, 30, 20) - rod(4, 12, (5, 0, 8), n=48)
+    _, (raw,) = raw_solids(write_stl(mesh, tmp_path / "a.stl"), None)
+    part = import_part(raw, "a", tmp_path, "a.stl")
+    assert part.free_mm["hole1"] == pytest.approx(4.0, abs=0.01)
+    assert 1e9 * part.solid.volume == pytest.approx(24000.0 - disc(4, 12), rel=1e-5)
