@@ -28,7 +28,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.sensor.rays import Sight
-from apo_bench.simulation.sensor.tv import Change, TvCamera
+from apo_bench.simulation.sensor.watch import Change, TvCamera
 from apo_bench.sweeps import sweep
 from apo_bench.sweeps.grid import SweepSettings
 from apo_bench.sweeps.sweep import run_sweep

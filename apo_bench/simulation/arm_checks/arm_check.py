@@ -76,9 +76,9 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
     errors, rest, soft = _errors(scene)
     force = _force(arm, scene)
     drawn = [draw_layout(scenario, np.random.default_rng([seed, 0])) for seed in range(layouts)]
-    found = [_margins(scene, Plan(scenario.assembly, each.start, each.goals)) for each in drawn]
-    good = sum(bool(np.isfinite(each).all()) for each in found)
-    margins = np.min([each for each in found if np.isfinite(each).all()] or found, axis=0)
+    of_layouts = [_margins(scene, Plan(scenario.assembly, each.start, each.goals)) for each in drawn]
+    in_reach = [each for each in of_layouts if np.isfinite(each).all()]
+    margins = np.min(in_reach or of_layouts, axis=0)
     across = max((each.across_mm for each in errors if each.speed < SPEEDS[-1]), default=0.0)
     if not errors:
         missing.append(f"the tip does not reach {HIGH_M * 1e3:g} mm above its home; move 'base' or state 'home_deg'.")
@@ -89,9 +89,10 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
         )
     if force < LEAST_FORCE_N:
         missing.append(f"each pad pushes with {force:.1f} N; parts slip below some {LEAST_FORCE_N:g} N.")
-    if good < layouts:
+    if len(in_reach) < layouts:
         missing.append(
-            f"{layouts - good} of {layouts} layouts are not reached; move 'base' nearer, or state another 'home_deg'."
+            f"{layouts - len(in_reach)} of {layouts} layouts are not reached; move 'base' nearer, or state another "
+            "'home_deg'."
         )
     if np.nanmin(margins, initial=np.inf) < _LEAST_MARGIN_DEG:
         joint = arm.joints[int(np.nanargmin(margins))]
@@ -109,7 +110,7 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
         force_n=force,
         margins_deg=margins,
         layouts=layouts,
-        layouts_reached=good,
+        layouts_reached=len(in_reach),
         clearance_mm=scene.clearance_mm,
         missing=tuple(missing),
     )
@@ -117,26 +118,26 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
 
 def unsaid(arm: Arm) -> list[str]:
     """What a file could say and does not, and what is wrong with the gripper that was measured."""
-    found = []
+    missing = []
     if arm.limits.payload_kg is None:
-        found.append("no payload is stated ('payload_kg'): all is lifted that friction holds.")
+        missing.append("no payload is stated ('payload_kg'): all is lifted that friction holds.")
     if arm.limits.speed_rad_s is None:
-        found.append("no speed of the joints is stated ('speed_deg_s'): none is kept.")
+        missing.append("no speed of the joints is stated ('speed_deg_s'): none is kept.")
     if arm.limits.torque_nm is not None and not np.isfinite(arm.limits.torque_nm).all():
-        found.append("the torque of a joint has no limit in the model; state 'torque_nm'.")
+        missing.append("the torque of a joint has no limit in the model; state 'torque_nm'.")
     if arm.hand is not None and not arm.hand.graded:
-        found.append("the gripper knows open and closed only: it opens fully beside other parts.")
+        missing.append("the gripper knows open and closed only: it opens fully beside other parts.")
     if arm.hand is not None and arm.hand.gives_m > _MOST_GIVING_M:
-        found.append(
+        missing.append(
             f"the fingers give way by {1e3 * arm.hand.gives_m:.1f} mm on a part of half their opening, so it is lost; "
             "take a gripper whose linkage is stiff, or a softer 'closed'."
         )
     if arm.hand is not None and arm.hand.turns_deg > _MOST_TURN_DEG:
-        found.append(
+        missing.append(
             f"the pads turn by {arm.hand.turns_deg:.1f} degrees while the gripper closes to half, so that they hold by "
             "their edges; take a gripper that keeps its pads parallel."
         )
-    return found
+    return missing
 
 
 def _reach(kinematics: Kinematics, arm: Arm) -> Array:
@@ -146,8 +147,7 @@ def _reach(kinematics: Kinematics, arm: Arm) -> Array:
         q = np.array(arm.home)
         reached = 0
         for turn in _TURNS:
-            found = kinematics.inverse(tip_down(np.array([x, y, _TABLE_M]), rest + turn), q, 25)
-            reached += found is not None
+            reached += kinematics.inverse(tip_down(np.array([x, y, _TABLE_M]), rest + turn), q, 25) is not None
         rows.append((x, y, reached / len(_TURNS)))
     return np.array(rows)
 

@@ -48,8 +48,8 @@ _DRIVES = MappingProxyType(
 )
 ATTRIBUTES: Mapping[str, frozenset[str]] = MappingProxyType(
     {
-        tag: frozenset(said.split())
-        for tag, said in {
+        tag: frozenset(words.split())
+        for tag, words in {
             "mujoco": "model",
             "compiler": "angle autolimits eulerseq meshdir texturedir assetdir strippath balanceinertia boundmass "
             "boundinertia inertiafromgeom inertiagrouprange discardvisual fusestatic usethread alignfree saveinertial "
@@ -82,8 +82,8 @@ ATTRIBUTES: Mapping[str, frozenset[str]] = MappingProxyType(
 """Element -> what it may say, wherever it stands."""
 INSIDE: Mapping[str, frozenset[str]] = MappingProxyType(
     {
-        outer: frozenset(said.split())
-        for outer, said in {
+        outer: frozenset(words.split())
+        for outer, words in {
             "mujoco": "compiler default worldbody asset contact equality tendon actuator",
             "default": "default geom joint site mesh tendon equality general motor position velocity intvelocity "
             "damper",
@@ -188,7 +188,7 @@ ARM_REMEDIES: Mapping[str, str] = MappingProxyType(
         "model": "write all bodies into one file, or <include> it",
         "extension": "plugins are code",
         "plugin": "plugins are code",
-        "material": "colours are said by rgba=",
+        "material": "colours are words by rgba=",
     }
 )
 """What to do instead."""

@@ -31,7 +31,7 @@ def load_model(path: Path, kind: str) -> Any:
     try:
         spec = mujoco.MjSpec.from_string(tree.text)
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
-        raise InputError(f"{path}: MuJoCo cannot read this MJCF file of the {kind}: {_said(error)}.") from error
+        raise InputError(f"{path}: MuJoCo cannot read this MJCF file of the {kind}: {_reason(error)}.") from error
     _check_world(spec, path, kind)
     for geom in list(spec.geoms):
         if geom.type == mujoco.mjtGeom.mjGEOM_MESH and not geom.contype and not geom.conaffinity:
@@ -53,7 +53,7 @@ def compiled(spec: Any, path: Path) -> Any:
     try:
         return spec.compile()
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
-        raise InputError(f"{path}: MuJoCo cannot compile this: {_said(error)}; mend the file.") from error
+        raise InputError(f"{path}: MuJoCo cannot compile this: {_reason(error)}; mend the file.") from error
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
@@ -72,14 +72,15 @@ def _check_world(spec: Any, path: Path, kind: str) -> None:
                 f"{path}: the joint '{joint.name}' of the {kind} neither turns nor slides; arms have hinges, and "
                 "grippers hinges and slides."
             )
-    moving = [body.name for body in spec.worldbody.bodies if _has_joint(body)]
+    moving = [body.name for body in spec.worldbody.bodies if body.find_all("joint")]
     if len(moving) > 1:
         raise InputError(
             f"{path}: the {kind} has {len(moving)} bodies that move on their own ({', '.join(moving[:4])}); give one."
         )
     for equality in spec.equalities:
-        to_body = equality.type in (mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_CONNECT)
-        if to_body and (equality.objtype == mujoco.mjtObj.mjOBJ_BODY) and _is_world(equality):
+        holds = equality.type in (mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_CONNECT)
+        bodies = {equality.name1, equality.name2} if equality.objtype == mujoco.mjtObj.mjOBJ_BODY else set()
+        if holds and bodies & {"", "world"}:
             raise InputError(
                 f"{path}: the equality '{equality.name}' ties something to the world; remove it, the arm moves."
             )
@@ -107,14 +108,6 @@ def check_surroundings(model: Any, path: Path) -> None:
             )
 
 
-def _has_joint(body: Any) -> bool:
-    return bool(body.find_all("joint"))
-
-
-def _is_world(equality: Any) -> bool:
-    return any(name in ("", "world") for name in (equality.name1, equality.name2))
-
-
 def _keep_meshes(spec: Any, path: Path, kind: str) -> None:
     """Meshes that something touches by."""
     used = {geom.meshname for geom in spec.geoms if geom.meshname}
@@ -135,6 +128,6 @@ def _keep_meshes(spec: Any, path: Path, kind: str) -> None:
         )
 
 
-def _said(error: Exception) -> str:
+def _reason(error: Exception) -> str:
     """What MuJoCo says, in one line."""
     return one_line(" ".join(str(error).split()).rstrip("."), _LONGEST)

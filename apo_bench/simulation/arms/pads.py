@@ -31,7 +31,8 @@ def pads_of(
     ]
     moving = [g for g in touching if np.linalg.norm(way[g]) > _MOVES_M]
     if gripper.pads is not None:
-        named = [[g for g in touching if _is(model, g, name)] for name in gripper.pads]
+        called = {g: (model.geom(g).name, model.body(int(model.geom_bodyid[g])).name) for g in touching}
+        named = [[g for g in touching if name in called[g]] for name in gripper.pads]
         for name, geoms in zip(gripper.pads, named, strict=True):
             if not geoms:
                 raise InputError(f"{rig.path}, gripper: nothing that could touch a part is called '{name}'.")
@@ -70,11 +71,6 @@ def geom_reach(model: Any, data: Any, geom: int, ahead: Array) -> float:
     centre = model.geom_aabb[geom, :3]
     half = model.geom_aabb[geom, 3:]
     return float(data.geom_xpos[geom] @ ahead + centre @ along + half @ np.abs(along))
-
-
-def _is(model: Any, geom: int, name: str) -> bool:
-    """Whether a geom, or a body that it is fixed to, has a name."""
-    return name in (model.geom(geom).name, model.body(int(model.geom_bodyid[geom])).name)
 
 
 def _snapped(direction: Array, R: Array, near: float) -> Array:

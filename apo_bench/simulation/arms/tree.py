@@ -188,14 +188,14 @@ def _check_option(path: Path, option: Element) -> None:
 
 def _meshes(root: Element, path: Path, kind: str) -> list[Path]:
     """The files of meshes that are named, each set to its whole path; what is not there is said where it is used."""
-    found = []
+    files = []
     size = 0
-    folders = [element.attrib for element in root.iter("compiler")]
-    beside = next((said[key] for key in ("meshdir", "assetdir") for said in folders[::-1] if key in said), "")
-    strip = any(said.get("strippath") == "true" for said in folders)
-    for element in root.iter("compiler"):
+    compilers = [element.attrib for element in root.iter("compiler")]
+    beside = next((each[key] for key in ("meshdir", "assetdir") for each in compilers[::-1] if key in each), "")
+    strip = any(each.get("strippath") == "true" for each in compilers)
+    for attributes in compilers:
         for key in ("meshdir", "texturedir", "assetdir", "strippath"):
-            element.attrib.pop(key, None)
+            attributes.pop(key, None)
     for assets in root.iter("asset"):
         names: set[str] = set()
         for mesh in list(assets):
@@ -206,18 +206,18 @@ def _meshes(root: Element, path: Path, kind: str) -> list[Path]:
             names.add(name)
             if "file" not in mesh.attrib:
                 continue
-            said = PurePosixPath(mesh.attrib["file"]).name if strip else mesh.attrib["file"]
-            file = path.parent / beside / said
+            stated = PurePosixPath(mesh.attrib["file"]).name if strip else mesh.attrib["file"]
+            file = path.parent / beside / stated
             mesh.set("name", name)
             mesh.set("file", str(file.absolute()))
             if file.suffix.lower() not in MESHES:
-                _refuse(path, f"the mesh file {one_line(said, _LONGEST)} is none of {', '.join(MESHES)}")
+                _refuse(path, f"the mesh file {one_line(stated, _LONGEST)} is none of {', '.join(MESHES)}")
             if file.exists():
                 size += checked_size(file, kind)
-                found.append(file)
+                files.append(file)
     if size > MOST_MESH_BYTES * 5:
         _refuse(path, f"its meshes have {size / 1e6:.0f} MB; {MOST_MESH_BYTES * 5 / 1e6:g} are the most")
-    return found
+    return files
 
 
 def checked_size(file: Path, kind: str) -> int:

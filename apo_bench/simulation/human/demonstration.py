@@ -14,9 +14,8 @@ from apo_bench.records.outcomes import sentence
 from apo_bench.scenario.human_error import careless_covariance, spread_error
 from apo_bench.scenario.scenario import Carelessness
 from apo_bench.simulation.hooks import Hooks
-from apo_bench.simulation.human.acts import act
 from apo_bench.simulation.human.hands import Hands
-from apo_bench.simulation.human.perform import STAND_STILL_S, perform
+from apo_bench.simulation.human.perform import STAND_STILL_S, act, perform
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import has_failed, sleeping, snapshot
 

@@ -114,8 +114,8 @@ def _no_window() -> str:
     if window:
         glfw.destroy_window(window)
         return ""
-    said: Any = glfw.get_error()[1]
-    return said.decode(errors="replace") if said else "there is no display"
+    message: Any = glfw.get_error()[1]
+    return message.decode(errors="replace") if message else "there is no display"
 
 
 def _hidden_window(glfw: Any) -> Any:

@@ -67,19 +67,19 @@ def build_scene(
     check("grasp", grasp)
     clearance = scenario.clearance_mm if clearance_mm is None else clearance_mm
     check_clearance(scenario, clearance)
-    found = find_arm(arm)
+    robot = find_arm(arm)
     settings = physics(timestep_s)
-    kinematics = Kinematics(found)
+    kinematics = Kinematics(robot)
     shown = _compiled(scenario, parts_and_hands(scenario, clearance, settings))
     shown.model.opt.sleep_tolerance = _DROWSY_M_S
-    work = _compiled(scenario, parts_and_arm(scenario, clearance, settings, found, grasp, kinematics.first_link))
+    work = _compiled(scenario, parts_and_arm(scenario, clearance, settings, robot, grasp, kinematics.first_link))
     if grasp == "friction":
-        check_holdable(scenario, work, found)
+        check_holdable(scenario, work, robot)
     return Scene(
         scenario=scenario,
         clearance_mm=clearance,
         grasp="weld" if grasp == "weld" else "friction",
-        arm=found,
+        arm=robot,
         physics=settings,
         pieces={name: physical_pieces(s, clearance * 1e-3) for name, s in scenario.assembly.solids.items()},
         shown=shown,

@@ -48,7 +48,7 @@ def simulated_pieces(solid: Solid, clearance_m: float) -> Mapping[str, tuple[Pie
 
 
 def _cut(solid: Solid, pieces: tuple[Piece, ...], clearance_m: float) -> Mapping[str, tuple[Piece, ...]]:
-    made: dict[str, tuple[Piece, ...]] = {piece.name: (piece,) for piece in pieces}
+    cut: dict[str, tuple[Piece, ...]] = {piece.name: (piece,) for piece in pieces}
     behind: list[Hull] = []
     walls: dict[str, Hull] = {}
     for face in solid.rounds.values():
@@ -61,17 +61,17 @@ def _cut(solid: Solid, pieces: tuple[Piece, ...], clearance_m: float) -> Mapping
                 behind += _joined([out for out in outer if out is not None])
     flats = [plane for plane in _flats(solid, clearance_m) if any(_has_side(hull, plane) for hull in behind)]
     for name, hull in walls.items():
-        made[name] = (_stood_back(hull, flats),)
+        cut[name] = (_stood_back(hull, flats),)
     for hull in behind:
-        made[hull.name] += (Hull(f"{hull.name}_behind", hull.corners),)
-    return made
+        cut[hull.name] += (Hull(f"{hull.name}_behind", hull.corners),)
+    return cut
 
 
 def _walls(face: RoundFace, pieces: Iterable[Piece], clearance_m: float) -> Iterator[_Wall]:
     """The wedges whose side is a wall of a hole, with where the wall ends."""
     w = 1.0 / np.sqrt(1.0 + face.slope**2)
     radius = face.radii[0] - face.slope * face.span[0] + clearance_m * face.fit / w
-    found = []
+    wedges = []
     for piece in pieces:
         if not isinstance(piece, Hull) or piece.cylinder is not None:
             continue
@@ -80,12 +80,12 @@ def _walls(face: RoundFace, pieces: Iterable[Piece], clearance_m: float) -> Iter
         on = np.abs(n @ face.axis - face.slope * w) < _PARALLEL
         on &= np.abs(n @ face.point - d - radius * w) < _ON_M
         if on.sum() == 1:
-            found.append((piece, _sector(face, -n[on][0])))
-    if not found:
+            wedges.append((piece, _sector(face, -n[on][0])))
+    if not wedges:
         return
-    reach = [float((hull.corners @ u).max() - face.point @ u) for hull, u in found]
+    reach = [float((hull.corners @ u).max() - face.point @ u) for hull, u in wedges]
     widest = max(face.radii) + clearance_m * face.fit
-    for (hull, u), far in zip(found, reach, strict=True):
+    for (hull, u), far in zip(wedges, reach, strict=True):
         thick = min(_THICK_M, (far - widest) / 2)
         if thick > _THINNEST_M:
             yield _Wall(hull, np.append(u, u @ face.point + widest + thick))
