@@ -77,16 +77,18 @@ FAULTS = (
     Fault("judging/judgement.py", "np.degrees(snapshot.spin_rad_s)", "snapshot.spin_rad_s", "rad/s taken for deg/s"),
     Fault("judging/verdict.py", "or not self.demonstrated.holds)", "or self.demonstrated.holds)", "the wrong reason"),
     Fault(
-        "sweeps/dispatch.py",
+        "sweeps/work/dispatch.py",
         "self._now - job.heard > STARTING_S",
         "self._now - job.heard > self._limit_s",
         "a worker that compiles has the limit of a trial",
     ),
-    Fault("sweeps/dispatch.py", "min(now - self._looked, _LONGEST_TURN_S)", "now - self._looked", "sleep counts"),
+    Fault("sweeps/work/dispatch.py", "min(now - self._looked, _LONGEST_TURN_S)", "now - self._looked", "sleep counts"),
     Fault(
         "sweeps/grid.py", "<= seed < grid.seed + grid.trials]", "<= seed <= grid.seed + grid.trials]", "one too many"
     ),
-    Fault("sweeps/worker.py", 'row["failure_stage"] == "worker"', "False", "a lost trial is judged by its time again"),
+    Fault(
+        "sweeps/work/worker.py", 'row["failure_stage"] == "worker"', "False", "a lost trial is judged by its time again"
+    ),
     Fault("sweeps/progress.py", "(total - ended) / ended", "total / ended", "the time left does not fall"),
     Fault("assembly/topology.py", "Term(k), *inverted(before)", "Term(k), *before", "a carried part goes twice"),
     Fault(

@@ -1,4 +1,4 @@
-"""The door for learners: `APOReplay-v0`."""
+"""The door for learners: `APOReplay-v0`. It is long, as the docstring of the class is its page for learners."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -7,17 +7,15 @@ from typing import Any, final
 
 import gymnasium
 import numpy as np
-from gymnasium import spaces
-from numpy.typing import NDArray
 
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.goals import Observation, Plan, Poses, Step
 from apo_bench.assembly.reached import Outcome
 from apo_bench.assembly.topology import Assembly
-from apo_bench.envs.episode import Scenes, Settings, with_options
-from apo_bench.envs.nullable import predicted_info, whole
+from apo_bench.envs.episode import Episode, Scenes, Settings, with_options
+from apo_bench.envs.infos import step_info
+from apo_bench.envs.spaces import Action, Seen, action_space, as_seen_entries, moved, observation_space
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level, make_noise
@@ -43,20 +41,11 @@ from apo_bench.trial.stages import (
     trial_outcome,
 )
 
-ROOM_M = 2.0
-"""Every goal lies within this of the origin, per axis; a gross outlier beyond is given at the wall of this room."""
-LARGEST_DEVIATION = np.repeat([0.5, np.pi], 3)
-"""No stated standard deviation is larger, [m, rad]."""
-LARGEST_TWIST = np.repeat([0.1, 0.5], 3)
-"""How far an action can move a goal per axis, [m, rad]."""
 PICTURE = (480, 640)
 LONGEST_REPLAY_S = 1000.0
 """Simulated time after which a replay begins no further step: seven times the longest of the benchmark."""
 MOST_TRIES = 30
 """So many demonstrations in a row may go wrong before `reset()` gives up."""
-
-Action = NDArray[np.float64]
-Seen = dict[str, Any]
 
 
 @final
@@ -162,22 +151,9 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             load_scenario(scenario), clearance_mm=clearance_mm, grasp=grasp, arm=arm, timestep_s=timestep_s
         )
         self._scenes = Scenes(self._scene)
-        n = len(self.assembly)
-        far = np.tile([ROOM_M] * 3 + [1.0] * 4, (n, 1))
-        unsure = np.tile(np.outer(LARGEST_DEVIATION, LARGEST_DEVIATION), (n, 1, 1))
-        twist = np.tile(LARGEST_TWIST, (n, 1))
-        self.observation_space = spaces.Dict(
-            {
-                "goals": spaces.Box(-far, far, dtype=np.float64),
-                "covariance": spaces.Box(-unsure, unsure, dtype=np.float64),
-                "seen": spaces.MultiBinary(n),
-            }
-        )
-        self.action_space = spaces.Box(-twist, twist, dtype=np.float64)
-        self._trial: int | None = None
-        self._simulated: SimulatedDemonstration | None = None
-        self._seen: Observation | None = None
-        self._look: Looks | None = None
+        self.observation_space = observation_space(len(self.assembly))
+        self.action_space = action_space(len(self.assembly))
+        self._episode: Episode | None = None
         self._aim: Plan | None = None
         self._refused: Outcome | None = None
         self._over = False
@@ -197,9 +173,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         Raises:
             ResetNeeded: There is no episode yet.
         """
-        if self._seen is None:
-            raise gymnasium.error.ResetNeeded("nothing was seen yet; call reset() first.")
-        return self._seen
+        return self._current("nothing was seen").seen
 
     @property
     def look(self) -> Looks | None:
@@ -208,9 +182,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         Raises:
             ResetNeeded: There is no episode yet.
         """
-        if self._allowed and self._look is None:
-            raise gymnasium.error.ResetNeeded("nothing was seen yet; call reset() first.")
-        return self._look
+        return self._current("nothing was seen").look if self._allowed else None
 
     @property
     def trial(self) -> int:
@@ -221,9 +193,12 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         Raises:
             ResetNeeded: There is no episode yet.
         """
-        if self._trial is None:
-            raise gymnasium.error.ResetNeeded("there is no trial yet; call reset() first.")
-        return self._trial
+        return self._current("there is no trial").trial
+
+    def _current(self, missing: str) -> Episode:
+        if self._episode is None:
+            raise gymnasium.error.ResetNeeded(f"{missing} yet; call reset() first.")
+        return self._episode
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
         """Watch another demonstration; `seed=k` is trial k.
@@ -240,17 +215,17 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._set(with_options(self._usual, options, self._eye))
         super().reset(seed=seed)
         self._over = True
-        self._trial, simulated = self._watch_human(seed)
+        trial, simulated = self._watch_human(seed)
         noise = range_sensor(self._scene, simulated, self._now.level.mm) if self._eye == RANGE else self._noise
-        self._seen = observe_demonstration(simulated, noise, self._trial)
-        self._look = looks_at(simulated, noise, self._trial, self._allowed) if self._allowed else None
-        self._simulated = replace(simulated, images=None)
-        self.aim(self._seen.goals)
-        self._refused = observation_failure(self._seen)
+        seen = observe_demonstration(simulated, noise, trial)
+        look = looks_at(simulated, noise, trial, self._allowed) if self._allowed else None
+        self._episode = Episode(trial, replace(simulated, images=None), seen, look)
+        self.aim(seen.goals)
+        self._refused = observation_failure(seen)
         self._over = False
         self._poses = simulated.layout.start
         self._state = None
-        return self._observation(), {"demonstration": simulated.demonstration.code}
+        return as_seen_entries(seen), {"demonstration": simulated.demonstration.code}
 
     def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
         """Replay the goals, each moved by its twist.
@@ -259,26 +234,13 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             ResetNeeded: The episode is over, or there is none.
             InputError: The action is not in the action space.
         """
-        if self._simulated is None or self._aim is None or self._over:
+        if self._aim is None or self._over:
             raise gymnasium.error.ResetNeeded("one step is one whole replay; call reset() for the next demonstration.")
-        twist = np.asarray(action, dtype=np.float64)
-        if not self.action_space.contains(twist):
-            raise InputError(
-                f"an action of shape {twist.shape} with numbers from {np.min(twist, initial=0):g} to "
-                f"{np.max(twist, initial=0):g} was given; shape {self.action_space.shape} within 0.1 m and 0.5 rad is "
-                "allowed, as `env.action_space` says."
-            )
+        plan = moved(self._aim, action, self.action_space)
         self._over = True
-        verdicts, end, predicted = self._replayed(self._simulated, _moved(self._aim, pose.exp(twist)))
-        info = {
-            **verdicts,
-            "stage": end.stage,
-            "code": end.code,
-            "operation": whole(None if end.operation is None else end.operation + 1),
-            "sentence": end.sentence,
-            **({} if predicted is None else {"predicted": predicted_info(predicted)}),
-        }
-        return self._observation(), float(verdicts["is_success"]), True, False, info
+        verdicts, end, predicted = self._replayed(plan)
+        info = step_info(verdicts, end, predicted)
+        return as_seen_entries(self.seen), float(verdicts["is_success"]), True, False, info
 
     def aim(self, goals: Array, schedule: Sequence[Step] = (), targets: Array | None = None) -> None:
         """Replay this on zeros, until the next reset; for wrappers.
@@ -333,7 +295,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     def _watch_human(self, seed: int | None) -> tuple[int, SimulatedDemonstration]:
         """Trial `seed`, or the next one whose demonstration is right."""
         for _ in range(1 if seed is not None else MOST_TRIES):
-            trial = int(seed) if seed is not None else self._next_trial()
+            trial = int(seed) if seed is not None else int(self.np_random.integers(2**31))
             simulated = simulate_demonstration(self._scene, self._now.careless, trial, self._eye)
             if seed is not None or simulated.demonstration.code == "ok":
                 return trial, simulated
@@ -343,32 +305,23 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             "the scenario."
         )
 
-    def _next_trial(self) -> int:
-        return int(self.np_random.integers(2**31))
-
-    def _observation(self) -> Seen:
-        """Fresh copies of what was seen."""
-        goals = packed(self.seen.goals)
-        return {"goals": goals, "covariance": self.seen.covariance.copy(), "seen": self.seen.seen.astype(np.int8)}
-
-    def _replayed(
-        self, simulated: SimulatedDemonstration, plan: Plan
-    ) -> tuple[dict[str, bool], Outcome, Predicted | None]:
+    def _replayed(self, plan: Plan) -> tuple[dict[str, bool], Outcome, Predicted | None]:
         """The verdicts, where it ended, and what the plan had said."""
+        episode = self._current("there is no trial")
+        simulated = episode.simulated
         failed = dict.fromkeys(("is_success", "as_demonstrated", "loose_success"), False)
         if simulated.demonstration.code != "ok":
             return failed, demonstration_failure(simulated.demonstration), None
         if self._refused is not None:
             return failed, self._refused, None
         predicted = predicted_outcome(plan, self._scene)
-        assert self._trial is not None
         attempt = replay_and_judge(
             plan,
             self._scene,
             simulated.layout.goals,
             self._watch(),
             most_s=LONGEST_REPLAY_S,
-            error=draw_robot_error(self._robot_error, self._scene, self._trial),
+            error=draw_robot_error(self._robot_error, self._scene, episode.trial),
         )
         if attempt.result.reached.final is not None:
             self._poses = attempt.result.reached.final.poses
@@ -387,15 +340,3 @@ class APOReplay(gymnasium.Env[Seen, Action]):
 
     def _remember(self, data: Any) -> None:
         self._state = np.array(data.qpos)
-
-
-def packed(goals: Array) -> Array:
-    """Goals (n, 4, 4) as observations hold them, (n, 7), within the bounds of their space."""
-    far = [ROOM_M] * 3 + [1.0] * 4  # of a quaternion, rounding alone could be beyond
-    return np.clip(pose.pack(goals), np.negative(far), far)
-
-
-def _moved(plan: Plan, twists: Array) -> Plan:
-    """Every goal and every target of an operation with the displacement of that operation, (n, 4, 4), on its right."""
-    done = [step.operation for step in plan.schedule]
-    return replace(plan, goals=plan.goals @ twists, targets=plan.targets @ twists[done])

@@ -4,7 +4,8 @@ from typing import Any, final
 
 import gymnasium
 
-from apo_bench.envs.apo_replay import Action, APOReplay, Seen, packed
+from apo_bench.envs.apo_replay import APOReplay
+from apo_bench.envs.spaces import Action, Seen, packed
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.records.short_names import CORRECTOR, CORRECTORS, SIMULATED
@@ -48,16 +49,16 @@ class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.R
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
         """Watch another demonstration and correct it."""
         seen, info = self.env.reset(seed=seed, options=options)
-        made = self._correct(self._base.seen, self._corrector, self._base.look)
-        goals = made.goals
-        if made.ok:
-            plan = self._base.planned(made)
+        correction = self._correct(self._base.seen, self._corrector, self._base.look)
+        goals = correction.goals
+        if correction.ok:
+            plan = self._base.planned(correction)
             goals = plan.goals
             self._base.aim(goals, plan.schedule, plan.targets)
         else:
-            self._base.refuse(made.status, made.sentence)
+            self._base.refuse(correction.status, correction.sentence)
         self._goals = packed(goals)
-        return self._with_goals(seen), {**info, "correction": made.status}
+        return self._with_goals(seen), {**info, "correction": correction.status}
 
     def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
         """Replay the corrected goals, each moved by its twist."""

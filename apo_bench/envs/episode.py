@@ -1,13 +1,16 @@
-"""The settings of one episode: what `reset(options=...)` may say."""
+"""One episode: its settings, which `reset(options=...)` may say, its scene, and what was seen in it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, final
 
+from apo_bench.assembly.goals import Observation
 from apo_bench.errors import InputError, unknown
+from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level
 from apo_bench.records.settings import check, level_pair
 from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.trial.stages import SimulatedDemonstration
 
 MOST_SCENES = 8
 """So many compiled scenes of other clearances are kept."""
@@ -29,6 +32,19 @@ class Settings:
             check("clearance_mm", self.clearance_mm)
 
 
+@final
+@dataclass(frozen=True, eq=False)
+class Episode:
+    """One trial as it was demonstrated and seen."""
+
+    trial: int
+    simulated: SimulatedDemonstration
+    """Without its images."""
+    seen: Observation
+    look: Looks | None
+    """None where no looks are allowed."""
+
+
 _OPTIONS = tuple(field.name for field in fields(Settings))
 
 
@@ -44,13 +60,13 @@ def with_options(usual: Settings, options: object, eye: str) -> Settings:
         raise InputError(
             f"the options {options!r} were given to reset(); a dict with {', '.join(_OPTIONS)} is allowed."
         )
-    said: dict[str, Any] = dict(options)
-    for name in said:
+    changes: dict[str, Any] = dict(options)
+    for name in changes:
         if name not in _OPTIONS:
             raise InputError(unknown("option of reset()", str(name), _OPTIONS))
-    if "level" in said:
-        said["level"] = Level(*level_pair(said["level"], eye))
-    return replace(usual, **said)
+    if "level" in changes:
+        changes["level"] = Level(*level_pair(changes["level"], eye))
+    return replace(usual, **changes)
 
 
 @final
@@ -71,7 +87,7 @@ class Scenes:
         clearance = float(usual.scenario.clearance_mm if clearance_mm is None else clearance_mm)
         if clearance == usual.clearance_mm:
             return usual
-        found = self._others.pop(clearance, None) or build_scene(
+        scene = self._others.pop(clearance, None) or build_scene(
             usual.scenario,
             clearance_mm=clearance,
             grasp=usual.grasp,
@@ -80,5 +96,5 @@ class Scenes:
         )
         while len(self._others) >= MOST_SCENES:
             del self._others[next(iter(self._others))]
-        self._others[clearance] = found
-        return found
+        self._others[clearance] = scene
+        return scene

@@ -22,7 +22,7 @@ from apo_bench.assembly.reached import Outcome
 from apo_bench.correction.correctors import correct
 from apo_bench.envs import apo_replay as envs
 from apo_bench.envs.apo_replay import APOReplay
-from apo_bench.envs.nullable import predicted_info, whole
+from apo_bench.envs.infos import nullable, predicted_info
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise
@@ -259,7 +259,10 @@ def test_infos_of_different_endings_go_into_one_vector_environment() -> None:
     many: Any = gymnasium.vector.VectorEnv()
     many.num_envs = 2
     endings = [
-        {"operation": whole(k), "predicted": predicted_info({"fails": True, "operation": k, "code": "c", "size_mm": x})}
+        {
+            "operation": nullable(k),
+            "predicted": predicted_info({"fails": True, "operation": k, "code": "c", "size_mm": x}),
+        }
         for k, x in ((3, 1.5), (None, None))
     ]
     for order in (endings, endings[::-1]):

@@ -17,6 +17,7 @@ from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.goals import Observation
 from apo_bench.envs import episode
 from apo_bench.envs.apo_replay import APOReplay
+from apo_bench.envs.spaces import as_seen_entries
 from apo_bench.errors import InputError
 from apo_bench.observation.noise import NOISES, Level, make_noise
 from apo_bench.records.settings import TrialSettings
@@ -101,10 +102,10 @@ def test_a_correction_can_be_pickled() -> None:
 
 @pytest.mark.parametrize("name", [*NOISES, "megapose-lmo"])
 def test_every_noise_model_travels(env: APOReplay, name: str) -> None:
-    assert env._recording is not None
+    assert env._episode is not None
     noise = make_noise(name, Level(1.0, 1.0))
     here, there = (
-        model(env.assembly, env._recording.demonstration, np.random.default_rng(1))
+        model(env.assembly, env._episode.simulated.demonstration, np.random.default_rng(1))
         for model in (noise, pickle.loads(pickle.dumps(noise)))
     )
     np.testing.assert_array_equal(here.goals, there.goals)
@@ -146,7 +147,7 @@ def test_a_window_is_not_copied(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_options_are_of_one_episode(env: APOReplay, options: dict[str, Any]) -> None:
     """It is that of an environment which was made with them, and the next one is as ever."""
     other = copy.deepcopy(env)
-    usual = env._observation(), {"demonstration": "ok"}
+    usual = as_seen_entries(env.seen), {"demonstration": "ok"}
     got = other.reset(seed=SEED, options=options)
     assert same(got, APOReplay(grasp="weld", **options).reset(seed=SEED))
     assert not same(got, usual)

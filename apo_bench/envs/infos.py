@@ -1,0 +1,45 @@
+"""What an environment says in `info`, where a number may be missing.
+
+A vector environment gathers the infos of its environments into arrays. If the first has an `int` it makes an array
+that holds nothing but ints, and a None of the next one raises; numbers of these types go into an array of objects.
+"""
+
+from collections.abc import Mapping
+from typing import Any, final
+
+from apo_bench.assembly.reached import Outcome
+from apo_bench.records.row import Predicted
+
+
+@final
+class NullableInt(int):
+    """A whole number beside which None may stand."""
+
+
+@final
+class NullableFloat(float):
+    """A number beside which None may stand."""
+
+
+def nullable(x: float | None) -> float | None:
+    """The number as one beside which None may stand."""
+    if x is None:
+        return None
+    return NullableInt(x) if isinstance(x, int) else NullableFloat(x)
+
+
+def predicted_info(predicted: Mapping[str, Any]) -> dict[str, Any]:
+    """What a plan said about itself, as in a row, fit for infos."""
+    return {**predicted, **{name: nullable(predicted[name]) for name in ("operation", "size_mm")}}
+
+
+def step_info(verdicts: Mapping[str, bool], end: Outcome, predicted: Predicted | None) -> dict[str, Any]:
+    """What is said after a step: the verdicts, where the replay ended, and what the plan had said of itself."""
+    return {
+        **verdicts,
+        "stage": end.stage,
+        "code": end.code,
+        "operation": nullable(None if end.operation is None else end.operation + 1),
+        "sentence": end.sentence,
+        **({} if predicted is None else {"predicted": predicted_info(predicted)}),
+    }

@@ -1,0 +1,76 @@
+"""What a learner sees and does: the spaces of `APOReplay-v0`, and observations and plans in their terms."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from apo_bench.assembly.goals import Observation, Plan
+from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array
+
+ROOM_M = 2.0
+"""Every goal lies within this of the origin, per axis; a gross outlier beyond is given at the wall of this room."""
+LARGEST_DEVIATION = np.repeat([0.5, np.pi], 3)
+"""No stated standard deviation is larger, [m, rad]."""
+_LARGEST_TWIST = np.repeat([0.1, 0.5], 3)
+"""How far an action can move a goal per axis, [m, rad]."""
+_FAR = np.repeat([ROOM_M, 1.0], [3, 4])
+"""Of a packed pose, (7,); of a quaternion, rounding alone could be beyond."""
+
+Action = NDArray[np.float64]
+Seen = dict[str, Any]
+
+
+def observation_space(n: int) -> spaces.Dict:
+    """The observations of `n` operations."""
+    far = np.tile(_FAR, (n, 1))
+    unsure = np.tile(np.outer(LARGEST_DEVIATION, LARGEST_DEVIATION), (n, 1, 1))
+    return spaces.Dict(
+        {
+            "goals": spaces.Box(-far, far, dtype=np.float64),
+            "covariance": spaces.Box(-unsure, unsure, dtype=np.float64),
+            "seen": spaces.MultiBinary(n),
+        }
+    )
+
+
+def action_space(n: int) -> spaces.Space[Action]:
+    """A body twist for each of `n` operations."""
+    twist = np.tile(_LARGEST_TWIST, (n, 1))
+    return spaces.Box(-twist, twist, dtype=np.float64)
+
+
+def as_seen_entries(observation: Observation) -> Seen:
+    """Fresh copies of what was seen."""
+    return {
+        "goals": packed(observation.goals),
+        "covariance": observation.covariance.copy(),
+        "seen": observation.seen.astype(np.int8),
+    }
+
+
+def packed(goals: Array) -> Array:
+    """Goals (n, 4, 4) as observations hold them, (n, 7), within the bounds of their space."""
+    return np.clip(pose.pack(goals), -_FAR, _FAR)
+
+
+def moved(plan: Plan, action: Action, space: spaces.Space[Action]) -> Plan:
+    """Every goal and every target of an operation with the displacement of that operation on its right.
+
+    Raises:
+        InputError: The action is not in the action space.
+    """
+    twist = np.asarray(action, dtype=np.float64)
+    if not space.contains(twist):
+        raise InputError(
+            f"an action of shape {twist.shape} with numbers from {np.min(twist, initial=0):g} to "
+            f"{np.max(twist, initial=0):g} was given; shape {space.shape} within 0.1 m and 0.5 rad is "
+            "allowed, as `env.action_space` says."
+        )
+    displacements = pose.exp(twist)
+    done = [step.operation for step in plan.schedule]
+    return replace(plan, goals=plan.goals @ displacements, targets=plan.targets @ displacements[done])
