@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from apo_bench.show.sensor_picture import draw_sensor
-from apo_bench.show.sensor_run import run_sensor
+from apo_bench.show.sensor import draw_sensor, run_sensor
 
 HERE = Path(__file__).parent
 SHOWN = {"stick_in_tower": 7, "carried_bridge": 2}

@@ -12,12 +12,12 @@ from apo_bench.observation.observing import observe
 from apo_bench.show.noise_card import (
     SCENARIO,
     draw_errors,
+    draw_histogram,
     drawn_sentence,
     listed_models,
     model_description,
     nominal_demonstration,
 )
-from apo_bench.show.noise_picture import draw_histogram
 
 HERE = Path(__file__).parent
 PAGE = HERE / "reference" / "noise-models.md"

@@ -50,7 +50,7 @@ def noise_card(
     from apo_bench.observation.noise import Level
     from apo_bench.records.settings import check
     from apo_bench.show import noise_card as cards
-    from apo_bench.show.noise_picture import draw_histogram
+    from apo_bench.show.noise_card import draw_histogram
 
     check("level_mm", level, called="level")
     check_outputs([(out, "--out", (".png",))])

@@ -25,7 +25,7 @@ def eye_command(
     as_json: AsJson = False,
 ) -> None:
     """Watch a demonstration with a range finder: what moved, which part it was, where it went."""
-    from apo_bench.show.sensor_run import checked_view, run_sensor, sensor_form, sensor_lines
+    from apo_bench.show.sensor import checked_view, run_sensor, sensor_form, sensor_lines
 
     check_outputs([(out, "--out", (".png",))])
     drawn_view = checked_view(view)
@@ -36,7 +36,7 @@ def eye_command(
     else:
         typer.echo("\n".join(sensor_lines(form)))
     if out is not None:
-        from apo_bench.show.sensor_picture import draw_sensor
+        from apo_bench.show.sensor import draw_sensor
 
         draw_sensor(sensor_run, out, drawn_view)
         if not as_json:

@@ -46,9 +46,9 @@ def replay_command(
 
     check_outputs([(video, "--video", (".mp4", ".gif")), (save_observation, "--save-observation", (".json",))])
     if view:
-        from apo_bench.show.viewing import choose_place
+        from apo_bench.show.viewing import choose_viewer
 
-        place = choose_place(port)
+        place = choose_viewer(port)
     elif port is not None:
         raise InputError(f"--port {port}, which is for --view, was given without it; leave it out.")
     if view and trial_limit is not None:

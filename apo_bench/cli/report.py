@@ -60,10 +60,10 @@ def compare_command(
     comparison = compare(first, second)
     if out is None and not as_json:
         out = Path("comparison")
-    written = None if out is None else write_comparison(comparison, out)
+    page = None if out is None else write_comparison(comparison, out)
     if as_json:
         print_json(comparison_form(comparison))
     else:
         print_comparison(comparison)
-        if written is not None:
-            typer.echo(f"Page: {written.page}")
+        if page is not None:
+            typer.echo(f"Page: {page}")

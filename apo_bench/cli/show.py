@@ -76,7 +76,7 @@ def view_command(
     from apo_bench.cli.terminal import print_row
     from apo_bench.scenario.file import load_scenario
     from apo_bench.show.trial_again import trial_again
-    from apo_bench.show.viewing import choose_place, view
+    from apo_bench.show.viewing import choose_viewer, view
     from apo_bench.simulation.scene.scene import build_scene
     from apo_bench.trial.story import scenario_story
 
@@ -86,10 +86,10 @@ def view_command(
             if value is not None:
                 raise InputError(f"{option}, which is for the folder of a sweep, was given for {target}; leave it out.")
         scenario = load_scenario(target)
-        place = choose_place(port)
+        place = choose_viewer(port)
         story = scenario_story(build_scene(scenario))
     else:
-        place = choose_place(port)
+        place = choose_viewer(port)
         row, story = trial_again(folder, trial, salt_file)
         print_row(row)
     view(story, place, port, typer.echo)

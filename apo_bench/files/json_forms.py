@@ -37,7 +37,7 @@ Form = dict[str, Any]
 def observation_form(observation: Observation, scenario: str) -> Form:
     """The JSON form of an observation."""
     extra = [
-        {"covariance_mm_deg": _covariance_form(C), "seen": bool(s)}
+        {"covariance_mm_deg": covariance_form(C), "seen": bool(s)}
         for C, s in zip(observation.covariance, observation.seen, strict=True)
     ]
     return {
@@ -77,16 +77,18 @@ def _head(schema: str, scenario: str, start: Poses) -> Form:
     return {"schema": schema, "scenario": scenario, "start": _poses_form(start)}
 
 
-def _pose_form(T: Array) -> Form:
+def pose_form(T: Array) -> Form:
+    """A pose (4, 4), [m], in mm and as a quaternion."""
     packed = pose.pack(T)
     return {"position_mm": (packed[:3] * 1e3).tolist(), "quaternion_wxyz": packed[3:].tolist()}
 
 
 def _poses_form(poses: Poses) -> Form:
-    return {part: _pose_form(T) for part, T in poses.items()}
+    return {part: pose_form(T) for part, T in poses.items()}
 
 
-def _covariance_form(C: Array) -> list[list[float]]:
+def covariance_form(C: Array) -> list[list[float]]:
+    """A covariance (6, 6), [m, rad], in mm and degrees."""
     return (C * np.outer(_TO_MM_DEG, _TO_MM_DEG)).tolist()
 
 
@@ -98,12 +100,12 @@ def _outliers_form(outliers: OutlierModel | None) -> Form:
 
 def _shared_form(one: SharedError) -> Form:
     """A shared error; without a frame its twist is in the frame of each part."""
-    frame = {} if one.frame is None else {"frame": _pose_form(one.frame), "local": one.local}
+    frame = {} if one.frame is None else {"frame": pose_form(one.frame), "local": one.local}
     correlation = {} if one.correlation is None else {"correlation": one.correlation.tolist()}
     return {
         "name": one.name,
         "operations": [k + 1 for k in one.operations],
-        "covariance_mm_deg": _covariance_form(one.covariance),
+        "covariance_mm_deg": covariance_form(one.covariance),
         **frame,
         **correlation,
     }
@@ -124,11 +126,11 @@ def _tails_form(tails: Tails) -> Form:
 
 def _operations_form(assembly: Assembly, goals: Array, extra: list[Form]) -> list[Form]:
     return [
-        {"operation": k + 1, "part": operation.main, **_pose_form(goals[k]), **extra[k]}
+        {"operation": k + 1, "part": operation.main, **pose_form(goals[k]), **extra[k]}
         for k, operation in enumerate(assembly.operations)
     ]
 
 
 def _step_form(plan: Plan, step: Step, target: Array) -> Form:
-    own = {} if np.array_equal(target, plan.goals[step.operation]) else _pose_form(target)
+    own = {} if np.array_equal(target, plan.goals[step.operation]) else pose_form(target)
     return {"operation": step.operation + 1, "undo": step.undo, **own}

@@ -16,7 +16,7 @@ from apo_bench.statistics.over_seeds import FEWEST_SEEDS, Contrast, Results, con
 from apo_bench.statistics.rate_text import percent
 from apo_bench.statistics.rates import Interval, Place, rank
 
-ALIKE = 0.05
+ALIKE_WITHIN = 0.05
 """Two methods are alike only where the whole interval of their difference is within this, to either side of 0."""
 _AGAINST = ("none", "paper", "contact", CORRECTOR)
 """The best method is compared with these; if none of them was tried, with the next best."""
@@ -27,20 +27,20 @@ _Who = tuple[str, int]
 """A method, and how often it might look again."""
 
 
-def answer(rows: Iterable[Row], found: Summary) -> str:
+def answer(rows: Iterable[Row], summary: Summary) -> str:
     """The sentences, with methods in backquotes; of trials with wrong relations only where there are no others."""
     rows = list(rows)
-    results, told = _results(rows)
+    results, kinds = _results(rows)
     if not results:
         return "No trial counts here: either no demonstration was right itself, or only the oracle was tried."
     best, *others = _ranked(results)
     own = pooled_rate(results[best])
     few = own.seeds < FEWEST_SEEDS
     if not any(any(each.values()) for each in results.values()):
-        return f"No method succeeds in any trial: {_nothing([best, *others], results)}.{_wrong(told)}"
+        return f"No method succeeds in any trial: {_nothing([best, *others], results)}.{_wrong(kinds)}"
     first = f"{_named(best)} succeeds in {_counted(own.right, own.trials, None if few else own.interval)}"
     sentences = [f"{first}{_tied(best, others, results)}."]
-    curves = [h for h in found.half_levels if h.setting.relations in told]
+    curves = [h for h in summary.half_levels if h.setting.relations in kinds]
     half = [h for h in curves if (h.setting.method, h.setting.looks) == best]
     if half and not few:
         sentences.append(_reach(half))
@@ -51,13 +51,13 @@ def answer(rows: Iterable[Row], found: Summary) -> str:
             f"{own.seeds} {'seed is' if own.seeds == 1 else 'seeds are'} too few for an interval: from {FEWEST_SEEDS} "
             "on, a difference at every seed is beyond chance."
         )
-    return " ".join(sentence for sentence in sentences if sentence) + _wrong(told)
+    return " ".join(sentence for sentence in sentences if sentence) + _wrong(kinds)
 
 
-def _wrong(told: set[str]) -> str:
+def _wrong(kinds: set[str]) -> str:
     """A sentence where nobody was told the right relations."""
-    kinds = ", ".join(f"`{one}`" for one in sorted(told))
-    return "" if told == {_GIVEN} else f" Correctors were told relations {kinds} here, not `{_GIVEN}`."
+    listed = ", ".join(f"`{kind}`" for kind in sorted(kinds))
+    return "" if kinds == {_GIVEN} else f" Correctors were told relations {listed} here, not `{_GIVEN}`."
 
 
 def _named(who: _Who) -> str:
@@ -85,18 +85,18 @@ def _results(rows: Iterable[Row]) -> tuple[dict[_Who, dict[tuple[Any, ...], bool
         for row in rows
         if row["success"] is not None and row["level"] is not None and not knows_truth(row["method"])
     ]
-    told = {str(row["relations"]) for row in counted if knows_relations(row["method"])} or {_GIVEN}
-    told = {_GIVEN} if _GIVEN in told else told
+    kinds = {str(row["relations"]) for row in counted if knows_relations(row["method"])} or {_GIVEN}
+    kinds = {_GIVEN} if _GIVEN in kinds else kinds
     # the one trial of a method that is told nothing would count once for each kind of relations that others are told
-    counted = [row for row in counted if len(told) == 1 or knows_relations(row["method"])]
+    counted = [row for row in counted if len(kinds) == 1 or knows_relations(row["method"])]
     names = [name for name in Place._fields if name not in ("method", "relations", "fidelity", "looks")]
     results: dict[_Who, dict[tuple[Any, ...], bool]] = {}
     for row in counted:
-        relations = str(row["relations"]) if knows_relations(row["method"]) else min(told)
-        if relations in told:
+        relations = str(row["relations"]) if knows_relations(row["method"]) else min(kinds)
+        if relations in kinds:
             key = (*(look_up(row, name) for name in names), row.get("fidelity"), relations, row["seed"])
             results.setdefault((row["method"], row.get("looks") or 0), {})[key] = bool(row["success"])
-    return results, told
+    return results, kinds
 
 
 def _ranked(results: Mapping[_Who, Results]) -> list[_Who]:
@@ -152,7 +152,7 @@ def _told(ours: _Who, c: Contrast) -> str:
         least, most = sorted((abs(low), abs(high)))
         ends = f"95 % interval {least:.1f} to {most:.1f}"
         return f": {_named(ours)} succeeds {more} often, by {points:.1f} points ({ends})"
-    if c.interval.low >= -ALIKE and c.interval.high <= ALIKE:
+    if c.interval.low >= -ALIKE_WITHIN and c.interval.high <= ALIKE_WITHIN:
         return f": as often, to within {max(-low, high):.1f} points (95 % interval of the difference)"
     if c.difference == 0.0:
         return f": as many, but {c.seeds:,} seeds leave room for a difference (in points: {between})"
@@ -191,5 +191,5 @@ def _half(h: HalfLevel) -> str:
 
 def _between(h: HalfLevel) -> str:
     """`1.1 to 1.6`, `below 0.2`, `above 3.2`; `any level` where it is open at both ends."""
-    said = h.interval_text
-    return "any level" if said == "any" else said.replace("<", "below").replace(">", "above")
+    text = h.interval_text
+    return "any level" if text == "any" else text.replace("<", "below").replace(">", "above")

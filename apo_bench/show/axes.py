@@ -33,14 +33,14 @@ def holds_axis(assembly: Assembly, contact: Contact) -> bool:
 
 def axes_of(assembly: Assembly, contacts: Iterable[Contact], poses: Poses) -> list[AxisEnds]:
     """The axes of round faces that make contacts, each once, as long as its faces and a little longer."""
-    found: list[list[Array]] = []
+    lines: list[list[Array]] = []
     for contact in contacts:
         for of in contact:
             face = assembly.face_of(of)
             T = poses[of.part]
             if isinstance(face, RoundFace):
-                _add(found, pose.apply(T, face.ends), T[:3, :3] @ face.axis)
-    return [_whole(points) for points in found]
+                _add(lines, pose.apply(T, face.ends), T[:3, :3] @ face.axis)
+    return [_whole(points) for points in lines]
 
 
 def axis_marks(assembly: Assembly, contacts: Iterable[Contact], poses: Poses) -> list[Any]:
@@ -50,16 +50,17 @@ def axis_marks(assembly: Assembly, contacts: Iterable[Contact], poses: Poses) ->
     return [AxisLine(begin, end, _INK) for begin, end in axes_of(assembly, contacts, poses)]
 
 
-def _add(found: list[list[Array]], ends: Array, axis: Array) -> None:
+def _add(lines: list[list[Array]], ends: Array, axis: Array) -> None:
     """Put the ends of a face, (2, 3), to those about the same axis."""
-    for points in found:
+    for points in lines:
+        # what of the two ends, seen from the first point, is not along the line: their distance from it
         line = _direction(points, axis)
         off = ends - points[0]
         across = np.linalg.norm(off - np.outer(off @ line, line), axis=1)
         if abs(line @ axis) > _ONE_COSINE and across.max() < _ONE_M:
             points.extend(ends)
             return
-    found.append(list(ends))
+    lines.append(list(ends))
 
 
 def _direction(points: list[Array], axis: Array) -> Array:

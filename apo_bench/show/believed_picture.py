@@ -49,10 +49,10 @@ def belief_panel(title: str, observation: Observation, goals: Array, step: int, 
     """What goals (n, 4, 4), world frame, [m], mean after so many operations."""
     graph = relation_graph(observation.assembly, step)
     residuals = arc_residuals(observation.assembly, observation.start, goals, graph)
-    found = sorted(zip(residuals, graph.arcs, strict=True), key=lambda pair: -pair[0])
+    worst_first = sorted(zip(residuals, graph.arcs, strict=True), key=lambda pair: -pair[0])
     wrong = tuple(
         f"{arc}: {1e3 * e:.2f} mm{' (disappeared)' * (arc.lost is not None)}"
-        for e, arc in found
+        for e, arc in worst_first
         if e > observation.gap_m
     )
     poses = placements(observation.assembly.first(step), observation.start, goals[:step])[-1]
@@ -109,27 +109,27 @@ def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[BeliefPanel], 
     what = listed_words([str(k) for k in range(1, step + 1)]) if step < 3 else f"1 to {step}"
     figure.text(0.5, 1 - 16 / height, f"{scenario.name}, believed after {'operation' if step == 1 else 'operations'} "
                 f"{what}", ha="center", va="center", fontsize=12)  # fmt: skip
-    for i, one in enumerate(beliefs):
+    for i, belief in enumerate(beliefs):
         axes = figure.add_axes((i / len(beliefs), below / height, 1 / len(beliefs), _HEIGHT / height))
-        marks = Marks(axis_marks(scenario.assembly, last.contacts, one.poses))
-        axes.imshow(picture(scene, one.poses, _WIDTH, _HEIGHT, camera, marks))
+        marks = Marks(axis_marks(scenario.assembly, last.contacts, belief.poses))
+        axes.imshow(picture(scene, belief.poses, _WIDTH, _HEIGHT, camera, marks))
         axes.axis("off")
-        figure.text((i + 0.5) / len(beliefs), 1 - 42 / height, one.title, ha="center", va="center", fontsize=11)
-        for j, line in enumerate(_below(one)):
+        figure.text((i + 0.5) / len(beliefs), 1 - 42 / height, belief.title, ha="center", va="center", fontsize=11)
+        for j, line in enumerate(_below(belief)):
             figure.text(
                 (i + 0.03) / len(beliefs), (below - _LINE_PX * (j + 0.8)) / height, line, va="center", fontsize=9.5
             )
     save_figure(figure, out)
 
 
-def _below(one: BeliefPanel) -> list[str]:
+def _below(belief: BeliefPanel) -> list[str]:
     """The lines below a panel."""
-    warning = textwrap.wrap(one.warning, _LETTERS)
-    if not one.open:
-        return [f"every contact holds: largest gap {1e3 * one.gap_m:.3f} mm", *warning]
-    shown = [f"contacts that do not hold: {one.open[0]}", *one.open[1 : _MOST_LINES - 1]]
-    left = len(one.open) - len(shown)
-    return [*shown, *([f"and {left} more"] if left else []), *warning]
+    warning = textwrap.wrap(belief.warning, _LETTERS)
+    if not belief.open:
+        return [f"every contact holds: largest gap {1e3 * belief.gap_m:.3f} mm", *warning]
+    lines = [f"contacts that do not hold: {belief.open[0]}", *belief.open[1 : _MOST_LINES - 1]]
+    left = len(belief.open) - len(lines)
+    return [*lines, *([f"and {left} more"] if left else []), *warning]
 
 
 def _camera(scenario: Scenario, poses: Poses, parts: tuple[str, ...]) -> Any:

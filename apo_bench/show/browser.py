@@ -39,7 +39,7 @@ def no_browser() -> str:
     return ""
 
 
-def serve(story: Story, port: int, say: Callable[[str], None], ends: Callable[[], bool] = lambda: False) -> None:
+def serve_story(story: Story, port: int, say: Callable[[str], None], ends: Callable[[], bool] = lambda: False) -> None:
     """Serve a story until `ends` says so, or Ctrl-C.
 
     Args:

@@ -18,28 +18,32 @@ from apo_bench.scenario.human_error import NOTHING_M, spread_error
 from apo_bench.scenario.scenario import Carelessness, Scenario, Turn
 from apo_bench.show.axes import holds_axis
 
-NOTHING: Mapping[str, str] = MappingProxyType({})
+_NOTHING: Mapping[str, str] = MappingProxyType({})
 _LEVEL = 0.01
 """A face is upright if its normal rises or falls by less."""
 
 
 def cards(
-    scenarios: Sequence[Scenario], command: str, picture: str, said: str = "", measured: Mapping[str, str] = NOTHING
+    scenarios: Sequence[Scenario],
+    command: str,
+    picture: str,
+    introduction: str = "",
+    measured: Mapping[str, str] = _NOTHING,
 ) -> str:
     """A page with the cards of all, written by `command`; `picture` is the path of a graph with `{}` for the name.
 
     Args:
-        said: What stands above the cards of what was measured.
+        introduction: What stands above the cards of what was measured.
         measured: Scenario -> what was measured of it, in Markdown.
     """
     lines = [f"<!-- Written by `{command}`; change the scenarios, not this page. -->", "", "# Scenarios", ""]
     lines += [f"- [{s.name}](#{s.name}): {s.title} ({s.paper})" for s in scenarios]
     lines += ["", "What is asked for under *Success*: [the two verdicts](../how/judge.md)."]
-    lines += ["", said] if said else []
+    lines += ["", introduction] if introduction else []
     for s in scenarios:
         head, _, rest = scenario_card(s, 2).partition("\n\n")
-        shown = f"![Relations of {s.name} after its last operation]({picture.format(s.name)})"
-        lines += ["", f'<a id="{s.name}"></a>', "", head, "", shown, "", rest.rstrip("\n")]
+        graph = f"![Relations of {s.name} after its last operation]({picture.format(s.name)})"
+        lines += ["", f'<a id="{s.name}"></a>', "", head, "", graph, "", rest.rstrip("\n")]
         lines += ["", "### What it asks for", "", measured[s.name]] if s.name in measured else []
     return "\n".join(lines) + "\n"
 
@@ -74,20 +78,20 @@ def _parts(scenario: Scenario) -> Iterator[str]:
 def _operations(scenario: Scenario, graph: Graph) -> Iterator[str]:
     """`5. stick into cube2 and cube3: R6 stick -> cube2 (py-hpy, ...), R7 ...; loses R2`."""
     for k, operation in enumerate(scenario.assembly.operations):
-        made = [arc for arc in graph.arcs if arc.made == k]
+        new = [arc for arc in graph.arcs if arc.made == k]
         lost = [arc.name for arc in graph.arcs if arc.lost == k]
         carrying = f", carrying {listed_words(operation.carries)}," if operation.carries else ""
-        where = _where(scenario, made)
-        relations = ", ".join(f"{arc} ({', '.join(arc.pairs)})" for arc in made) or "no contact"
+        where = _where(scenario, new)
+        relations = ", ".join(f"{arc} ({', '.join(arc.pairs)})" for arc in new) or "no contact"
         loses = f"; loses {', '.join(lost)}" if lost else ""
         yield f"{k + 1}. {operation.main}{carrying}{f' {where}' if where else ''}: {relations}{loses}"
 
 
-def _where(scenario: Scenario, made: Sequence[Arc]) -> str:
+def _where(scenario: Scenario, arcs: Sequence[Arc]) -> str:
     """`onto table and against cube`."""
-    ends = dict.fromkeys((_way(scenario, arc), arc.environment.part) for arc in made)
+    ends = dict.fromkeys((_way(scenario, arc), arc.environment.part) for arc in arcs)
     ways = groupby(ends, key=lambda end: end[0])
-    return listed_words([f"{way} {listed_words([part for _, part in found])}" for way, found in ways])
+    return listed_words([f"{way} {listed_words([part for _, part in same])}" for way, same in ways])
 
 
 def _way(scenario: Scenario, arc: Arc) -> str:
@@ -96,6 +100,7 @@ def _way(scenario: Scenario, arc: Arc) -> str:
     assembly = scenario.assembly
     poses = placements(assembly, scenario.start, scenario.goals)[arc.made]
     touched = touched_contacts(assembly, arc.contacts, assembly.operations[arc.made].moves, poses)
+    # normals of all faces that are touched: their span says in which contact state the part is
     N = np.array([each.normal for each in touched])
     if classify(N).state.constraining:
         rounds = [assembly.round_face(c.manipulated) for c in arc.contacts if holds_axis(assembly, c)]

@@ -7,9 +7,10 @@ import numpy as np
 from apo_bench.assembly.correction_record import Consistency, Correction
 from apo_bench.assembly.goals import Observation
 from apo_bench.correction.explanation import Explanation
+from apo_bench.files.json_forms import covariance_form, pose_form
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.show.explain_text import covariance_form, explanation_form, sentences, total
+from apo_bench.show.explain_text import explanation_form, sentences, total
 
 _CORRECTION = "apo-bench/correction/1"
 _TOO_GOOD = 1e-6
@@ -19,7 +20,7 @@ _TESTED = 3
 
 
 def correction_lines(
-    observation: Observation, correction: Correction, found: Explanation | None
+    observation: Observation, correction: Correction, explanation: Explanation | None
 ) -> list[tuple[str, str]]:
     """How it ended, the gaps, the test, what is free: name and text of each line."""
     lines = [("ended", f"{'' if correction.ok else f'{correction.status}: '}{correction.sentence}")]
@@ -30,9 +31,9 @@ def correction_lines(
         lines.append(("left out", ", ".join(correction.dropped)))
     if correction.test_after is not None:
         lines.append(("test without", _test(correction.test_after, correction.status == "inconsistent")))
-    if found is not None:
-        lines.append(("contacts", total(found)))
-        lines += [("" if i else "free", sentence) for i, sentence in enumerate(sentences(found))]
+    if explanation is not None:
+        lines.append(("contacts", total(explanation)))
+        lines += [("" if i else "free", sentence) for i, sentence in enumerate(sentences(explanation))]
     return lines
 
 
@@ -40,31 +41,31 @@ def pose_table(observation: Observation, correction: Correction) -> Any:
     """Corrected poses in mm and wxyz, and how far they were moved, as a table of `rich`."""
     from rich.table import Table
 
-    found = Table("", "part", box=None, pad_edge=False)
+    table = Table("", "part", box=None, pad_edge=False)
     for name in ("x mm", "y mm", "z mm", "qw", "qx", "qy", "qz", "moved mm", "turned deg"):
-        found.add_column(name, justify="right")
+        table.add_column(name, justify="right")
     moved = _moved(observation, correction)
     for k, operation in enumerate(observation.assembly.operations):
         packed = pose.pack(correction.goals[k])
         places = (*(_short(x, 3) for x in packed[:3] * 1e3), *(_short(q, 6) for q in packed[3:]))
-        found.add_row(str(k + 1), operation.main, *places, *(f"{x:.3f}" for x in moved[k]))
-    return found
+        table.add_row(str(k + 1), operation.main, *places, *(f"{x:.3f}" for x in moved[k]))
+    return table
 
 
 def suspect_table(test: Consistency) -> Any:
     """Every relation, and how well the rest fits without it, as a table of `rich`."""
     from rich.table import Table
 
-    found = Table("without", "made", "contacts", box=None, pad_edge=False)
+    table = Table("without", "made", "contacts", box=None, pad_edge=False)
     for name in ("chi-square", "of", "p"):
-        found.add_column(name, justify="right")
-    found.add_column("")
+        table.add_column(name, justify="right")
+    table.add_column("")
     for suspect in test.suspects:
         contacts = ", ".join(map(str, suspect.contacts))
         numbers = (f"{suspect.chi_square:.1f}", str(suspect.freedom), f"{suspect.p_value:.2g}")
         verdict = "may be wrong" if suspect in test.ambiguous else ""
-        found.add_row(suspect.relation, str(suspect.made + 1), contacts, *numbers, verdict)
-    return found
+        table.add_row(suspect.relation, str(suspect.made + 1), contacts, *numbers, verdict)
+    return table
 
 
 def correction_form(
@@ -72,7 +73,7 @@ def correction_form(
     method: str,
     observation: Observation,
     correction: Correction,
-    found: Explanation | None,
+    explanation: Explanation | None,
     assumed: bool,
 ) -> dict[str, Any]:
     """What `json` can write: mm, degrees, wxyz, operations from 1; poses only of a correction that converged."""
@@ -85,38 +86,40 @@ def correction_form(
         "gap_before_mm": _number(correction.gap_before_m * 1e3),
         "gap_after_mm": _number(correction.gap_after_m * 1e3) if correction.ok else None,
         "rank": correction.rank,
-        "freedom": None if found is None else found.freedom,
+        "freedom": None if explanation is None else explanation.freedom,
         "deviations_assumed": assumed,
         "operations": _operations_form(observation, correction) if correction.ok else None,
         "test": None if correction.test is None else _test_form(correction.test),
         "test_after": None if correction.test_after is None else _test_form(correction.test_after),
         "dropped": list(correction.dropped),
-        "explanation": None if found is None else explanation_form(scenario, found),
+        "explanation": None if explanation is None else explanation_form(scenario, explanation),
     }
 
 
 def _gaps(correction: Correction) -> str:
     """The largest gap before and, of a correction that converged, after."""
-    said = f"{correction.gap_before_m * 1e3:.3f} mm as seen"
+    before = f"{correction.gap_before_m * 1e3:.3f} mm as seen"
     if not correction.ok:
-        return said
+        return before
     of = ", relations that were left out counted too" if correction.dropped else ""
-    return f"{said}, {correction.gap_after_m * 1e3:.3f} mm corrected{of}"
+    return f"{before}, {correction.gap_after_m * 1e3:.3f} mm corrected{of}"
 
 
 def _test(test: Consistency, contradictory: bool) -> str:
-    said = f"chi-square {test.chi_square:.1f}, {test.freedom} degrees of freedom, p {shown_p(test.p_value, test.level)}"
+    numbers = (
+        f"chi-square {test.chi_square:.1f}, {test.freedom} degrees of freedom, p {shown_p(test.p_value, test.level)}"
+    )
     if test.passes and contradictory:
-        return f"{said}, but the contacts contradict each other"
+        return f"{numbers}, but the contacts contradict each other"
     if test.passes and test.p_value > 1.0 - _TOO_GOOD and test.freedom >= _TESTED:
-        return f"{said}: the stated noise is far larger than what was seen; are the units right?"
+        return f"{numbers}: the stated noise is far larger than what was seen; are the units right?"
     if test.passes:
-        return f"{said}: explained by the stated noise"
+        return f"{numbers}: explained by the stated noise"
     named = [suspect.relation for suspect in test.ambiguous]
     who = f"; {'one of ' * (len(named) > 1)}{', '.join(named)} may be wrong" if named else ""
     if contradictory:
-        return f"{said}: the contacts contradict each other{who}"
-    return f"{said}: longer than the stated noise explains{who}"
+        return f"{numbers}: the contacts contradict each other{who}"
+    return f"{numbers}: longer than the stated noise explains{who}"
 
 
 def shown_p(p: float, level: float) -> str:
@@ -127,20 +130,19 @@ def shown_p(p: float, level: float) -> str:
 
 def _moved(observation: Observation, correction: Correction) -> Array:
     """How far each goal was moved and turned, (n, 2), [mm, degrees]."""
+    # D = seen^-1 corrected: its log ends with the turn, whose size is an angle
     D = pose.inverse(observation.goals) @ correction.goals
     turned = np.linalg.norm(pose.log(D)[..., 3:], axis=-1)
     return np.column_stack([np.linalg.norm(D[..., :3, 3], axis=-1) * 1e3, np.degrees(turned)])
 
 
 def _operations_form(observation: Observation, correction: Correction) -> list[dict[str, Any]]:
-    packed = pose.pack(correction.goals)
     moved = _moved(observation, correction)
     return [
         {
             "operation": k + 1,
             "part": operation.main,
-            "position_mm": (packed[k, :3] * 1e3).tolist(),
-            "quaternion_wxyz": packed[k, 3:].tolist(),
+            **pose_form(correction.goals[k]),
             "moved_mm": float(moved[k, 0]),
             "turned_deg": float(moved[k, 1]),
             "covariance_mm_deg": None if correction.covariance is None else covariance_form(correction.covariance[k]),

@@ -33,7 +33,7 @@ _SHADE = 0.8
 """Arrows are that much darker than their part."""
 
 
-class _Drawn(NamedTuple):
+class _DrawnPart(NamedTuple):
     """A part, where it stands at the end, and what is free of the operation that last put it down by itself."""
 
     solid: Solid
@@ -43,7 +43,7 @@ class _Drawn(NamedTuple):
 
 
 @default_looks()
-def draw_explanation(scenario: Scenario, observation: Observation, found: Explanation, out: str | Path) -> None:
+def draw_explanation(scenario: Scenario, observation: Observation, explanation: Explanation, out: str | Path) -> None:
     """Write a PNG picture.
 
     Raises:
@@ -53,31 +53,33 @@ def draw_explanation(scenario: Scenario, observation: Observation, found: Explan
     from apo_bench.simulation.scene.render import camera_view, picture
     from apo_bench.simulation.scene.scene import build_scene
 
-    drawn = _parts(scenario, found)
+    drawn = _parts(scenario, explanation)
     scene = build_scene(scenario)
-    low, high = world_bounds((one.solid, one.pose) for one in drawn)
-    azimuth = np.degrees(np.arctan2(found.goals[0][1, 0], found.goals[0][0, 0])) + _AZIMUTH_DEG
+    low, high = world_bounds((part.solid, part.pose) for part in drawn)
+    azimuth = np.degrees(np.arctan2(explanation.goals[0][1, 0], explanation.goals[0][0, 0])) + _AZIMUTH_DEG
     middle = (low + high) / 2 - [0.0, 0.0, 0.1 * (high - low)[2]]
     camera = camera_view(middle, _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low)), azimuth, _ELEVATION_DEG)
-    marks = [mark for one in drawn for mark in _marks(one, -_looking(azimuth))]
-    poses = {**observation.start, **{part.part: part.pose for part in found.parts}}
+    marks = [_mark(part, free.direction, -_looking(azimuth)) for part in drawn for free in part.operation.free]
+    poses = {**observation.start, **{part.part: part.pose for part in explanation.parts}}
     standing = [relation.contact for relation in scenario.assembly.relations() if relation.lost is None]
     lines = axis_marks(scenario.assembly, standing, poses)
     image = picture(scene, poses, _WIDTH, _HEIGHT, camera, Marks([*marks, *lines]))
     fovy = float(scene.shown.model.vis.global_.fovy)
     names = [(mark, pixels(mark.tips, camera, fovy, _WIDTH, _HEIGHT)) for mark in marks]
-    figure = _captioned(image, scenario, found, drawn)
+    figure = _captioned(image, scenario, explanation, drawn)
     for mark, tips in names:
         x, y = max(tips, key=lambda tip: (round(tip[1]), tip[0]))
         _name(figure, mark.name, x, y, mark.color)
     save_figure(figure, out)
 
 
-def _parts(scenario: Scenario, found: Explanation) -> list[_Drawn]:
-    own = {o.part: o for o in found.operations}
+def _parts(scenario: Scenario, explanation: Explanation) -> list[_DrawnPart]:
+    own = {o.part: o for o in explanation.operations}
     return [
-        _Drawn(scenario.assembly.solids[part.part], part.pose, scenario.colors.get(part.part, _GRAY), own[part.part])
-        for part in found.parts
+        _DrawnPart(
+            scenario.assembly.solids[part.part], part.pose, scenario.colors.get(part.part, _GRAY), own[part.part]
+        )
+        for part in explanation.parts
         if part.part in own
     ]
 
@@ -88,37 +90,30 @@ def _looking(azimuth_deg: float) -> Array:
     return np.array([np.cos(a), np.sin(a), 0.0])
 
 
-def _marks(one: _Drawn, toward: Array) -> list[Any]:
-    return [_mark(one, free.direction, toward) for free in one.operation.free]
-
-
-def _mark(one: _Drawn, direction: Direction, toward: Array) -> Any:
+def _mark(part: _DrawnPart, direction: Direction, toward: Array) -> Any:
     """Arrows outside the part; a ring about the point that a turn is about, or the middle where any point will do."""
     from apo_bench.simulation.scene.marks import ShiftArrows, TurnRing
 
-    R = one.pose[:3, :3]
-    middle = one.solid.bounds.mean(axis=0)
-    r, g, b = one.color
+    R = part.pose[:3, :3]
+    middle = part.solid.bounds.mean(axis=0)
+    r, g, b = part.color
     color = (_SHADE * r, _SHADE * g, _SHADE * b)
     axis = R @ direction.axis
     if not direction.turns:
-        reach = extent(one.solid.pieces, direction.axis)[1] - direction.axis @ middle
-        center = R @ middle + one.pose[:3, 3]
+        reach = extent(part.solid.pieces, direction.axis)[1] - direction.axis @ middle
+        center = R @ middle + part.pose[:3, 3]
         return ShiftArrows(center, axis, reach + _AWAY_M, reach + _AWAY_M + _ARROW_M, color, str(direction))
-    low, high = extent(one.solid.pieces, direction.axis)
+    low, high = extent(part.solid.pieces, direction.axis)
+    # on the axis of the turn, at a part of the way from the lower end of the solid along it
     about = direction.point + (_LOW * high + (1 - _LOW) * low - direction.point @ direction.axis) * direction.axis
-    across = _across(direction.axis)
-    ends = np.array([extent(one.solid.pieces, v) for v in across]) - (across @ about)[:, None]
+    # two unit vectors at right angles to the axis: rows of V^T that belong to no singular value
+    across = np.linalg.svd(direction.axis[None])[2][1:]
+    ends = np.array([extent(part.solid.pieces, v) for v in across]) - (across @ about)[:, None]
     radius = float(np.linalg.norm(np.abs(ends).max(axis=1))) + 2 * _AWAY_M
-    return TurnRing(R @ about + one.pose[:3, 3], axis, toward, radius, color, str(direction))
+    return TurnRing(R @ about + part.pose[:3, 3], axis, toward, radius, color, str(direction))
 
 
-def _across(axis: Array) -> Array:
-    """Two unit vectors at right angles to an axis, (2, 3)."""
-    return np.linalg.svd(axis[None])[2][1:]
-
-
-def _captioned(image: Any, scenario: Scenario, found: Explanation, drawn: list[_Drawn]) -> Any:
+def _captioned(image: Any, scenario: Scenario, explanation: Explanation, drawn: list[_DrawnPart]) -> Any:
     """The picture with its title above and a line for each part below."""
     from matplotlib.figure import Figure
 
@@ -128,12 +123,12 @@ def _captioned(image: Any, scenario: Scenario, found: Explanation, drawn: list[_
     axes = figure.add_axes((0.0, below / height, 1.0, _HEIGHT / height))
     axes.imshow(image)
     axes.axis("off")
-    title = f"{scenario.name}: what no contact fixes ({found.freedom} of {6 * len(found.goals)} directions)"
+    title = f"{scenario.name}: what no contact fixes ({explanation.freedom} of {6 * len(explanation.goals)} directions)"
     figure.text(0.5, 1.0 - 15 / height, title, ha="center", va="center", fontsize=12)
-    for i, one in enumerate(drawn):
+    for i, part in enumerate(drawn):
         y = (below - _LINE_PX * (i + 0.8)) / height
-        figure.text(0.02, y, "\u25a0", color=one.color, fontsize=14, va="center")
-        figure.text(0.045, y, _line(found, one.operation), va="center", fontsize=10)
+        figure.text(0.02, y, "\u25a0", color=part.color, fontsize=14, va="center")
+        figure.text(0.045, y, _line(explanation, part.operation), va="center", fontsize=10)
     return figure
 
 
@@ -149,13 +144,13 @@ def _name(figure: Any, name: str, x: float, y: float, color: tuple[float, float,
     )  # fmt: skip
 
 
-def _line(found: Explanation, o: OperationExplanation) -> str:
+def _line(explanation: Explanation, o: OperationExplanation) -> str:
     """`castle1: x 1.00 mm free; y 0.58 mm, yaw 0.58 deg free with castle2 and the stick; the rest fixed`."""
     together: dict[tuple[int, ...], list[str]] = {}
     for free in o.free:
         together.setdefault(free.along, []).append(f"{free.direction} ({size(free)})")
-    said = []
+    groups = []
     for along, words in together.items():
-        others = dict.fromkeys(with_article(found.operations[j].part) for j in along)
-        said.append(f"{listed_words(words)} free{f' with {listed_words(others)}' if others else ''}")
-    return f"{o.part}: {'; '.join([*said, f'{listed_words(o.fixed)} fixed'] if o.fixed else said)}"
+        others = dict.fromkeys(with_article(explanation.operations[j].part) for j in along)
+        groups.append(f"{listed_words(words)} free{f' with {listed_words(others)}' if others else ''}")
+    return f"{o.part}: {'; '.join([*groups, f'{listed_words(o.fixed)} fixed'] if o.fixed else groups)}"

@@ -10,7 +10,7 @@ from apo_bench.correction.directions import SHIFT_NAMES, TURN_NAMES, Direction
 from apo_bench.correction.explanation import Explanation, FreeDirection, OperationExplanation, PartExplanation
 from apo_bench.correction.holding import Hold
 from apo_bench.correction.shared_estimate import SharedEstimate
-from apo_bench.geometry import pose
+from apo_bench.files.json_forms import covariance_form, pose_form
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.io.words import listed_words, with_article
@@ -23,81 +23,75 @@ _ALONG = 1e-9
 """Cosines that are nearer to 1 are of one direction."""
 
 
-def total(found: Explanation) -> str:
+def total(explanation: Explanation) -> str:
     """`the contacts fix 13 of 18 directions; 5 are free and 14 equations redundant`."""
-    return (
-        f"the contacts fix {found.rank} of {6 * len(found.goals)} directions; {found.freedom} are free "
-        f"and {found.redundant} of {found.rank + found.redundant} equations redundant"
-    )
+    redundant = f"{explanation.redundant} of {explanation.rank + explanation.redundant} equations redundant"
+    fixed = f"{explanation.rank} of {6 * len(explanation.goals)} directions"
+    return f"the contacts fix {fixed}; {explanation.freedom} are free and {redundant}"
 
 
-def sentences(found: Explanation) -> list[str]:
+def sentences(explanation: Explanation) -> list[str]:
     """One for each operation: what is fixed by which parts, and what is free; then one for each shared error."""
     operations = [
-        f"{o.operation + 1} {o.part}: {_fixed(o)}; {_loose(found, o.free)}{_along_axes(found, o)}"
-        for o in found.operations
+        f"{o.operation + 1} {o.part}: {_fixed(o)}; {_loose(explanation, o.free)}{_along_axes(explanation, o)}"
+        for o in explanation.operations
     ]
-    return operations + [_shared(one) for one in found.shared]
+    return operations + [_shared(estimate) for estimate in explanation.shared]
 
 
-def explanation_tables(found: Explanation) -> list[Any]:
+def explanation_tables(explanation: Explanation) -> list[Any]:
     """What holds each operation, and how well every part is known at the end, as tables of `rich`."""
     from rich.table import Table
 
     operations = Table("", "operation", "fixed", "free", "through", "agrees", box=None, pad_edge=False)
-    for o in found.operations:
+    for o in explanation.operations:
         through, agreeing = ("\n".join(map(_hold, some)) or "-" for some in (o.through, o.agreeing))
         free = "\n".join(map(_free, o.free)) or "-"
         operations.add_row(str(o.operation + 1), o.part, f"{o.rank} of 6", free, through, agreeing)
     parts = Table("at the end", "pose", "fixed", box=None, pad_edge=False)
     for name in (*(f"{name} mm" for name in SHIFT_NAMES), *(f"{name} deg" for name in TURN_NAMES)):
         parts.add_column(name, justify="right")
-    for part in found.parts:
+    for part in explanation.parts:
         deviations = [f"{x:.2f}" for x in part.deviations * _TO_MM_DEG]
         parts.add_row(part.part, spelled(part.odl), f"{part.rank} of 6", *deviations)
     return [operations, parts]
 
 
-def explanation_form(scenario: str, found: Explanation) -> dict[str, Any]:
+def explanation_form(scenario: str, explanation: Explanation) -> dict[str, Any]:
     """What `json` can write: mm, degrees, operations from 1; a spectral gap of null is infinite."""
     return {
         "schema": _EXPLANATION,
         "scenario": scenario,
-        "operations": [_operation_form(found, o) for o in found.operations],
-        "parts": [_part_form(part) for part in found.parts],
-        "rank": found.rank,
-        "freedom": found.freedom,
-        "redundant": found.redundant,
-        "shared": [_shared_form(one) for one in found.shared],
-        "spectral_gap": found.spectral_gap if np.isfinite(found.spectral_gap) else None,
+        "operations": [_operation_form(explanation, o) for o in explanation.operations],
+        "parts": [_part_form(part) for part in explanation.parts],
+        "rank": explanation.rank,
+        "freedom": explanation.freedom,
+        "redundant": explanation.redundant,
+        "shared": [_shared_form(estimate) for estimate in explanation.shared],
+        "spectral_gap": explanation.spectral_gap if np.isfinite(explanation.spectral_gap) else None,
     }
 
 
-def _shared(one: SharedEstimate) -> str:
+def _shared(estimate: SharedEstimate) -> str:
     """`camera: seen off by (-0.30 +- 0.50, 1.90 +- 0.30, 0.10 +- 0.40) mm and (..) deg, in its frame`."""
-    numbers = zip(one.twist * _TO_MM_DEG, one.deviations * _TO_MM_DEG, strict=True)
+    numbers = zip(estimate.twist * _TO_MM_DEG, estimate.deviations * _TO_MM_DEG, strict=True)
     each = [f"{x:.2f} +- {s:.2f}" for x, s in numbers]
-    frame = "in the frame of the part" if one.error.frame is None else "in its frame"
-    return f"{one.error.name}: seen off by ({', '.join(each[:3])}) mm and ({', '.join(each[3:])}) deg, {frame}"
+    frame = "in the frame of the part" if estimate.error.frame is None else "in its frame"
+    return f"{estimate.error.name}: seen off by ({', '.join(each[:3])}) mm and ({', '.join(each[3:])}) deg, {frame}"
 
 
-def _shared_form(one: SharedEstimate) -> dict[str, Any]:
+def _shared_form(estimate: SharedEstimate) -> dict[str, Any]:
     return {
-        "name": one.error.name,
-        "operations": [k + 1 for k in one.error.operations],
-        "twist_mm_deg": (one.twist * _TO_MM_DEG).tolist(),
-        "covariance_mm_deg": covariance_form(one.covariance),
+        "name": estimate.error.name,
+        "operations": [k + 1 for k in estimate.error.operations],
+        "twist_mm_deg": (estimate.twist * _TO_MM_DEG).tolist(),
+        "covariance_mm_deg": covariance_form(estimate.covariance),
     }
 
 
 def size(free: FreeDirection) -> str:
     """`1.00 mm` or `0.58 deg`."""
     return f"{_deviation(free):.2f} {'deg' if free.direction.turns else 'mm'}"
-
-
-def covariance_form(C: Array) -> list[list[float]]:
-    """(6, 6), in mm and degrees."""
-    return (C * np.outer(_TO_MM_DEG, _TO_MM_DEG)).tolist()
 
 
 def _fixed(o: OperationExplanation) -> str:
@@ -110,41 +104,40 @@ def _fixed(o: OperationExplanation) -> str:
     return f"{', '.join(o.fixed)} fixed by {listed_words(map(with_article, others))} ({', '.join(names)}{agrees})"
 
 
-def _loose(found: Explanation, free: Sequence[FreeDirection]) -> str:
+def _loose(explanation: Explanation, free: Sequence[FreeDirection]) -> str:
     """Free directions, those that go together in one breath."""
     if not free:
         return "nothing is free"
     together: dict[tuple[int, ...], list[FreeDirection]] = {}
-    for one in free:
-        together.setdefault(one.along, []).append(one)
-    return "; ".join(_group(found, along, some) for along, some in together.items())
+    for direction in free:
+        together.setdefault(direction.along, []).append(direction)
+    return "; ".join(_group(explanation, along, some) for along, some in together.items())
 
 
-def _group(found: Explanation, along: tuple[int, ...], some: list[FreeDirection]) -> str:
+def _group(explanation: Explanation, along: tuple[int, ...], some: list[FreeDirection]) -> str:
     sizes = ", ".join(map(size, some))
-    names = ", ".join(f"{one.direction}{_about(one)}" for one in some)
+    names = ", ".join(f"{free.direction}{_about(free)}" for free in some)
     if not along:
         return f"{names} free, kept as seen, {sizes}"
-    others = dict.fromkeys(found.operations[j].part for j in along)
+    others = dict.fromkeys(explanation.operations[j].part for j in along)
     return f"{names} free together with {listed_words(map(with_article, others))}, {sizes}"
 
 
-def _along_axes(found: Explanation, o: OperationExplanation) -> str:
+def _along_axes(explanation: Explanation, o: OperationExplanation) -> str:
     """`; slides along the axis of shaft and turns freely about it`: what is free of round faces that touch."""
-    contacts = found.assembly.operations[o.operation].contacts
-    own = dict.fromkeys(of.face for contact in contacts for of in contact if of.part == o.part)
-    rounds = [
-        found.assembly.solids[o.part].rounds[name] for name in own if name in found.assembly.solids[o.part].rounds
-    ]
-    said = list[str]()
+    contacts = explanation.assembly.operations[o.operation].contacts
+    touching = dict.fromkeys(of.face for contact in contacts for of in contact if of.part == o.part)
+    own = explanation.assembly.solids[o.part].rounds
+    rounds = [own[name] for name in touching if name in own]
+    sentences = list[str]()
     last = ""
     for free in o.free:
-        face = None if free.along else next((one for one in rounds if _is_on(free.direction, one)), None)
+        face = None if free.along else next((face for face in rounds if _is_on(free.direction, face)), None)
         if face is not None:
             does = "turns freely about" if free.direction.turns else "slides along"
-            said.append(f"{does} it" if face.name == last else f"{does} the axis of {face.name}")
+            sentences.append(f"{does} it" if face.name == last else f"{does} the axis of {face.name}")
             last = face.name
-    return f"; {listed_words(said)}" if said else ""
+    return f"; {listed_words(sentences)}" if sentences else ""
 
 
 def _is_on(direction: Direction, face: RoundFace) -> bool:
@@ -153,6 +146,7 @@ def _is_on(direction: Direction, face: RoundFace) -> bool:
         return False
     if not direction.turns:
         return True
+    # distance of the two parallel lines: |(p - q) x a| of a unit axis a
     off = np.cross(face.point - direction.point, face.axis)
     return bool(np.sqrt(off @ off) < _OFF_M and abs(direction.pitch_m) < _OFF_M)
 
@@ -179,13 +173,13 @@ def _deviation(free: FreeDirection) -> float:
     return float(free.deviation * _TO_MM_DEG[3 if free.direction.turns else 0])
 
 
-def _operation_form(found: Explanation, o: OperationExplanation) -> dict[str, Any]:
+def _operation_form(explanation: Explanation, o: OperationExplanation) -> dict[str, Any]:
     return {
         "operation": o.operation + 1,
         "part": o.part,
         "rank": o.rank,
         "fixed": list(o.fixed),
-        "free": list(_free_forms(o.free, found.goals[o.operation])),
+        "free": list(_free_forms(o.free, explanation.goals[o.operation])),
         "through": [_hold_form(hold) for hold in o.through],
         "agreeing": [_hold_form(hold) for hold in o.agreeing],
         "covariance_mm_deg": covariance_form(o.covariance),
@@ -193,14 +187,12 @@ def _operation_form(found: Explanation, o: OperationExplanation) -> dict[str, An
 
 
 def _part_form(part: PartExplanation) -> dict[str, Any]:
-    packed = pose.pack(part.pose)
     deviations = part.deviations * _TO_MM_DEG
     return {
         "part": part.part,
         "placed": part.placed + 1,
         "odl": spelled(part.odl),
-        "position_mm": (packed[:3] * 1e3).tolist(),
-        "quaternion_wxyz": packed[3:].tolist(),
+        **pose_form(part.pose),
         "rank": part.rank,
         "fixed": list(part.fixed),
         "free": list(_free_forms(part.free, part.pose)),
@@ -212,8 +204,8 @@ def _part_form(part: PartExplanation) -> dict[str, Any]:
 
 def _free_forms(free: Sequence[FreeDirection], T: Array) -> Iterator[dict[str, Any]]:
     """Twists per mm of a shift and per degree of a turn; axes in the frame of the part and in the world."""
-    for one in free:
-        d = one.direction
+    for freedom in free:
+        d = freedom.direction
         unit = _TO_MM_DEG[3 if d.turns else 0]
         form: dict[str, Any] = {
             "name": str(d),
@@ -223,7 +215,11 @@ def _free_forms(free: Sequence[FreeDirection], T: Array) -> Iterator[dict[str, A
         }
         if d.turns:
             form["point_mm"] = (d.point * 1e3).tolist()
-        yield {**form, "deviation_deg" if d.turns else "deviation_mm": _deviation(one), "with": _numbers(one.along)}
+        yield {
+            **form,
+            "deviation_deg" if d.turns else "deviation_mm": _deviation(freedom),
+            "with": _numbers(freedom.along),
+        }
 
 
 def _hold_form(hold: Hold) -> dict[str, Any]:

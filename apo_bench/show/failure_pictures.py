@@ -60,7 +60,7 @@ def failure_pictures(
         salt: The one that the trials were drawn with, if any.
         trust_code: Import code of somebody's own that rows name; else none of it is.
     """
-    made: list[FailurePicture] = []
+    pictures: list[FailurePicture] = []
     missed: list[str] = []
     scenes: dict[tuple[Any, ...], Any] = {}
     for row in chosen:
@@ -68,15 +68,15 @@ def failure_pictures(
             missed.append(left_out([row]))
             continue
         try:
-            made.append(_made(row, folder, files or {}, scenes, salt))
+            pictures.append(_picture_of(row, folder, files or {}, scenes, salt))
         except (InputError, RuntimeError, OSError, ValueError) as error:
             missed.append(str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__)
             if "no picture can be drawn here" in missed[-1]:
                 break
-    return made, list(dict.fromkeys(missed))
+    return pictures, list(dict.fromkeys(missed))
 
 
-def _made(
+def _picture_of(
     row: Row, folder: Path, files: Files, scenes: dict[tuple[Any, ...], Any], salt: Salt | None
 ) -> FailurePicture:
     from apo_bench.scenario.file import scenario_names
@@ -115,9 +115,9 @@ def _whole_row(folder: Path, row: Row) -> Mapping[str, Any]:
     path = folder / "trials.jsonl"
     for number, line in each_line(path, "table of trials"):
         if all(part in line for part in wanted):
-            found = row_of(line, f"{path}, line {number}")
-            if row_key(found) == row_key(row):
-                return found
+            whole = row_of(line, f"{path}, line {number}")
+            if row_key(whole) == row_key(row):
+                return whole
     return {}
 
 
@@ -131,10 +131,10 @@ def _again(row: Row, spec: TrialSettings, scene: Any, content: str) -> Any:
     def keep(data: Any) -> None:
         last[:] = [np.array(data.qpos)]
 
-    done = run_trial(spec, scene, content=content, watch=keep)
-    if not last or any(done.get(name) != row.get(name) for name in _SAME):
+    again = run_trial(spec, scene, content=content, watch=keep)
+    if not last or any(again.get(name) != row.get(name) for name in _SAME):
         return None
-    poses = _poses(done["reached"]) or {}
+    poses = _poses(again["reached"]) or {}
     camera = _camera(scene, row, poses)
     fixed = {part: poses[part] for part in scene.scenario.assembly.fixed if part in poses}
     return picture_with_arm(scene, fixed, last[0], _WIDTH, _HEIGHT, camera, _mark(row, scene, poses))
@@ -185,8 +185,8 @@ def _camera(scene: Any, row: Row, poses: Poses) -> Any:
 
     assembly = scene.scenario.assembly
     k = row.get("failure_operation")
-    asked = assembly.operations if k is None else assembly.operations[k - 1 : k]
-    near = {part for o in asked for part in (*o.moves, *(c.environment.part for c in o.contacts))}
+    failed = assembly.operations if k is None else assembly.operations[k - 1 : k]
+    near = {part for o in failed for part in (*o.moves, *(c.environment.part for c in o.contacts))}
     parts = [part for part in sorted(near) if part in poses and part not in assembly.fixed]
     if not parts:
         return camera_view(np.array([*scene.scenario.site.center_m, 0.06]), 0.6, _AZIMUTH_DEG, _ELEVATION_DEG)

@@ -21,7 +21,6 @@ _SHOWN = 0.995
 @default_looks()
 def draw_fit(residuals: Residuals, measured: MeasuredNoise, path: Path) -> None:
     """Write the picture as PNG: across the ray, along it, turns; above, histograms; below, quantiles."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     upright = residuals.upright
@@ -34,7 +33,6 @@ def draw_fit(residuals: Residuals, measured: MeasuredNoise, path: Path) -> None:
         ("turn [deg]", residuals.angle_deg[known], turn.cdf_length, turn.limit),
     )
     figure = Figure(figsize=(11.0, 6.6), layout="constrained")
-    FigureCanvasAgg(figure)
     axes = figure.subplots(2, 3)
     for column, (name, sizes, cdf, limit) in zip(axes.T, columns, strict=True):
         _histogram(column[0], sizes, cdf, limit)

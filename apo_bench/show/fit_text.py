@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.geometry.arrays import Array
+from apo_bench.io.words import columns
 from apo_bench.observation.fitting.fit import PERCENTILES, Figures, outliers_by_score
 from apo_bench.observation.models.fitted import MeasuredNoise
 from apo_bench.observation.models.residuals import INLIER_MM, TURNED_DEG, Residuals
@@ -23,7 +24,7 @@ def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Fi
         "schema": _SCHEMA,
         "source": measured.source,
         "parts": len(residuals.where),
-        "images": len(np.unique(residuals.where[:, :2], axis=0)),
+        "images": _images(residuals),
         "distance_mm": residuals.distance_mm,
         "found": int(residuals.found.sum()),
         "missed_rate": measured.missed,
@@ -67,10 +68,9 @@ def fit_lines(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[F
     mean, error = _bias(residuals)
     turns = _percentiles(residuals.angle_deg[residuals.inlier])[:2]
     by_trace = _percentiles(residuals.trace_deg[residuals.inlier])[:2]
-    images = len(np.unique(residuals.where[:, :2], axis=0))
     facts = [
         ("source", measured.source),
-        ("parts", f"{n} in {images} images, {residuals.distance_mm:.0f} mm away in the median"),
+        ("parts", f"{n} in {_images(residuals)} images, {residuals.distance_mm:.0f} mm away in the median"),
         ("found", f"{found}; {n - found} missed ({100 * measured.missed:.1f} %); {_left_over(residuals)}"),
         (
             "inliers",
@@ -94,9 +94,7 @@ def fit_lines(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[F
         *_tail_facts("shift", ("across the ray", "along the ray"), measured.shift_mm, "mm", figures[:2]),
         *_tail_facts("turn", ("across the ray", "about the ray"), measured.turn_deg, "deg", figures[2:]),
     ]
-    width = max(len(name) for name, _ in facts)
-    lines = [f"{name:{width}}  {text}" for name, text in facts]
-    lines += ["", " " * 33 + "".join(f"{f'p{p}':>8}" for p in PERCENTILES)]
+    lines = [*columns(facts), "", " " * 33 + "".join(f"{f'p{p}':>8}" for p in PERCENTILES)]
     for f in figures:
         for word, values in (("seen", f.observed), ("fitted", f.fitted)):
             name = f"{f.name} [{f.unit}]" if word == "seen" else ""
@@ -130,12 +128,14 @@ def _turned(residuals: Residuals, measured: MeasuredNoise) -> str:
     )
 
 
+def _images(residuals: Residuals) -> int:
+    return len(np.unique(residuals.where[:, :2], axis=0))
+
+
 def _left_over(residuals: Residuals) -> str:
-    images = len(np.unique(residuals.where[:, :2], axis=0))
-    return (
-        f"{residuals.surplus} estimates left over, {residuals.surplus / images:.2g} per image, {residuals.absent} of "
-        "objects that are not in it"
-    )
+    per_image = residuals.surplus / _images(residuals)
+    absent = f"{residuals.absent} of objects that are not in it"
+    return f"{residuals.surplus} estimates left over, {per_image:.2g} per image, {absent}"
 
 
 def _turned_and_off(residuals: Residuals, measured: MeasuredNoise) -> int:
@@ -147,17 +147,19 @@ def _turned_and_off(residuals: Residuals, measured: MeasuredNoise) -> int:
 def _score_fact(residuals: Residuals) -> list[tuple[str, str]]:
     """A line on how outliers depend on the score, if there are scores."""
     bands = outliers_by_score(residuals)
-    said = ", ".join(f"{100 * band.outliers:.0f} % from {band.least:.7g}" for band in bands[1:])
-    return [("by score", f"{100 * bands[0].outliers:.0f} % of the lowest fifth, {said}, a fifth each")] if bands else []
+    higher = ", ".join(f"{100 * band.outliers:.0f} % from {band.least:.7g}" for band in bands[1:])
+    return (
+        [("by score", f"{100 * bands[0].outliers:.0f} % of the lowest fifth, {higher}, a fifth each")] if bands else []
+    )
 
 
 def _round_fact(residuals: Residuals) -> list[tuple[str, str]]:
     """A line on objects whose turn is not known."""
     named = ", ".join(map(str, residuals.round_objects))
-    said = (
+    text = (
         f"objects {named} look alike turned by any angle about an axis, as estimates tell; their turns are not fitted"
     )
-    return [("round", said)] if named else []
+    return [("round", text)] if named else []
 
 
 def _goodness(f: Figures) -> str:

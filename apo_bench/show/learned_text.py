@@ -5,21 +5,22 @@ from typing import Any
 import numpy as np
 
 from apo_bench.correction.learning.likelihood import Estimate
+from apo_bench.io.words import columns
 from apo_bench.observation.fitting.components import COMPONENTS
 from apo_bench.trial.learned_noise import Learned
 
 _SCHEMA = "apo-bench/noise-learned/1"
 
 
-def learned_form(found: Learned) -> dict[str, Any]:
+def learned_form(learned: Learned) -> dict[str, Any]:
     """Every number with its 95 % interval: mm and degrees."""
-    noise = found.noise
+    noise = learned.noise
     return {
         "schema": _SCHEMA,
-        "source": found.measured.source,
+        "source": learned.measured.source,
         "observations": noise.observations,
-        "operations": found.operations,
-        "not_seen": found.unseen,
+        "operations": learned.operations,
+        "not_seen": learned.unseen,
         "components": [
             {"name": component.name, "unit": component.unit, **estimate._asdict()}
             for component, estimate in zip(COMPONENTS, noise.deviations, strict=True)
@@ -31,23 +32,22 @@ def learned_form(found: Learned) -> dict[str, Any]:
     }
 
 
-def learned_lines(found: Learned) -> list[str]:
+def learned_lines(learned: Learned) -> list[str]:
     """The same in words, line by line; numbers in brackets are 95 % intervals."""
-    noise = found.noise
+    noise = learned.noise
     facts = [
-        ("source", found.measured.source),
-        ("observations", f"{noise.observations}, {found.operations} operations, {found.unseen} of them not seen"),
+        ("source", learned.measured.source),
+        ("observations", f"{noise.observations}, {learned.operations} operations, {learned.unseen} of them not seen"),
     ]
     for component, estimate in zip(COMPONENTS, noise.deviations, strict=True):
         facts.append((component.name, _estimate(estimate, component.unit)))
     percent = Estimate(*(100.0 * x for x in noise.gross))
     facts.append(("outliers", f"{percent.value:.1f} % [{percent.low:.1f} to {percent.high:.1f}] of what was seen"))
     if noise.constant.any():
-        spread = np.sqrt(np.diag(noise.constant_covariance))
-        each = [f"{x:.2f} +- {s:.2f}" for x, s in zip(noise.constant, spread, strict=True)]
+        deviations = np.sqrt(np.diag(noise.constant_covariance))
+        each = [f"{x:.2f} +- {s:.2f}" for x, s in zip(noise.constant, deviations, strict=True)]
         facts.append(("constant error", f"({', '.join(each[:3])}) mm, ({', '.join(each[3:])}) deg, axes of the camera"))
-    width = max(len(name) for name, _ in facts)
-    return [f"{name:{width}}  {text}" for name, text in facts]
+    return columns(facts)
 
 
 def _estimate(estimate: Estimate, unit: str) -> str:

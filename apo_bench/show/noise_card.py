@@ -1,7 +1,9 @@
-"""The card of a noise model: formula, frame, parameters, and a histogram of what it really does."""
+"""The card of a noise model: formula, frame, parameters, and a histogram of what it really does, in text or drawn with
+the Gaussian that its observations state."""
 
 import inspect
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -9,6 +11,7 @@ import numpy as np
 from apo_bench.assembly.goals import Demonstration, placements
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
+from apo_bench.io.figures import default_looks
 from apo_bench.names import resolve
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.level import Facts
@@ -21,11 +24,15 @@ from apo_bench.scenario.file import load_scenario
 SCENARIO = "stick_in_tower"
 _DRAWS = 1000
 """Observations of that scenario, three operations each, behind a histogram."""
-PANELS = ("across the ray", "along the ray", "tilt", "about the ray")
-PANEL_UNITS = ("mm", "mm", "deg", "deg")
+_PANELS = (("across the ray", "mm"), ("along the ray", "mm"), ("tilt", "deg"), ("about the ray", "deg"))
 _BINS = 17
 _WIDTH = 14
 """Bins of a histogram in text, the outermost with all that is beyond, and the length of its longest bar."""
+_SIZE_INCH = (9.0, 2.3)
+_DRAWN_BINS = 49
+_REACH = 6.0
+"""Half width of a drawn panel in stated standard deviations; what is beyond is counted in the outermost bins."""
+_COLOR = "#4477aa"
 
 
 class Drawn(NamedTuple):
@@ -46,46 +53,49 @@ def listed_models() -> Mapping[str, str]:
     }
 
 
-def facts(given: Any) -> Facts:
+def facts(model: Any) -> Facts:
     """What a model says of itself; of one that says nothing, its docstring."""
-    model = _model(given)
+    model = _model(model)
     own = getattr(model, "FACTS", None)
     if isinstance(own, Facts):
         return own
-    said = (inspect.getdoc(model) or "A noise model that says nothing of itself.").split("\n\n")[0]
-    return Facts(" ".join(said.split()), (), "", (), "")
+    title = (inspect.getdoc(model) or "A noise model that says nothing of itself.").split("\n\n")[0]
+    return Facts(" ".join(title.split()), (), "", (), "")
 
 
-def _model(given: Any) -> Any:
+def _model(model: Any) -> Any:
     """What a name stands for: a class, or an object that no level changes, but what is measured at level 1."""
-    measured = noise_of_file(given, Level(1.0, 1.0)) if isinstance(given, str) else None
-    return measured or resolve(given, NOISES, "noise model")
+    measured = noise_of_file(model, Level(1.0, 1.0)) if isinstance(model, str) else None
+    return measured or resolve(model, NOISES, "noise model")
 
 
-def draw_errors(given: Any, level: Level, draws: int = _DRAWS) -> Drawn:
+def draw_errors(model: Any, level: Level, draws: int = _DRAWS) -> Drawn:
     """Errors of many observations of the nominal example 5.1; operations that were not seen have none."""
-    noise = make_noise(given, level)
-    shown = nominal_demonstration()
+    noise = make_noise(model, level)
+    demonstration = nominal_demonstration()
     camera = Camera()
     rng = np.random.default_rng(0)
     errors = []
     variances = []
     missed = 0
     for _ in range(draws):
-        observation = observe(shown, noise, rng)
-        Q = np.zeros((len(observation.goals), 6, 6))
-        Q[:, :3, :3] = Q[:, 3:, 3:] = np.swapaxes(camera.frames(observation.goals), 1, 2) @ observation.goals[:, :3, :3]
-        xi = (Q @ pose.log(pose.inverse(shown.goals) @ observation.goals)[..., None])[..., 0]
+        observation = observe(demonstration, noise, rng)
+        # error xi of T Exp(xi), turned from the part's own frame into that of the ray: R_ray^T R_part, for both halves
+        R = np.swapaxes(camera.frames(observation.goals), 1, 2) @ observation.goals[:, :3, :3]
+        Q = np.zeros((len(R), 6, 6))
+        Q[:, :3, :3] = R
+        Q[:, 3:, 3:] = R
+        xi = (Q @ pose.log(pose.inverse(demonstration.goals) @ observation.goals)[..., None])[..., 0]
         errors.append(xi[observation.seen])
-        variances.append(
-            np.diagonal(Q @ observation.covariance @ np.swapaxes(Q, 1, 2), axis1=1, axis2=2)[observation.seen]
-        )
+        covariance = Q @ observation.covariance @ np.swapaxes(Q, 1, 2)
+        variances.append(np.diagonal(covariance, axis1=1, axis2=2)[observation.seen])
         missed += int(np.sum(~observation.seen))
+    # x is across the ray and z along it; rx tilts it and rz turns about it
     scale = np.array([1e3, 1e3, np.degrees(1.0), np.degrees(1.0)])
-    some = np.concatenate(errors)[:, [0, 2, 3, 5]] * scale
+    four = np.concatenate(errors)[:, [0, 2, 3, 5]] * scale
     stated = np.concatenate(variances)[:, [0, 2, 3, 5]]
     rms = np.sqrt(stated.sum(axis=0) / max(1, len(stated))) * scale
-    return Drawn(some, rms, missed / (draws * len(shown.goals)))
+    return Drawn(four, rms, missed / (draws * len(demonstration.goals)))
 
 
 def nominal_demonstration() -> Demonstration:
@@ -97,37 +107,37 @@ def nominal_demonstration() -> Demonstration:
     return Demonstration(scenario.assembly, scenario.start, goals, final, np.zeros((len(goals), 6, 6)))
 
 
-def noise_card(given: Any, level: Level, drawn: Drawn | None = None) -> str:
+def noise_card(model: Any, level: Level, drawn: Drawn | None = None) -> str:
     """The card of a model in Markdown, with a histogram in text of `drawn` (none: of what `draw_errors` draws)."""
-    drawn = drawn or draw_errors(given, level)
+    drawn = drawn or draw_errors(model, level)
     if not len(drawn.errors):
-        return f"{model_description(given)}\nNothing was seen: every operation of {SCENARIO} was missed.\n"
+        return f"{model_description(model)}\nNothing was seen: every operation of {SCENARIO} was missed.\n"
     bars = "\n".join(f"    {line}".rstrip() for line in _histogram(drawn))
-    return f"{model_description(given)}\n{drawn_sentence(given, drawn, level)}:\n\n{bars}\n"
+    return f"{model_description(model)}\n{drawn_sentence(model, drawn, level)}:\n\n{bars}\n"
 
 
-def model_description(given: Any, heading: int = 1) -> str:
+def model_description(model: Any, heading: int = 1) -> str:
     """What a model says of itself, without a histogram."""
-    said = facts(given)
-    name = given if isinstance(given, str) else getattr(given, "__name__", type(given).__name__)
-    parts = [f"{'#' * heading} {name}: {said.title}"]
-    if said.formula:
-        parts.append("\n".join(f"    {line}" for line in said.formula))
-    lines = [f"Frame: {said.frame}."] * bool(said.frame)
-    lines += [f"Parameter {parameter}." for parameter in said.parameters]
-    lines += [f"States: {said.states}."] * bool(said.states)
-    lines += [f"{note}." for note in said.notes]
+    about = facts(model)
+    name = model if isinstance(model, str) else getattr(model, "__name__", type(model).__name__)
+    parts = [f"{'#' * heading} {name}: {about.title}"]
+    if about.formula:
+        parts.append("\n".join(f"    {line}" for line in about.formula))
+    lines = [f"Frame: {about.frame}."] * bool(about.frame)
+    lines += [f"Parameter {parameter}." for parameter in about.parameters]
+    lines += [f"States: {about.states}."] * bool(about.states)
+    lines += [f"{note}." for note in about.notes]
     if lines:
         parts.append("\n".join(f"- {line}" for line in lines))
     return "\n\n".join(parts) + "\n"
 
 
-def drawn_sentence(given: Any, drawn: Drawn, level: Level) -> str:
+def drawn_sentence(model: Any, drawn: Drawn, level: Level) -> str:
     """One sentence on what was drawn, without its full stop."""
-    if facts(given).measured:
+    if facts(model).measured:
         apart = f" in mm and {level.deg:g} times in deg" if level.deg != level.mm else ""
         where = "as measured" if level == (1.0, 1.0) else f"{level.mm:g} times{apart} what was measured"
-    elif isinstance(_model(given), type):
+    elif isinstance(_model(model), type):
         where = f"at {level.mm:g} mm and {level.deg:g} deg"
     else:
         where = "at every level alike"
@@ -136,29 +146,52 @@ def drawn_sentence(given: Any, drawn: Drawn, level: Level) -> str:
     return f"Errors {where}, {n}{missed}"
 
 
+@default_looks()
+def draw_histogram(drawn: Drawn, path: Path) -> None:
+    """Write the four panels as PNG: error across and along the ray, tilt, turn about the ray; densities are log."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=_SIZE_INCH, layout="constrained")
+    axes = figure.subplots(1, len(_PANELS))
+    for i, (axis, (name, unit)) in enumerate(zip(axes, _PANELS, strict=True)):
+        _panel(axis, drawn.errors[:, i], float(drawn.stated[i]))
+        axis.set_xlabel(f"{name} [{unit}]", fontsize=9)
+    axes[0].set_ylabel("density", fontsize=9)
+    figure.savefig(path, dpi=90)
+
+
 def _histogram(drawn: Drawn) -> list[str]:
     """Bars over bins of half a stated standard deviation, and below them the deviations found and stated."""
     unit = drawn.errors / np.where(drawn.stated > 0.0, drawn.stated, 1.0)
     edges = 0.5 * (np.arange(_BINS - 1) - (_BINS - 2) / 2)
     counts = np.array([np.bincount(np.digitize(column, edges), minlength=_BINS) for column in unit.T])
     longest = max(1, int(counts.max()))
-    lines = ["stated".rjust(12) + "".join(f"  {name:{_WIDTH}}" for name in PANELS)]
+    lines = ["stated".rjust(12) + "".join(f"  {name:{_WIDTH}}" for name, _ in _PANELS)]
     for i in range(_BINS):
-        low = edges[i - 1] if i else None
-        high = edges[i] if i < _BINS - 1 else None
-        if low is None:
-            where = f"< {high:.2f}"
-        elif high is None:
-            where = f"> {low:.2f}"
+        if i == 0:
+            where = f"< {edges[0]:.2f}"
+        elif i == _BINS - 1:
+            where = f"> {edges[-1]:.2f}"
         else:
-            where = f"{(low + high) / 2:.1f}"
+            where = f"{(edges[i - 1] + edges[i]) / 2:.1f}"
         bars = ("#" * int(np.ceil(_WIDTH * count / longest)) for count in counts[:, i])
         lines.append(where.rjust(12) + "".join(f"  {bar:{_WIDTH}}" for bar in bars))
-    for word, values in (
-        ("deviation", np.sqrt(np.mean(drawn.errors**2, axis=0)) if len(drawn.errors) else np.zeros(4)),
-        ("stated", drawn.stated),
-    ):
-        lines.append(
-            word.rjust(12) + "".join(f"  {f'{v:.3g} {u}':{_WIDTH}}" for v, u in zip(values, PANEL_UNITS, strict=True))
-        )
+    deviation = np.sqrt(np.mean(drawn.errors**2, axis=0))
+    for word, values in (("deviation", deviation), ("stated", drawn.stated)):
+        sizes = (f"{value:.3g} {unit}" for value, (_, unit) in zip(values, _PANELS, strict=True))
+        lines.append(word.rjust(12) + "".join(f"  {size:{_WIDTH}}" for size in sizes))
     return lines
+
+
+def _panel(axis: Any, errors: Array, stated: float) -> None:
+    sigma = stated or 1.0
+    edges = np.linspace(-_REACH * sigma, _REACH * sigma, _DRAWN_BINS + 1)
+    inside = np.clip(errors, edges[0], edges[-1])
+    axis.hist(inside, edges, density=True, color=_COLOR, alpha=0.75)
+    x = np.linspace(edges[0], edges[-1], 241)
+    normal = np.exp(-0.5 * (x / sigma) ** 2) / (sigma * np.sqrt(2.0 * np.pi))
+    axis.plot(x, normal, color="black", linewidth=1.0)
+    axis.set_yscale("log")
+    axis.set_ylim(1e-4 / sigma, 1.5 / sigma)
+    axis.tick_params(labelsize=8)
+    axis.spines[["top", "right"]].set_visible(False)

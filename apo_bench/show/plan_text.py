@@ -11,7 +11,7 @@ import numpy as np
 
 from apo_bench.assembly.goals import Plan, placements
 from apo_bench.assembly.topology import spelled
-from apo_bench.geometry import pose
+from apo_bench.files.json_forms import pose_form
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.arrival import Arrival, turning_state
 from apo_bench.insertion.macros import Macro
@@ -105,6 +105,7 @@ def plan_lines_form(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequen
         poses = stages[line.operation if line.undo else line.operation + 1]
         screw = turning_state(scenario.assembly, line.comes, poses)
         position, felt, across = line.comes.axes
+        goal = {"position_mm": None, "quaternion_wxyz": None} if line.goal is None else pose_form(line.goal)
         forms.append(
             {
                 "operation": line.operation + 1,
@@ -116,7 +117,7 @@ def plan_lines_form(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequen
                 "macros": [_macro(line.leaves, macro) for macro in line.leaves.departs]
                 + [_macro(line.comes, macro) for macro in line.comes.macros],
                 "from": line.came_from,
-                "until": {"relations": list(line.relations), "back_to": line.back_to or None} | _pose(line.goal),
+                "until": {"relations": list(line.relations), "back_to": line.back_to or None} | goal,
                 "guarded": felt.tolist(),
                 "position": position.tolist(),
                 "walls": across.tolist(),
@@ -165,6 +166,7 @@ def _until(line: PlanLine) -> str:
 
 def _turns(T: Array) -> Array:
     """Turns about the fixed x, then y, then z axis, (3,), [degrees], as in a scenario file."""
+    # R = Rz Ry Rx; where y is 90 degrees only x - z or x + z is known, and z is said to be 0
     R = T[:3, :3]
     level = float(np.hypot(R[0, 0], R[1, 0]))
     if level < 1e-9:
@@ -182,24 +184,17 @@ def _point(p: Array) -> str:
     return f"({', '.join(f'{v:.4g}' for v in np.round(1e3 * p, 6) + 0.0)})"
 
 
-def _state(found: Arrival) -> dict[str, Any]:
-    return {"letter": found.state.letter, "translation": list(found.state)}
+def _state(arrival: Arrival) -> dict[str, Any]:
+    return {"letter": arrival.state.letter, "translation": list(arrival.state)}
 
 
-def _macro(found: Arrival, macro: Macro) -> dict[str, Any]:
+def _macro(arrival: Arrival, macro: Macro) -> dict[str, Any]:
     return {
         "name": macro.name,
         "direction": macro.direction.tolist(),
-        "direction_in_part": found.own(macro.direction).tolist(),
+        "direction_in_part": arrival.own(macro.direction).tolist(),
         "length_mm": None if macro.length_m is None else round(1e3 * macro.length_m, 6),
         "guarded": macro.guarded,
-        "contacts": [str(contact) for contact in found.contacts(macro)],
-        "keeps": [str(found.touched[i].contact) for i in macro.keeps],
+        "contacts": [str(contact) for contact in arrival.contacts(macro)],
+        "keeps": [str(arrival.touched[i].contact) for i in macro.keeps],
     }
-
-
-def _pose(T: Array | None) -> dict[str, Any]:
-    if T is None:
-        return {"position_mm": None, "quaternion_wxyz": None}
-    packed = pose.pack(T)
-    return {"position_mm": (packed[:3] * 1e3).tolist(), "quaternion_wxyz": packed[3:].tolist()}

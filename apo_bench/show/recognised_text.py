@@ -13,7 +13,7 @@ _SURE = 0.9
 """Sets that are less likely are called not certain."""
 
 
-def evidence_table(found: Recognised, right: Assembly) -> Any:
+def evidence_table(recognised: Recognised, right: Assembly) -> Any:
     """One line per contact, with what was measured and what was allowed."""
     from rich.table import Table
 
@@ -23,8 +23,8 @@ def evidence_table(found: Recognised, right: Assembly) -> Any:
     for name in ("seen gap mm", "gap mm", "allowed", "angle deg", "allowed", "overlap"):
         table.add_column(name, justify="right")
     table.add_column("")
-    there = {(relation.made, relation.contact) for relation in right.relations()}
-    for e in found.evidence:
+    in_scenario = {(relation.made, relation.contact) for relation in right.relations()}
+    for e in recognised.evidence:
         table.add_row(
             str(e.made + 1),
             str(e.contact.manipulated),
@@ -35,16 +35,16 @@ def evidence_table(found: Recognised, right: Assembly) -> Any:
             f"{degrees(e.angle_rad):z.2f}",
             f"{degrees(e.most.angle_rad):.2f}",
             f"{100 * e.share:.0f} %",
-            "" if (e.made, e.contact) in there else "not in the scenario",
+            "" if (e.made, e.contact) in in_scenario else "not in the scenario",
         )
     return table
 
 
-def difference_lines(observation: Observation, found: Recognised) -> list[str]:
+def difference_lines(observation: Observation, recognised: Recognised) -> list[str]:
     """`all 9 contacts of the scenario were recognised, and no other`, or what differs."""
     right = observation.assembly
-    count = count_contacts(right, found.assembly)
-    missed = [f"missed: {made + 1}: {contact}" for made, contact in _missed(right, found)]
+    count = count_contacts(right, recognised.assembly)
+    missed = [f"missed: {made + 1}: {contact}" for made, contact in _missed(right, recognised)]
     total = count["contacts_right"] + count["contacts_missed"]
     if not missed and not count["contacts_false"]:
         return [f"all {total} contacts of the scenario were recognised, and no other"]
@@ -52,18 +52,20 @@ def difference_lines(observation: Observation, found: Recognised) -> list[str]:
     return [f"{line}, and {count['contacts_false']} that it does not have", *missed]
 
 
-def confidence_line(found: Recognised) -> list[str]:
+def confidence_line(recognised: Recognised) -> list[str]:
     """How likely the set of contacts is, and what the next best one would change; nothing where none were compared."""
-    if found.probability is None:
+    if recognised.probability is None:
         return []
-    said = f"this set of contacts is right with probability {found.probability:.2f}, of those that were compared"
-    if found.probability < _SURE:
-        said = f"not certain: {said}"
-    if found.rival is None:
-        return [said]
-    added, gone = _changes(found.assembly, found.rival.assembly)
+    sentence = (
+        f"this set of contacts is right with probability {recognised.probability:.2f}, of those that were compared"
+    )
+    if recognised.probability < _SURE:
+        sentence = f"not certain: {sentence}"
+    if recognised.rival is None:
+        return [sentence]
+    added, gone = _changes(recognised.assembly, recognised.rival.assembly)
     change = [f"{word} {', '.join(names)}" for word, names in (("with", added), ("without", gone)) if names]
-    return [f"{said}; the next ({found.rival.probability:.2f}) is {' and '.join(change)}"]
+    return [f"{sentence}; the next ({recognised.rival.probability:.2f}) is {' and '.join(change)}"]
 
 
 def _changes(best: Assembly, other: Assembly) -> tuple[list[str], list[str]]:
@@ -73,32 +75,34 @@ def _changes(best: Assembly, other: Assembly) -> tuple[list[str], list[str]]:
 
 
 def recognition_form(
-    name: str, kind: str, observation: Observation, found: Recognised, assumed: bool
+    name: str, kind: str, observation: Observation, recognised: Recognised, assumed: bool
 ) -> dict[str, Any]:
     """Everything, in mm and degrees; operations from 1."""
-    there = {(relation.made, relation.contact) for relation in observation.assembly.relations()}
+    in_scenario = {(relation.made, relation.contact) for relation in observation.assembly.relations()}
     return {
         "schema": _SCHEMA,
         "scenario": name,
         "relations": kind,
         "deviation_assumed": assumed,
-        "contacts": [{**_evidence_form(e), "in_scenario": (e.made, e.contact) in there} for e in found.evidence],
+        "contacts": [
+            {**_evidence_form(e), "in_scenario": (e.made, e.contact) in in_scenario} for e in recognised.evidence
+        ],
         "missed": [
             {"operation": made + 1, "manipulated": str(contact.manipulated), "environment": str(contact.environment)}
-            for made, contact in _missed(observation.assembly, found)
+            for made, contact in _missed(observation.assembly, recognised)
         ],
-        **count_contacts(observation.assembly, found.assembly),
-        "probability": found.probability,
-        "next": _rival_form(found),
+        **count_contacts(observation.assembly, recognised.assembly),
+        "probability": recognised.probability,
+        "next": _rival_form(recognised),
     }
 
 
-def _rival_form(found: Recognised) -> dict[str, Any] | None:
+def _rival_form(recognised: Recognised) -> dict[str, Any] | None:
     """The next best set: how likely it is, and in what it differs."""
-    if found.rival is None:
+    if recognised.rival is None:
         return None
-    added, gone = _changes(found.assembly, found.rival.assembly)
-    return {"probability": found.rival.probability, "with": added, "without": gone}
+    added, gone = _changes(recognised.assembly, recognised.rival.assembly)
+    return {"probability": recognised.rival.probability, "with": added, "without": gone}
 
 
 def _evidence_form(e: Evidence) -> dict[str, Any]:
@@ -115,8 +119,8 @@ def _evidence_form(e: Evidence) -> dict[str, Any]:
     }
 
 
-def _missed(right: Assembly, found: Recognised) -> list[tuple[int, Contact]]:
-    named = {(e.made, e.contact) for e in found.evidence}
+def _missed(right: Assembly, recognised: Recognised) -> list[tuple[int, Contact]]:
+    named = {(e.made, e.contact) for e in recognised.evidence}
     return [(r.made, r.contact) for r in right.relations() if (r.made, r.contact) not in named]
 
 

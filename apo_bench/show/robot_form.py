@@ -2,7 +2,7 @@
 
 The tip lies between the fingertips: z points ahead, x along the direction in which the fingers close. Each motion is a
 straight line `from` a pose `to` a pose. One that is guarded ends where contact is felt against its direction, which
-should be at `to`; it begins as far before as the plan comes from, or `NEAR_M` where nothing else says so.
+should be at `to`; it begins as far before as the plan comes from, or 5 mm where nothing else says so.
 """
 
 from collections.abc import Mapping, Sequence
@@ -18,7 +18,7 @@ from apo_bench.scenario.scenario import Grasp, Scenario
 from apo_bench.show.plan_text import PlanLine
 
 _SCHEMA = "apo-bench/robot-plan/1"
-NEAR_M = 0.005
+_GUARDED_FROM_M = 0.005
 """A guarded motion whose length nothing else says begins so far before contact."""
 _BEYOND_M = 0.002
 """Contact is sought this far beyond where it should be."""
@@ -84,26 +84,25 @@ def _step(
     frames: RobotFrames,
 ) -> dict[str, Any]:
     part = line.what.main
-    solid = plan.assembly.solids[line.what.main]
     here = poses[part]
     goal = after[part]
     grip = tip_in_part(line.grasp, here)
-    low, high = solid.bounds
+    low, high = plan.assembly.solids[part].bounds
     width = float(np.abs(line.grasp.across) @ (high - low))
     tip = here @ grip
     end = goal @ grip
-    made = () if line.undo else plan.assembly.operations[line.operation].contacts
+    contacts = () if line.undo else plan.assembly.operations[line.operation].contacts
     return {
         "operation": line.operation + 1,
         "undo": line.undo,
         "part": part,
         "carries": list(line.what.carries),
-        "makes": [str(contact) for contact in made],
+        "makes": [str(contact) for contact in contacts],
         "grasp": {
             "tip_in_part": _pose(grip, frames),
             "part_is_at_most_mm_wide": round(1e3 * width, 6),
         },
-        "pick": {"above": _tip(_lifted(tip, _ABOVE_M), frames), "at": _tip(tip, frames)},
+        "pick": {"above": _tip(_shifted(tip, np.array([0.0, 0.0, 1.0]), _ABOVE_M), frames), "at": _tip(tip, frames)},
         "motions": [
             *_departs(line, here, grip, frames),
             *_arrives(line, goal, grip, frames),
@@ -116,6 +115,7 @@ def _step(
 
 def tip_in_part(grasp: Grasp, T_world_part: Array) -> Array:
     """The tip in the frame of the part, (4, 4): looking down where the part stands like this."""
+    # world -z in the frame of the part: z of the tip; x is the grasp's direction with what is along z taken out
     down = -T_world_part[2, :3]
     across = grasp.across - (grasp.across @ down) * down
     across = across / np.linalg.norm(across)
@@ -129,14 +129,14 @@ def tip_in_part(grasp: Grasp, T_world_part: Array) -> Array:
 
 def _departs(line: PlanLine, here: Array, grip: Array, frames: RobotFrames) -> list[dict[str, Any]]:
     """The motions by which the part leaves the contacts that it is in, one after the other."""
-    found = []
+    motions = []
     at = here
     for macro in line.leaves.departs:
         way = here[:3, :3] @ line.leaves.own(macro.direction)
-        to = _shifted(at, way, macro.length_m or NEAR_M)
-        found.append(_motion(macro.name, False, at, to, way, grip, frames))
+        to = _shifted(at, way, macro.length_m or _GUARDED_FROM_M)
+        motions.append(_motion(macro.name, False, at, to, way, grip, frames))
         at = to
-    return found
+    return motions
 
 
 def _arrives(line: PlanLine, goal: Array, grip: Array, frames: RobotFrames) -> list[dict[str, Any]]:
@@ -146,18 +146,19 @@ def _arrives(line: PlanLine, goal: Array, grip: Array, frames: RobotFrames) -> l
     if not macros:
         at = _shifted(goal, way_in, -line.comes.line.travel_m)
         return [_motion("put down", False, at, goal, way_in, grip, frames)]
-    found = list[dict[str, Any]]()
+    motions = list[dict[str, Any]]()
     end = goal
     for i, macro in reversed(list(enumerate(macros))):
         way = goal[:3, :3] @ line.comes.own(macro.direction)
+        # the first motion along the way in is as long as the plan's own way; others as long as their macro says
         first_along = way @ way_in > _ALONG and not any(
             goal[:3, :3] @ line.comes.own(other.direction) @ way_in > _ALONG for other in macros[:i]
         )
-        length = line.comes.line.travel_m if first_along else macro.length_m or NEAR_M
+        length = line.comes.line.travel_m if first_along else macro.length_m or _GUARDED_FROM_M
         begin = _shifted(end, way, -length)
-        found.append(_motion(macro.name, macro.guarded, begin, end, way, grip, frames))
+        motions.append(_motion(macro.name, macro.guarded, begin, end, way, grip, frames))
         end = begin
-    return found[::-1]
+    return motions[::-1]
 
 
 def _motion(
@@ -185,10 +186,6 @@ def _pose(T: Array, frames: RobotFrames) -> dict[str, Any]:
     packed = pose.pack(T)
     q = packed[3:] if frames.quaternion == "wxyz" else np.roll(packed[3:], -1)
     return {"position_mm": (packed[:3] * 1e3).round(9).tolist(), f"quaternion_{frames.quaternion}": q.tolist()}
-
-
-def _lifted(T: Array, far: float) -> Array:
-    return _shifted(T, np.array([0.0, 0.0, 1.0]), far)
 
 
 def _shifted(T: Array, way: Array, far: float) -> Array:

@@ -35,22 +35,22 @@ class Cursor:
     _played_s: float = 0.0
 
     @property
-    def shown(self) -> Chapter:
+    def current(self) -> Chapter:
         return self.story.chapters[self.chapter]
 
     @property
     def at(self) -> FilmMoment:
-        return self.shown.moments[self.moment]
+        return self.current.moments[self.moment]
 
     def still(self) -> Still:
         """What is to be seen here."""
-        return Still(self.shown, self.at, self.words(), self._faces(), self._ghosts())
+        return Still(self.current, self.at, self.words(), self._faces(), self._ghosts())
 
     def press(self, key: str) -> None:
         """Do what a key means, one of `KEYS` of the window."""
         way = -1 if key.startswith("previous") else 1
         if key == "play":
-            if not self.playing and self.moment == len(self.shown.moments) - 1:
+            if not self.playing and self.moment == len(self.current.moments) - 1:
                 self.go(0)
             self.playing = not self.playing
         elif key.endswith("operation"):
@@ -66,7 +66,7 @@ class Cursor:
 
     def go(self, moment: int) -> None:
         """To a moment of this chapter, by its number; beyond an end to the end."""
-        self.moment = min(max(moment, 0), len(self.shown.moments) - 1)
+        self.moment = min(max(moment, 0), len(self.current.moments) - 1)
         self._played_s = self.at.time_s
 
     def turn_to(self, chapter: int) -> None:
@@ -80,7 +80,7 @@ class Cursor:
         if not self.playing:
             return
         self._played_s += seconds
-        moments = self.shown.moments
+        moments = self.current.moments
         k = self.moment
         while k + 1 < len(moments) and moments[k + 1].time_s <= self._played_s:
             k += 1
@@ -91,15 +91,15 @@ class Cursor:
         """What is done here, the force, how far goals and the part are from the true goal; at the end, how it ended."""
         moment = self.at
         assembly = self.story.scene.scenario.assembly
-        said = [f"{moment.time_s:.2f} s, {operation_words(assembly, moment)}"]
-        if self.shown.world is self.story.scene.work and self.shown.ending:
-            said.append(f"force {moment.doing.force_n:.1f} N")
+        words = [f"{moment.time_s:.2f} s, {operation_words(assembly, moment)}"]
+        if self.current.world is self.story.scene.work and self.current.ending:
+            words.append(f"force {moment.doing.force_n:.1f} N")
         if moment.doing.operation is not None:
-            said += map(str, assembly.operations[moment.doing.operation].contacts)
-            said += self._offsets(moment.doing.operation)
-        if self.moment == len(self.shown.moments) - 1 and self.shown.ending:
-            said.append(self.shown.ending)
-        return tuple(said)
+            words += map(str, assembly.operations[moment.doing.operation].contacts)
+            words += self._offsets(moment.doing.operation)
+        if self.moment == len(self.current.moments) - 1 and self.current.ending:
+            words.append(self.current.ending)
+        return tuple(words)
 
     def _offsets(self, k: int) -> list[str]:
         true = self.story.goals.get(AS_TRUE)
@@ -107,24 +107,25 @@ class Cursor:
             return []
         part = self.story.scene.scenario.assembly.operations[k].main
         named = {name: goals[k] for name, goals in self.story.goals.items() if name != AS_TRUE}
-        named["as it is now"] = part_poses(self.shown, self.at)[part]
-        said = []
+        named["as it is now"] = part_poses(self.current, self.at)[part]
+        offsets = []
         for name, T in named.items():
+            # T_true^-1 T = Exp(twist): how far off in the part's own frame
             twist = pose.log(pose.inverse(true[k]) @ T)
             mm = 1e3 * np.linalg.norm(twist[:3])
             deg = np.degrees(np.linalg.norm(twist[3:]))
-            said.append(f"{name}: {mm:.2f} mm, {deg:.2f} degrees off")
-        return said
+            offsets.append(f"{name}: {mm:.2f} mm, {deg:.2f} degrees off")
+        return offsets
 
     def _go_operation(self, way: int) -> None:
         """To the first moment of the next operation, or of the one before."""
         begins = [0] + [
             i
-            for i, (a, b) in enumerate(zip(self.shown.moments, self.shown.moments[1:], strict=False), start=1)
+            for i, (a, b) in enumerate(zip(self.current.moments, self.current.moments[1:], strict=False), start=1)
             if a.doing.operation != b.doing.operation
         ]
         beyond = [i for i in begins if (i > self.moment if way > 0 else i < self.moment)]
-        self.go((beyond[0] if way > 0 else beyond[-1]) if beyond else (len(self.shown.moments) if way > 0 else 0))
+        self.go((beyond[0] if way > 0 else beyond[-1]) if beyond else (len(self.current.moments) if way > 0 else 0))
 
     def _faces(self) -> tuple[PartFace, ...]:
         assembly = self.story.scene.scenario.assembly
@@ -145,7 +146,7 @@ class Cursor:
 
         def placed(name: str) -> Poses:
             goals = self.story.goals[name]
-            poses = placements(assembly.first(k + 1), self.shown.start, goals[: k + 1])[-1]
+            poses = placements(assembly.first(k + 1), self.current.start, goals[: k + 1])[-1]
             return {part: T for part, T in poses.items() if part in moved}
 
         return tuple(Ghost(name, placed(name), COLORS[name]) for name in self.story.goals if name in self.goals)

@@ -4,15 +4,15 @@ from collections.abc import Callable
 from typing import Literal
 
 from apo_bench.errors import InputError
-from apo_bench.show.browser import PORT, no_browser, serve
+from apo_bench.show.browser import PORT, no_browser, serve_story
 from apo_bench.show.stepping import Cursor
 from apo_bench.simulation.film.window import no_window, step_in_window
 from apo_bench.trial.story import Story
 
-Place = Literal["window", "browser"]
+Viewer = Literal["window", "browser"]
 
 
-def choose_place(port: int | None) -> Place:
+def choose_viewer(port: int | None) -> Viewer:
     """Where it can be shown; asked before anything is run.
 
     Args:
@@ -37,11 +37,11 @@ def choose_place(port: int | None) -> Place:
     return "window"
 
 
-def view(story: Story, place: Place, port: int | None, say: Callable[[str], None]) -> None:
+def view(story: Story, viewer: Viewer, port: int | None, say: Callable[[str], None]) -> None:
     """Show it until a person closes the window, or Ctrl-C."""
     try:
-        if place == "browser":
-            serve(story, PORT if port is None else port, say)
+        if viewer == "browser":
+            serve_story(story, PORT if port is None else port, say)
         else:
             cursor = Cursor(story)
             step_in_window(story.scene, story.assembled, cursor.still, cursor.press, cursor.pass_time)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.report.answer import ALIKE, answer
+from apo_bench.report.answer import ALIKE_WITHIN, answer
 from apo_bench.statistics.levels.summary import Summary, summary
 from apo_bench.statistics.over_seeds import FEWEST_SEEDS, contrast
 from apo_bench.statistics.paired import tango
@@ -203,7 +203,7 @@ def test_no_sentence_contradicts_the_counts(rows: list[dict[str, Any]]) -> None:
             assert ours < theirs
             assert high < 0
         if "as often" in sentence:
-            assert -ALIKE <= low <= 0 <= high <= ALIKE
+            assert -ALIKE_WITHIN <= low <= 0 <= high <= ALIKE_WITHIN
         if "ahead" in sentence or "behind" in sentence:
             assert ("ahead" in sentence) == (ours > theirs)
         if "as many, but" in sentence:

@@ -12,7 +12,7 @@ from apo_bench.assembly.graph import Graph, relation_graph
 from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.show.graph.drawing import draw_graph
 from apo_bench.show.graph.layers import Links, arrange_layers, links_of
-from apo_bench.show.graph.layout import Rectangle, arrange, shared_area
+from apo_bench.show.graph.layout import Rectangle, layout_graph, shared_area
 from tests import scenes
 
 CASES = [(name, step) for name in scenes.ALL for step in range(1, len(scenes.ALL[name]().assembly) + 1)]
@@ -42,7 +42,7 @@ def test_arrows_lead_down_and_do_not_cross(name: str, step: int) -> None:
 @pytest.mark.parametrize(("name", "step"), CASES)
 def test_nothing_lies_on_anything(name: str, step: int) -> None:
     graph = graph_of(name, step)
-    layout = arrange(graph, [f"{arc.name}\n10.00 mm" for arc in graph.arcs])
+    layout = layout_graph(graph, [f"{arc.name}\n10.00 mm" for arc in graph.arcs])
     for a, b in combinations((*layout.boxes.values(), *layout.labels), 2):
         assert shared_area(a, b) == 0
     for i, route in enumerate(layout.routes):
@@ -61,7 +61,7 @@ def inside(box: Rectangle, points: np.ndarray) -> bool:
 @pytest.mark.parametrize(("name", "step"), CASES)
 def test_arrows_begin_and_end_at_their_parts(name: str, step: int) -> None:
     graph = graph_of(name, step)
-    layout = arrange(graph, [arc.name for arc in graph.arcs])
+    layout = layout_graph(graph, [arc.name for arc in graph.arcs])
     for arc, route in zip(graph.arcs, layout.routes, strict=True):
         above = layout.boxes[arc.manipulated]
         below = layout.boxes[arc.environment]

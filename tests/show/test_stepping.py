@@ -187,8 +187,8 @@ def test_where_nothing_can_be_shown_one_sentence_says_so(
 
 def test_a_browser_is_served_what_the_cursor_is_at(tower: Scene) -> None:
     pytest.importorskip("viser")
-    from apo_bench.show.browser import serve
+    from apo_bench.show.browser import serve_story
 
     said: list[str] = []
-    serve(with_goals(tower), 18417, said.append, ends=lambda: bool(said))
+    serve_story(with_goals(tower), 18417, said.append, ends=lambda: bool(said))
     assert said[0].startswith("Open http://127.0.0.1:18")

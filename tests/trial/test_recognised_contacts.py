@@ -15,7 +15,7 @@ from apo_bench.records.relations import RECOGNISED
 from apo_bench.records.settings import TrialSettings
 from apo_bench.report.figures.levels import recognition_figure
 from apo_bench.report.figures.sheet import draw
-from apo_bench.report.tables.forecasts import NONE, recognition_table
+from apo_bench.report.tables.forecasts import recognition_table
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.statistics.forecasts import ALL
@@ -90,7 +90,7 @@ def test_nothing_recognised_has_no_precision(tmp_path: Path) -> None:
     found = recognitions([row("recognised-fixed", contacts_right=0, contacts_missed=3)])
     assert (found[0].precision, found[0].recall) == (None, 0.0)
     assert recognition_table(found).markdown()[-1].endswith("| – | 0.00 % | 3 | 0 |")
-    assert recognition_table(()).markdown() == [NONE]
+    assert recognition_table(()).markdown() == ["No method was told relations that were recognised."]
     recognition_table(found).write(tmp_path / "table.csv")
     with (tmp_path / "table.csv").open(encoding="utf-8") as file:
         (line,) = csv.DictReader(file)

@@ -19,9 +19,9 @@ from apo_bench.statistics.rates import Cell, Interval, Place, Rate, order, place
 from apo_bench.statistics.settings import cell_place
 
 RUN = "run.json can be read"
-ENDING = ("success", "failure_stage", "failure_code")
-_ENDED = itemgetter(*ENDING)
-_TOLD = itemgetter(*ENDING, "as_demonstrated", "loose_success", "failure_operation", "sentence", "freed", *NUMBERS)
+_ENDING = ("success", "failure_stage", "failure_code")
+_ENDED = itemgetter(*_ENDING)
+_RESULT = itemgetter(*_ENDING, "as_demonstrated", "loose_success", "failure_operation", "sentence", "freed", *NUMBERS)
 
 
 class Side(NamedTuple):
@@ -71,7 +71,7 @@ class Agreement:
         return tango(self.only_second, self.only_first, self.same.trials - self.excluded_in_one)
 
 
-class Apart(NamedTuple):
+class NumberChange(NamedTuple):
     """A number of a row, over the trials that both have."""
 
     name: str
@@ -85,7 +85,7 @@ class Apart(NamedTuple):
     """Trials in which one of the two alone has it."""
 
 
-class Pair(NamedTuple):
+class CellPair(NamedTuple):
     """Cells of both at the same place, whatever the fidelity; None where one has none."""
 
     first: Cell | None
@@ -123,10 +123,10 @@ class Comparison:
     """By scenario, and of all at the end."""
     changed: tuple[tuple[Row, Row], ...]
     """The trials whose verdicts differ."""
-    numbers: tuple[Apart, ...]
+    numbers: tuple[NumberChange, ...]
     identical: int
     """Trials of which verdict, stage, code, words and every number are exactly the same."""
-    cells: tuple[Pair, ...]
+    cells: tuple[CellPair, ...]
 
 
 def compare(first: str | Path, second: str | Path) -> Comparison:
@@ -139,7 +139,7 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
         InputError: A folder is no sweep, holds a trial twice, or both have no trial in common (of other salts a seed is
             another trial).
     """
-    sides = [_side(Path(folder)) for folder in (first, second)]
+    sides = [Side(Path(folder), read_run(Path(folder)), report_rows(Path(folder))) for folder in (first, second)]
     for side in sides:
         if not side.rows:
             raise InputError(f"'{side.folder}' holds no finished trial yet; run the sweep before it is compared.")
@@ -166,7 +166,7 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
         agreements=agreements(pairs),
         changed=tuple(pair for pair in sorted(pairs, key=_place_and_seed) if pair[0]["success"] != pair[1]["success"]),
         numbers=number_changes(pairs),
-        identical=sum(_identical(a, b) for a, b in pairs),
+        identical=sum(bool(_RESULT(a) == _RESULT(b)) for a, b in pairs),
         cells=_cells(sides[0], sides[1], pairs),
     )
 
@@ -180,9 +180,9 @@ def differences(first: Side, second: Side) -> tuple[Difference, ...]:
         read = [bool(side.run) or None for side in (first, second)]
         first = first._replace(run={RUN: read[0]})
         second = second._replace(run={RUN: read[1]})
-    said = [_said(side) for side in (first, second)]
-    names = list(dict.fromkeys([*said[0], *said[1]]))
-    return tuple(Difference(n, said[0].get(n), said[1].get(n)) for n in names if said[0].get(n) != said[1].get(n))
+    ours, theirs = (_settings_of(side) for side in (first, second))
+    names = dict.fromkeys([*ours, *theirs])
+    return tuple(Difference(n, ours.get(n), theirs.get(n)) for n in names if ours.get(n) != theirs.get(n))
 
 
 def agreements(pairs: Iterable[tuple[Row, Row]]) -> tuple[Agreement, ...]:
@@ -194,9 +194,9 @@ def agreements(pairs: Iterable[tuple[Row, Row]]) -> tuple[Agreement, ...]:
     return (*(_agreement(name, groups[name]) for name in sorted(groups)), _agreement(ALL, everything))
 
 
-def number_changes(pairs: Sequence[tuple[Row, Row]]) -> tuple[Apart, ...]:
+def number_changes(pairs: Sequence[tuple[Row, Row]]) -> tuple[NumberChange, ...]:
     """One per number that is in any row."""
-    found = []
+    changes = []
     for name in NUMBERS:
         value = itemgetter(name)
         values = [(value(a), value(b)) for a, b in pairs]
@@ -204,26 +204,22 @@ def number_changes(pairs: Sequence[tuple[Row, Row]]) -> tuple[Apart, ...]:
         alone = sum((x is None) != (y is None) for x, y in values)
         if both or alone:
             most = max((abs(x - y) for x, y in both), default=0.0)
-            found.append(Apart(name, len(both), sum(x != y for x, y in both), float(most), alone))
-    return tuple(found)
-
-
-def _side(folder: Path) -> Side:
-    return Side(folder, read_run(folder), report_rows(folder))
+            changes.append(NumberChange(name, len(both), sum(x != y for x, y in both), float(most), alone))
+    return tuple(changes)
 
 
 def _by_key(side: Side) -> dict[Key, Row]:
-    found: dict[Key, Row] = {}
+    rows: dict[Key, Row] = {}
     for row in side.rows:
         if row["level"] is None:
             continue
-        if row_key(row) in found:
+        if row_key(row) in rows:
             raise InputError(
                 f"'{side.folder}' holds a trial twice ({row['scenario']}, {row['method']}, level {row['level']:g}, "
                 f"seed {row['seed']}); every trial counts once, so leave one of the two out."
             )
-        found[row_key(row)] = row
-    return found
+        rows[row_key(row)] = row
+    return rows
 
 
 def _agreement(name: str, pairs: Sequence[tuple[Row, Row]]) -> Agreement:
@@ -243,17 +239,13 @@ def _agreement(name: str, pairs: Sequence[tuple[Row, Row]]) -> Agreement:
     )
 
 
-def _identical(a: Row, b: Row) -> bool:
-    return bool(_TOLD(a) == _TOLD(b))
-
-
 def _place_and_seed(pair: tuple[Row, Row]) -> tuple[Any, ...]:
     place = place_of(pair[0])
     assert place is not None
     return (*order(place), pair[0]["seed"])
 
 
-def _cells(first: Side, second: Side, pairs: Iterable[tuple[Row, Row]]) -> tuple[Pair, ...]:
+def _cells(first: Side, second: Side, pairs: Iterable[tuple[Row, Row]]) -> tuple[CellPair, ...]:
     """Cells by place, whatever the fidelity; sorted as `tally` sorts."""
     ours, theirs = ({_anywhere(cell_place(cell)): cell for cell in tally(side.rows)} for side in (first, second))
     verdicts: dict[Place, list[tuple[Any, Any]]] = {}
@@ -261,12 +253,12 @@ def _cells(first: Side, second: Side, pairs: Iterable[tuple[Row, Row]]) -> tuple
         place = place_of(a)
         if place is not None and a["success"] is not None and b["success"] is not None:
             verdicts.setdefault(_anywhere(place), []).append((a["success"], b["success"]))
-    found = []
+    pairs_of_cells = []
     for place in sorted({**ours, **theirs}, key=order):
-        met = verdicts.get(place, [])
-        alone = (met.count((True, False)), met.count((False, True)))
-        found.append(Pair(ours.get(place), theirs.get(place), len(met), *alone))
-    return tuple(found)
+        both = verdicts.get(place, [])
+        alone = (both.count((True, False)), both.count((False, True)))
+        pairs_of_cells.append(CellPair(ours.get(place), theirs.get(place), len(both), *alone))
+    return tuple(pairs_of_cells)
 
 
 def _anywhere(place: Place) -> Place:
@@ -274,17 +266,17 @@ def _anywhere(place: Place) -> Place:
     return place._replace(fidelity="full")
 
 
-def _said(side: Side) -> dict[str, Any]:
+def _settings_of(side: Side) -> dict[str, Any]:
     """Settings by name: of `run.json` one level deep, and of the rows what cannot be seen there."""
-    said: dict[str, Any] = {}
+    settings: dict[str, Any] = {}
     for name, value in side.run.items():
         if isinstance(value, dict):
-            said |= {f"{name}: {key}": inner for key, inner in value.items()}
+            settings |= {f"{name}: {key}": inner for key, inner in value.items()}
         elif isinstance(value, list) and all(isinstance(x, dict) for x in value):
             for i, inner in enumerate(value, start=1):
-                said |= {f"{name} {i}: {key}": x for key, x in inner.items()}
+                settings |= {f"{name} {i}: {key}": x for key, x in inner.items()}
         else:
-            said[name] = value
+            settings[name] = value
     for name in ("schema", *(info.column for info in SETTINGS.values() if info.shared)):
-        said[f"rows: {name}"] = sorted(set(map(itemgetter(name), side.rows)))
-    return said
+        settings[f"rows: {name}"] = sorted(set(map(itemgetter(name), side.rows)))
+    return settings

@@ -7,7 +7,7 @@ from apo_bench.records.row import Row
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.report_rows import NUMBERS
 from apo_bench.records.setting_columns import KEY, row_key
-from apo_bench.report.comparison.compare import Agreement, Comparison, Pair, Side
+from apo_bench.report.comparison.compare import Agreement, CellPair, Comparison, Side
 from apo_bench.report.run.facts import limits_of, scenario_files, value_words
 from apo_bench.report.run.trials import verdict, why
 from apo_bench.report.tables.table import Column, Table, level_text
@@ -17,11 +17,23 @@ from apo_bench.statistics.rates import Cell, Place, Rate, place_of
 from apo_bench.statistics.settings import cell_place, setting_of
 
 _SCHEMA = "apo-bench/comparison/1"
-MOST = 2000
+MOST_LISTED = 2000
 """Changed trials that are listed."""
+_AGREEMENT = (
+    "The same trials in both: how often success is the same, with Wilson's interval, and how often stage "
+    "and code of a failure are as well. Trials of one seed share their random numbers, so those "
+    "intervals are too narrow where disagreements come in bunches; *same in all* counts the seeds with which every "
+    "trial has the same verdict in both, and these are independent. *Right in the first alone* are trials "
+    "that the second lost. The difference of success is the second minus the first, with Tango's interval for pairs "
+    "(95 %), over trials too. Trials whose demonstration was not right in either are left out here."
+)
+_NUMBERS = "Of trials that have the number in both: in how many it is not exactly the same, and by how much at most."
+_CELLS = (
+    "Rates over all trials of each side; alone and the difference, second minus first, over the trials that they share."
+)
 
 
-def agreement_table(found: Comparison) -> Table:
+def agreement_table(comparison: Comparison) -> Table:
     """Verdicts that agree, by scenario and of all."""
     columns = (
         _both("scenario")._replace(words=True),
@@ -36,20 +48,22 @@ def agreement_table(found: Comparison) -> Table:
         _both("right in the second alone", lambda a: a.only_second),
         _both("difference of success [points]", lambda a: points(a.difference, a.interval)),
     )
-    return Table(found.agreements, columns)
+    return Table(comparison.agreements, columns, note=_AGREEMENT)
 
 
-def difference_table(found: Comparison) -> Table:
+def difference_table(comparison: Comparison) -> Table:
     """What is not the same in both."""
     columns = (
         _both("what"),
-        _both(str(found.first.folder), lambda d: _value(d.first)),
-        _both(str(found.second.folder), lambda d: _value(d.second)),
+        _both(str(comparison.first.folder), lambda d: _value(d.first)),
+        _both(str(comparison.second.folder), lambda d: _value(d.second)),
     )
-    return Table(found.differences, [c._replace(words=True) for c in columns], "Nothing that is said of them differs.")
+    return Table(
+        comparison.differences, [c._replace(words=True) for c in columns], "Nothing that is said of them differs."
+    )
 
 
-def number_table(found: Comparison) -> Table:
+def number_table(comparison: Comparison) -> Table:
     """How far numbers of the same trials are apart."""
     columns = (
         _both("number", lambda a: NUMBERS[a.name])._replace(words=True),
@@ -58,10 +72,10 @@ def number_table(found: Comparison) -> Table:
         _both("largest difference", lambda a: f"{a.most:.3g}" if a.both else None),
         _both("in one alone", lambda a: a.alone),
     )
-    return Table(found.numbers, columns)
+    return Table(comparison.numbers, columns, note=_NUMBERS)
 
 
-def rate_pair_table(found: Comparison) -> Table:
+def rate_pair_table(comparison: Comparison) -> Table:
     """Rates of both, cell by cell."""
     columns = (
         *(c._replace(words=True) for c in _where(_place_of_pair)),
@@ -72,10 +86,10 @@ def rate_pair_table(found: Comparison) -> Table:
         _both("second alone", lambda p: p.only_second),
         _both("difference [points]", lambda p: points(p.difference, p.interval)),
     )
-    return Table(found.cells, columns)
+    return Table(comparison.cells, columns, note=_CELLS)
 
 
-def changed_table(found: Comparison) -> Table:
+def changed_table(comparison: Comparison) -> Table:
     """The trials whose verdicts differ, with both sentences and commands."""
     columns = (
         *_where(lambda pair: place_of(pair[0])),
@@ -84,18 +98,18 @@ def changed_table(found: Comparison) -> Table:
         _both("in words", lambda pair: pair[0].get("sentence")),
         _both("second", lambda pair: f"{verdict(pair[1])} {why(pair[1])}".strip()),
         _both("in words", lambda pair: pair[1].get("sentence"), "in words 2"),
-        _both("command of the first", lambda pair: _command(pair[0], found.first)),
-        _both("command of the second", lambda pair: _command(pair[1], found.second)),
+        _both("command of the first", lambda pair: _command(pair[0], comparison.first)),
+        _both("command of the second", lambda pair: _command(pair[1], comparison.second)),
     )
-    return Table(found.changed[:MOST], [c._replace(words=True) for c in columns], "No verdict differs.")
+    return Table(comparison.changed[:MOST_LISTED], [c._replace(words=True) for c in columns], "No verdict differs.")
 
 
-def in_words(found: Comparison) -> str:
+def in_words(comparison: Comparison) -> str:
     """The whole in some sentences, counts first."""
-    first, second = found.alone
-    shared = f"{_trials(found.shared)} in both, {first:,} in the first alone, {second:,} in the second alone."
-    identical = f"{_trials(found.identical)} the same to the last digit."
-    return f"{shared} {_agreed(found.agreements[-1])} {identical}"
+    first, second = comparison.alone
+    shared = f"{_trials(comparison.shared)} in both, {first:,} in the first alone, {second:,} in the second alone."
+    identical = f"{_trials(comparison.identical)} the same to the last digit."
+    return f"{shared} {_agreed(comparison.agreements[-1])} {identical}"
 
 
 def _agreed(total: Agreement) -> str:
@@ -120,21 +134,21 @@ def _trials(n: int) -> str:
     return "1 trial is" if n == 1 else f"{n:,} trials are"
 
 
-def comparison_form(found: Comparison) -> dict[str, Any]:
+def comparison_form(comparison: Comparison) -> dict[str, Any]:
     """A comparison as JSON holds it."""
     return {
         "schema": _SCHEMA,
-        "first": str(found.first.folder),
-        "second": str(found.second.folder),
+        "first": str(comparison.first.folder),
+        "second": str(comparison.second.folder),
         "verdict": "success",
-        "shared": found.shared,
-        "first_alone": found.alone[0],
-        "second_alone": found.alone[1],
-        "identical": found.identical,
-        "agreements": [_agreement_form(a) for a in found.agreements],
-        "numbers": [a._asdict() for a in found.numbers],
-        "differences": [d._asdict() for d in found.differences],
-        "changed": [_changed_form(pair, found) for pair in found.changed],
+        "shared": comparison.shared,
+        "first_alone": comparison.alone[0],
+        "second_alone": comparison.alone[1],
+        "identical": comparison.identical,
+        "agreements": [_agreement_form(a) for a in comparison.agreements],
+        "numbers": [a._asdict() for a in comparison.numbers],
+        "differences": [d._asdict() for d in comparison.differences],
+        "changed": [_changed_form(pair, comparison) for pair in comparison.changed],
     }
 
 
@@ -152,11 +166,11 @@ def _where(of: Callable[[Any], Any]) -> tuple[Column, ...]:
     )
 
 
-def _place_of_pair(pair: Pair) -> Place:
+def _place_of_pair(pair: CellPair) -> Place:
     """Whatever the fidelity."""
-    one = pair.first or pair.second
-    assert one is not None
-    return cell_place(one)._replace(fidelity="full")
+    cell = pair.first or pair.second
+    assert cell is not None
+    return cell_place(cell)._replace(fidelity="full")
 
 
 def _counted(r: Rate) -> str:
@@ -197,9 +211,9 @@ def _agreement_form(a: Agreement) -> dict[str, Any]:
     }
 
 
-def _changed_form(pair: tuple[Row, Row], found: Comparison) -> dict[str, Any]:
+def _changed_form(pair: tuple[Row, Row], comparison: Comparison) -> dict[str, Any]:
     a, b = pair
-    said = {
+    sides = {
         name: {
             "verdict": verdict(row),
             "stage": row["failure_stage"],
@@ -207,6 +221,6 @@ def _changed_form(pair: tuple[Row, Row], found: Comparison) -> dict[str, Any]:
             "sentence": row.get("sentence"),
             "command": _command(row, side),
         }
-        for name, row, side in (("first", a, found.first), ("second", b, found.second))
+        for name, row, side in (("first", a, comparison.first), ("second", b, comparison.second))
     }
-    return {**dict(zip(KEY, row_key(a), strict=True)), **said}
+    return {**dict(zip(KEY, row_key(a), strict=True)), **sides}

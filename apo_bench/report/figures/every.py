@@ -11,7 +11,7 @@ from apo_bench.report.figures.levels import (
     success_figure,
 )
 from apo_bench.report.figures.other_axes import looks_figure, tightness_figure
-from apo_bench.report.figures.sheet import Drawing, draw
+from apo_bench.report.figures.sheet import DrawnFigure, draw
 from apo_bench.report.figures.styles import styles
 from apo_bench.statistics.effort import TrialTimes
 from apo_bench.statistics.forecasts import Confusion
@@ -29,7 +29,7 @@ def figures(
     confusions: Sequence[Confusion],
     recognitions: Sequence[Recognition],
     times: Sequence[TrialTimes],
-) -> dict[str, Drawing]:
+) -> dict[str, DrawnFigure]:
     """By the name of their file."""
     where = list(grouped)
     looks = styles(methods_of(found.cells))

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 from apo_bench.records.method import knows_truth
 from apo_bench.records.settings import RANGE
-from apo_bench.report.figures.lines import Axis, MethodLine, Point, Rule, dodges, entries, levels_axis, line_panel
+from apo_bench.report.figures.lines import Axis, MethodLine, Point, RuleLine, dodges, entries, levels_axis, line_panel
 from apo_bench.report.figures.sheet import Figure, Panel
 from apo_bench.report.figures.styles import RECOGNITION_STYLES, SEEN, Style, styles
 from apo_bench.statistics.forecasts import ALL
@@ -28,10 +28,10 @@ from apo_bench.statistics.settings import (
 
 _Item = TypeVar("_Item")
 SHARES = tuple((x / 100, f"{x} %") for x in (0, 25, 50, 75, 100))
-STEPS = (1, 2, 5, 10, 20, 25, 50, 100)
-FLOOR_MM = 1e-3
+_STEPS = (1, 2, 5, 10, 20, 25, 50, 100)
+_FLOOR_MM = 1e-3
 """Gaps below this are drawn here: what solvers leave of zero says nothing."""
-RECOGNITION = {"precision": "precision", "recall": "recall", "completeness": "demonstrations all right"}
+_RECOGNITION = {"precision": "precision", "recall": "recall", "completeness": "demonstrations all right"}
 
 
 def success_figure(cells: Sequence[Cell]) -> Figure:
@@ -45,29 +45,33 @@ def success_figure(cells: Sequence[Cell]) -> Figure:
 
 def difference_figure(pairs: Mapping[Setting, Sequence[Paired]], reference: str, looks: Mapping[str, Style]) -> Figure:
     """Differences to a reference: a panel per setting in which methods are compared with it."""
-    shown = {m: look for m, look in looks.items() if m not in (reference, "none")}
+    compared = {m: look for m, look in looks.items() if m not in (reference, "none")}
     here = {s: [p for p in own if p.reference == reference and p.pairs] for s, own in pairs.items()}
-    panels = [_differences(setting, own, shown) for setting, own in here.items() if own]
-    return Figure(f"Difference of success to {reference}, same seeds", panels, entries(shown))
+    panels = [_differences(setting, own, compared) for setting, own in here.items() if own]
+    return Figure(f"Difference of success to {reference}, same seeds", panels, entries(compared))
 
 
 def gap_figure(gaps: Mapping[Setting, Sequence[GapSummary]], looks: Mapping[str, Style]) -> Figure:
     """Gaps as seen and as planned: a panel per setting in which a method corrected."""
-    shown = {m: look for m, look in looks.items() if any(g.place.method == m for own in gaps.values() for g in own)}
-    panels = [_gaps(setting, own, shown) for setting, own in gaps.items() if own]
-    return Figure("Gap of the contacts as seen and as planned", panels, entries({"as seen": SEEN, **shown}))
+    compared = {m: look for m, look in looks.items() if any(g.place.method == m for own in gaps.values() for g in own)}
+    panels = [_gaps(setting, own, compared) for setting, own in gaps.items() if own]
+    return Figure("Gap of the contacts as seen and as planned", panels, entries({"as seen": SEEN, **compared}))
 
 
-def recognition_figure(found: Sequence[Recognition]) -> Figure:
+def recognition_figure(recognitions: Sequence[Recognition]) -> Figure:
     """Precision, recall and demonstrations all right, over all scenarios where there are several."""
-    shown = [r for r in found if r.place.scenario == ALL] or list(found)
-    rows = sorted({(r.place.noise, r.place.eye, r.place.careless) for r in shown})
+    drawn = [r for r in recognitions if r.place.scenario == ALL] or list(recognitions)
+    rows = sorted({(r.place.noise, r.place.eye, r.place.careless) for r in drawn})
     panels = []
     for row in rows:
-        here = [r for r in shown if (r.place.noise, r.place.eye, r.place.careless) == row]
+        here = [r for r in drawn if (r.place.noise, r.place.eye, r.place.careless) == row]
         where = f"{'range finder' if row[1] == RANGE else row[0]}, carelessness {row[2]:g}"
-        panels += [_recognised(f"{name}; {where}", here, what) for what, name in RECOGNITION.items()]
-    kinds = {kind: style for kind, style in RECOGNITION_STYLES.items() if any(r.place.relations == kind for r in found)}
+        panels += [_recognised(f"{name}; {where}", here, what) for what, name in _RECOGNITION.items()]
+    kinds = {
+        kind: style
+        for kind, style in RECOGNITION_STYLES.items()
+        if any(r.place.relations == kind for r in recognitions)
+    }
     return Figure("Recognised contacts over level", panels, entries(kinds))
 
 
@@ -87,7 +91,7 @@ def scale(values: Sequence[float]) -> Axis:
     """An axis in points that holds zero and all values (shares)."""
     low = 100 * min(0.0, *values)
     high = 100 * max(0.0, *values)
-    step = next((s for s in STEPS if (high - low) / s <= 6), STEPS[-1])
+    step = next((s for s in _STEPS if (high - low) / s <= 6), _STEPS[-1])
     first = math.floor(low / step)
     last = max(math.ceil(high / step), math.floor(low / step) + 1)
     ticks = [(k * step / 100, f"{k * step:+d}" if k else "0") for k in range(first, last + 1)]
@@ -104,7 +108,7 @@ def _success(setting: Setting, cells: Sequence[Cell], looks: Mapping[str, Style]
     known = [c for c in cells if c.rate is not None]
     lines = _lines(setting, known, looks, point, tip)
     best = next((c for c in known if c.method == "oracle"), None)
-    rule = None if best is None else Rule(best.rate or 0.0, True, f"oracle: {percent(best.rate)}, n {best.trials}")
+    rule = None if best is None else RuleLine(best.rate or 0.0, True, f"oracle: {percent(best.rate)}, n {best.trials}")
     title = f"{setting.title()}; {counted([c.trials for c in cells])}"
     return line_panel(title, _levels(setting, cells), Axis("success", 0.0, 1.0, SHARES), lines, rule)
 
@@ -120,29 +124,29 @@ def _differences(setting: Setting, pairs: Sequence[Paired], looks: Mapping[str, 
 
     y = scale([x for p in pairs for x in p.interval])
     title = f"{setting.title()}; {counted([p.pairs for p in pairs], 'pairs')}"
-    return line_panel(title, _levels(setting, pairs), y, _lines(setting, pairs, looks, point, tip), Rule(0.0))
+    return line_panel(title, _levels(setting, pairs), y, _lines(setting, pairs, looks, point, tip), RuleLine(0.0))
 
 
-def _gaps(setting: Setting, found: Sequence[GapSummary], looks: Mapping[str, Style]) -> Panel:
+def _gaps(setting: Setting, summaries: Sequence[GapSummary], looks: Mapping[str, Style]) -> Panel:
     def point(q: Quantiles) -> tuple[float, float, float]:
-        return max(q.median, FLOOR_MM), max(q.low, FLOOR_MM), max(q.high, FLOOR_MM)
+        return max(q.median, _FLOOR_MM), max(q.low, _FLOOR_MM), max(q.high, _FLOOR_MM)
 
     def tip(g: GapSummary) -> str:
         return f"as planned: median {g.planned.median:.3f} mm, 95 % below {g.planned.high:.3f} mm, n {g.trials}"
 
-    planned = _lines(setting, found, looks, lambda g: point(g.planned), tip)
-    most_tried = [max((g for g in found if level_of(g) == x), key=lambda g: g.trials) for x in levels_of(found)]
+    planned = _lines(setting, summaries, looks, lambda g: point(g.planned), tip)
+    most_tried = [max((g for g in summaries if level_of(g) == x), key=lambda g: g.trials) for x in levels_of(summaries)]
     seen = [
         Point(float(i), *point(g.seen), f"median {g.seen.median:.3f} mm, n {g.trials}")
         for i, g in enumerate(most_tried)  # methods were shown the same
     ]
-    values = [x for g in found for q in (g.seen, g.planned) for x in point(q)]
+    values = [x for g in summaries for q in (g.seen, g.planned) for x in point(q)]
     low = math.floor(math.log10(min(values)))
     high = max(math.ceil(math.log10(max(values))), low + 1)
     ticks = [(10.0**k, _power(k)) for k in range(low, high + 1, max(1, (high - low) // 4))]
     y = Axis("gap [mm]", 10.0**low, 10.0**high, ticks, logarithmic=True)
-    title = f"{setting.title()}; {counted([g.trials for g in found])}"
-    return line_panel(title, _levels(setting, found), y, [MethodLine("as seen", SEEN, seen), *planned])
+    title = f"{setting.title()}; {counted([g.trials for g in summaries])}"
+    return line_panel(title, _levels(setting, summaries), y, [MethodLine("as seen", SEEN, seen), *planned])
 
 
 def _recognised(title: str, here: Sequence[Recognition], what: str) -> Panel:
@@ -185,8 +189,8 @@ def _lines(
         points = []
         for item in own:
             level = level_of(item)
-            said = f"level {level_words(level, setting.noise)}: {tip(item)}"
-            points.append(Point(levels.index(level) + dodge, *point(item), said))
+            words = f"level {level_words(level, setting.noise)}: {tip(item)}"
+            points.append(Point(levels.index(level) + dodge, *point(item), words))
         lines.append(MethodLine(method, looks[method], points))
     return lines
 

@@ -6,12 +6,12 @@ from typing import Any, NamedTuple
 from apo_bench.report.figures.sheet import DPI, SAMPLE, Entry, Panel, Tips
 from apo_bench.report.figures.styles import INK, RULE, SOFT, Style
 
-DODGE = 0.08
-SPREAD = 0.4
+_DODGE = 0.08
+_WITHIN = 0.4
 """Methods stand this far from each other at one level, so that equal values do not hide each other; and all of them
 within this part of the way to the next level."""
-LIFT = 1.8
-RANGE = 8.0
+_LIFT = 1.8
+_RANGE = 8.0
 """For the same reason lines stand this far above each other, and all of them within this range, in px."""
 
 
@@ -43,7 +43,7 @@ class Axis(NamedTuple):
     logarithmic: bool = False
 
 
-class Rule(NamedTuple):
+class RuleLine(NamedTuple):
     """A line across a panel."""
 
     at: float
@@ -51,7 +51,7 @@ class Rule(NamedTuple):
     tip: str = ""
 
 
-def line_panel(title: str, x: Axis, y: Axis, lines: Sequence[MethodLine], rule: Rule | None = None) -> Panel:
+def line_panel(title: str, x: Axis, y: Axis, lines: Sequence[MethodLine], rule: RuleLine | None = None) -> Panel:
     """Lines with bands; a line of one point has a bar instead."""
 
     def draw(axis: Any, tip: Tips) -> None:
@@ -63,7 +63,7 @@ def line_panel(title: str, x: Axis, y: Axis, lines: Sequence[MethodLine], rule: 
                 tip(drawn, [rule.tip])
         for line in lines:
             _band(axis, line)
-        step = min(LIFT, RANGE / max(len(lines), 1))
+        step = min(_LIFT, _RANGE / max(len(lines), 1))
         for i, line in enumerate(lines):
             lift = step * ((len(lines) - 1) / 2 - i)
             tip(_marks(axis, line, lift), [f"{line.name}, {point.tip}" for point in line.points])
@@ -78,15 +78,15 @@ def levels_axis(labels: Sequence[str], what: str) -> Axis:
 
 def dodges(number: int) -> list[float]:
     """How far each of so many methods stands from its level."""
-    step = min(DODGE, SPREAD / number) if number else 0.0
+    step = min(_DODGE, _WITHIN / number) if number else 0.0
     return [step * (i - (number - 1) / 2) for i in range(number)]
 
 
 def entries(looks: dict[str, Style], ceiling: bool = False) -> list[Entry]:
     """A legend: one per method, and one for the oracle."""
     oracle = Style(SOFT, "", (0, (4, 3)))
-    made = [Entry(method, _sample(style)) for method, style in looks.items()]
-    return made + [Entry("oracle", _sample(oracle))] * ceiling
+    methods = [Entry(method, _sample(style)) for method, style in looks.items()]
+    return methods + [Entry("oracle", _sample(oracle))] * ceiling
 
 
 def _sample(style: Style) -> Callable[[Any], None]:
@@ -102,7 +102,7 @@ def _sample(style: Style) -> Callable[[Any], None]:
 def _scaffold(axis: Any, x: Axis, y: Axis) -> None:
     """Grid, labels and names; ticks of matplotlib would take half of the time."""
     axis.set_axis_off()
-    scales = {f"{name}scale": "log" for name, one in (("x", x), ("y", y)) if one.logarithmic}
+    scales = {f"{name}scale": "log" for name, axis_of in (("x", x), ("y", y)) if axis_of.logarithmic}
     axis.set(xlim=(x.low, x.high), ylim=(y.low, y.high), **scales)
     axis.hlines([at for at, _ in y.ticks], x.low, x.high, color=RULE, linewidth=1, zorder=0)
     crowded = sum(len(label) for _, label in x.ticks) + 2 * len(x.ticks) > 52
@@ -135,6 +135,6 @@ def _marks(axis: Any, line: MethodLine, lift: float) -> Any:
     shared = {"color": color, "clip_on": False, "transform": higher}
     axis.plot(at, values, linestyle=dashes, linewidth=1.7, **shared)
     thin = marker == "1" or isinstance(marker, tuple)  # a white edge would cover most of them
-    (made,) = axis.plot(at, values, marker=marker, linestyle="", markersize=8.0 if thin else 6.5, **shared)
-    made.set(markeredgecolor=color if thin else "#ffffff", markeredgewidth=0.6)
-    return made
+    (marks,) = axis.plot(at, values, marker=marker, linestyle="", markersize=8.0 if thin else 6.5, **shared)
+    marks.set(markeredgecolor=color if thin else "#ffffff", markeredgewidth=0.6)
+    return marks

@@ -22,21 +22,21 @@ from apo_bench.io.writing import to_write
 from apo_bench.report.figures.styles import INK, themed
 
 WIDTH = 360
-HEIGHT = 230
+_HEIGHT = 230
 """Of a panel."""
-ACROSS = 3
-LETTERS = 62
+_ACROSS = 3
+_LETTERS = 62
 """Panels side by side in a file; letters of a line of their titles."""
-HEAD = 40
-LINE = 20
-GAP = 18
-TITLE = 32
+_HEAD = 40
+_LINE = 20
+_GAP = 18
+_TITLE = 32
 SAMPLE = (26, 14)
 """Heights of the title, of a line of the legend, of the space between panels and of their titles; size of a sample."""
 DPI = 72
 """Of a sheet: one px each."""
-PNG_DPI = 120
-LOOKS: Any = {
+_PNG_DPI = 120
+_LOOKS: Any = {
     "svg.fonttype": "none",
     "font.family": ["sans-serif"],
     "font.sans-serif": ["DejaVu Sans"],
@@ -46,9 +46,9 @@ LOOKS: Any = {
     "text.usetex": False,
     "path.simplify": False,
 }
-PIECE = re.compile(r'^  <g id="((?:panel|sample)-\d+)">\n(.*?)^  </g>$', re.MULTILINE | re.DOTALL)
-CLIPS = re.compile(r"<clipPath .*?</clipPath>", re.DOTALL)
-SHAPE = re.compile(r"<(use|path) (?!id=)([^>]*?)/>")
+_PIECE = re.compile(r'^  <g id="((?:panel|sample)-\d+)">\n(.*?)^  </g>$', re.MULTILINE | re.DOTALL)
+_CLIPS = re.compile(r"<clipPath .*?</clipPath>", re.DOTALL)
+_SHAPE = re.compile(r"<(use|path) (?!id=)([^>]*?)/>")
 Tips = Callable[[Any, Sequence[str]], None]
 """Says what is shown when a mark is pointed at: takes something drawn, and a sentence for each of its marks."""
 
@@ -59,7 +59,7 @@ class Panel(NamedTuple):
     title: str
     draw: Callable[[Any, Tips], None]
     """Draws into the axes of matplotlib."""
-    height: int = HEIGHT
+    height: int = _HEIGHT
     margins: tuple[int, int, int, int] = (52, 12, 10, 42)
     """Left, right, above and below the axes."""
 
@@ -80,7 +80,7 @@ class Figure(NamedTuple):
     legend: Sequence[Entry] = ()
 
 
-class Piece(NamedTuple):
+class PagePiece(NamedTuple):
     """A panel, or the sample of a legend, as it stands in a page."""
 
     title: str
@@ -89,12 +89,12 @@ class Piece(NamedTuple):
 
 @final
 @dataclass(frozen=True)
-class Drawing:
+class DrawnFigure:
     """A figure that was drawn."""
 
     title: str
-    panels: tuple[Piece, ...]
-    legend: tuple[Piece, ...]
+    panels: tuple[PagePiece, ...]
+    legend: tuple[PagePiece, ...]
     shapes: Markup
     """What pieces refer to; it stands once in the page."""
     sheet: str
@@ -107,61 +107,56 @@ class Drawing:
         with to_write(path) as file:
             if path.suffix == ".png":
                 with _looks(self.title):
-                    from matplotlib.backends.backend_agg import FigureCanvasAgg
-
-                    FigureCanvasAgg(self.canvas)
-                    self.canvas.savefig(file, format="png", dpi=PNG_DPI)
+                    self.canvas.savefig(file, format="png", dpi=_PNG_DPI)
             else:
                 file.write(self.sheet.encode())
         return path
 
 
-def draw(figure: Figure) -> Drawing:
+def draw(figure: Figure) -> DrawnFigure:
     """Draw every panel and the legend."""
-    across = min(ACROSS, len(figure.panels))
-    width = across * (WIDTH + GAP) + GAP
+    across = min(_ACROSS, len(figure.panels))
+    width = across * (WIDTH + _GAP) + _GAP
     samples, lines = _legend_places(figure.legend, width)
-    top = HEAD + LINE * lines
+    top = _HEAD + _LINE * lines
     places = []
     for i in range(0, len(figure.panels), across):
         row = figure.panels[i : i + across]
-        places += [(GAP + k * (WIDTH + GAP), top + TITLE) for k in range(len(row))]
-        top += TITLE + max(panel.height for panel in row) + GAP
+        places += [(_GAP + k * (WIDTH + _GAP), top + _TITLE) for k in range(len(row))]
+        top += _TITLE + max(panel.height for panel in row) + _GAP
     boxes: dict[str, tuple[float, ...]] = {}
     tips: list[Sequence[str]] = []
 
-    def tip(artist: Any, said: Sequence[str]) -> None:
+    def tip(artist: Any, sentences: Sequence[str]) -> None:
         artist.set_gid(f"tips-{len(tips)}")
-        tips.append(said)
+        tips.append(sentences)
 
     with _looks(figure.title):
         from matplotlib import figure as mpl
-        from matplotlib.backends.backend_svg import FigureCanvasSVG
 
         canvas = mpl.Figure(figsize=(width / DPI, top / DPI), dpi=DPI)
         sheet = _Sheet(canvas, width, top)
-        sheet.text(GAP, 26, figure.title, fontsize=15)
+        sheet.text(_GAP, 26, figure.title, fontsize=15)
         for i, (entry, (x, y)) in enumerate(zip(figure.legend, samples, strict=True)):
             boxes[f"sample-{i}"] = (x, y, *SAMPLE)
             entry.draw(sheet.axes(f"sample-{i}", x, y, *SAMPLE))
             sheet.text(x + SAMPLE[0] + 5, y + 11, entry.name)
         for i, (panel, (x, y)) in enumerate(zip(figure.panels, places, strict=True)):
             boxes[f"panel-{i}"] = (x, y, WIDTH, panel.height)
-            for k, words in enumerate(textwrap.wrap(panel.title, LETTERS)[:2]):
-                sheet.text(x, y - TITLE + 12 + 14 * k, words)
+            for k, words in enumerate(textwrap.wrap(panel.title, _LETTERS)[:2]):
+                sheet.text(x, y - _TITLE + 12 + 14 * k, words)
             left, right, above, below = panel.margins
             size = (WIDTH - left - right, panel.height - above - below)
             panel.draw(sheet.axes(f"panel-{i}", x + left, y + above, *size), tip)
-        made = io.StringIO()
-        FigureCanvasSVG(canvas)
-        canvas.savefig(made, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
-    svg = _with_tips(made.getvalue(), tips)
-    pieces = {name: _piece(body, boxes[name]) for name, body in PIECE.findall(svg)}
-    return Drawing(
+        file = io.StringIO()
+        canvas.savefig(file, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
+    svg = _with_tips(file.getvalue(), tips)
+    pieces = {name: _piece(body, boxes[name]) for name, body in _PIECE.findall(svg)}
+    return DrawnFigure(
         title=figure.title,
-        panels=tuple(Piece(p.title, pieces[f"panel-{i}"]) for i, p in enumerate(figure.panels)),
-        legend=tuple(Piece(e.name, pieces[f"sample-{i}"]) for i, e in enumerate(figure.legend)),
-        shapes=Markup("".join(map(_small, CLIPS.findall(svg)))),
+        panels=tuple(PagePiece(p.title, pieces[f"panel-{i}"]) for i, p in enumerate(figure.panels)),
+        legend=tuple(PagePiece(e.name, pieces[f"sample-{i}"]) for i, e in enumerate(figure.legend)),
+        shapes=Markup("".join(map(_small, _CLIPS.findall(svg)))),
         sheet=svg[svg.index("<svg ") :],
         canvas=canvas,
     )
@@ -180,30 +175,30 @@ class _Sheet(NamedTuple):
 
     def axes(self, name: str, x: float, y: float, width: float, height: float) -> Any:
         place = (x / self.width, 1 - (y + height) / self.height, width / self.width, height / self.height)
-        made = self.canvas.add_axes(place, gid=name)
-        made.patch.set_visible(False)
-        return made
+        axes = self.canvas.add_axes(place, gid=name)
+        axes.patch.set_visible(False)
+        return axes
 
 
 @contextmanager
 def _looks(salt: str) -> Iterator[None]:
     """Matplotlib's own settings but for ours; a letter that a font lacks is nothing to warn of."""
-    with default_looks(LOOKS | {"svg.hashsalt": salt}), warnings.catch_warnings():
+    with default_looks(_LOOKS | {"svg.hashsalt": salt}), warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
 
 
 def _legend_places(entries: Sequence[Entry], width: int) -> tuple[list[tuple[int, int]], int]:
     """Upper left corners of the samples, set in lines, and how many lines there are."""
-    x = GAP
+    x = _GAP
     line = 0
     places = []
     for entry in entries:
         need = 48 + 7 * len(entry.name)
-        if x + need > width and x > GAP:
-            x = GAP
-            line = line + 1
-        places.append((x, HEAD + LINE * line - 4))
+        if x + need > width and x > _GAP:
+            x = _GAP
+            line += 1
+        places.append((x, _HEAD + _LINE * line - 4))
         x += need
     return places, line + bool(places)
 
@@ -211,22 +206,21 @@ def _legend_places(entries: Sequence[Entry], width: int) -> tuple[list[tuple[int
 def _with_tips(svg: str, tips: Sequence[Sequence[str]]) -> str:
     """With a `<title>` in every mark of which something is said."""
     head, *rest = re.split(r'<g id="tips-(\d+)">', svg)
-    made = [head]
+    pieces = [head]
     for number, segment in zip(rest[::2], rest[1::2], strict=True):
-        made += ["<g>", _tipped(segment, tips[int(number)])]
-    return "".join(made)
+        pieces += ["<g>", _tipped(segment, tips[int(number)])]
+    return "".join(pieces)
 
 
 def _tipped(segment: str, tips: Sequence[str]) -> str:
     """One tip for each mark, in their order; marks that are left have none."""
     left = iter(tips)
-    return SHAPE.sub(lambda mark: _pointed(mark, next(left, None)), segment)
 
+    def tipped(mark: re.Match[str]) -> str:
+        tip = next(left, None)
+        return mark[0] if tip is None else f"<{mark[1]} {mark[2]}><title>{escape(tip, quote=False)}</title></{mark[1]}>"
 
-def _pointed(mark: re.Match[str], said: str | None) -> str:
-    if said is None:
-        return mark[0]
-    return f"<{mark[1]} {mark[2]}><title>{escape(said, quote=False)}</title></{mark[1]}>"
+    return _SHAPE.sub(tipped, segment)
 
 
 def _piece(body: str, box: Sequence[float]) -> Markup:

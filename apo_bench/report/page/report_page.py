@@ -10,7 +10,7 @@ from apo_bench.records.row import Row, look_up
 from apo_bench.records.run.replay_command import Files, replay_command
 from apo_bench.records.salt import one_salt
 from apo_bench.records.settings import RANGE
-from apo_bench.report.figures.sheet import Drawing
+from apo_bench.report.figures.sheet import DrawnFigure
 from apo_bench.report.page.cells import matrices, packed_json, trials
 from apo_bench.report.page.document import page
 from apo_bench.report.run.facts import limits_of, run_facts, scenario_files
@@ -52,7 +52,7 @@ def report_page(
     rows: Sequence[Row],
     summary: Summary,
     grouped: Mapping[Setting, Sequence[Cell]],
-    figures: Mapping[str, Drawing],
+    figures: Mapping[str, DrawnFigure],
     tables: Mapping[str, Table],
     run: Mapping[str, Any],
     work: Sequence[Work],

@@ -6,7 +6,7 @@ from typing import Any
 
 from apo_bench.assembly.graph import Arc, ArcResiduals, Graph, Node
 from apo_bench.io.figures import default_looks
-from apo_bench.show.graph.layout import GraphLayout, arrange
+from apo_bench.show.graph.layout import GraphLayout, layout_graph
 
 _INK = "#222222"
 _GONE = "#8A8A8A"
@@ -40,17 +40,15 @@ def draw_graph(
         residuals: Written on the arcs, in red if above `gap_m`.
         colors: Of parts, RGB in 0..1.
     """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     measured = [None] * len(graph.arcs) if residuals is None else list(residuals)
     texts = [_label(arc, residual, residuals is not None) for arc, residual in zip(graph.arcs, measured, strict=True)]
-    layout = arrange(graph, texts)
+    layout = layout_graph(graph, texts)
     words = _words(graph, residuals is not None, gap_m)
     width = max(layout.width, 0.078 * len(title), 0.06 * len(words)) + 2 * _MARGIN
     height = layout.height + 2 * _MARGIN + _HEAD + (_FOOT if words else 0.0)
     figure = Figure(figsize=(width, height), facecolor="white")
-    FigureCanvasAgg(figure)
     axes = _canvas(figure, layout, width, height, bool(words))
     figure.text(0.5, 1 - (_MARGIN + 0.1) / height, title, ha="center", va="center", fontsize=10, color=_INK)
     figure.text(0.5, (_MARGIN + 0.02) / height, words, ha="center", va="center", fontsize=7.5, color=_GONE)
@@ -133,10 +131,10 @@ def _formula(node: Node) -> str:
 
 def _words(graph: Graph, measured: bool, gap_m: float) -> str:
     """What dashes and colours mean, if there are any."""
-    said = ["dashed: disappeared"] if any(arc.lost is not None for arc in graph.arcs) else []
-    said += ["dash-dot: about an axis"] if any(arc.axial and arc.lost is None for arc in graph.arcs) else []
-    said += [f"red: above {gap_m * 1e3:g} mm"] if measured else []
-    return "; ".join(said)
+    words = ["dashed: disappeared"] if any(arc.lost is not None for arc in graph.arcs) else []
+    words += ["dash-dot: about an axis"] if any(arc.axial and arc.lost is None for arc in graph.arcs) else []
+    words += [f"red: above {gap_m * 1e3:g} mm"] if measured else []
+    return "; ".join(words)
 
 
 def _pale(color: tuple[float, float, float] | None) -> Any:

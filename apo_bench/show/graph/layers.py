@@ -83,6 +83,7 @@ def abscissas(layers: Layers, rounds: int = 60) -> dict[LayerItem, float]:
         x.update(zip(row, offset - offset[-1] / 2, strict=True))
     for _ in range(rounds):
         for row, offset in zip(layers.rows, offsets, strict=True):
+            # towards the mean of what each is linked with, in the rows above and below
             middle = float(np.mean([x[item] for item in row]))
             wanted = np.array([np.mean([x[other] for other in near[item]] or [middle]) for item in row])
             weight = np.array([1.0 if near[item] else _LOOSE for item in row])
@@ -126,11 +127,11 @@ def _ordered(rows: _Rows, links: Links) -> _Rows:
     best = rows
     least = _cost(rows, links)
     while True:
-        found = min(_neighbours(best), key=lambda each: _cost(each, links))
-        if _cost(found, links) >= least:
+        better = min(_neighbours(best), key=lambda each: _cost(each, links))
+        if _cost(better, links) >= least:
             return best
-        best = found
-        least = _cost(found, links)
+        best = better
+        least = _cost(better, links)
 
 
 def _neighbours(rows: _Rows) -> list[_Rows]:
@@ -165,4 +166,5 @@ def _apart(wanted: Array, offset: Array, weight: Array) -> Array:
     """The places nearest to those that are wanted which keep their order and distance (isotonic regression)."""
     from scipy.optimize import isotonic_regression
 
+    # x_i - offset_i may not fall from left to right: the nearest such numbers in weighted squares
     return np.asarray(isotonic_regression(wanted - offset, weights=weight).x + offset)

@@ -48,7 +48,7 @@ class GraphLayout:
     """The room of the label of each arrow."""
 
 
-def arrange(graph: Graph, texts: Sequence[str]) -> GraphLayout:
+def layout_graph(graph: Graph, texts: Sequence[str]) -> GraphLayout:
     """Lay out a graph whose arcs are labelled with these texts."""
     layers = arrange_layers(graph)
     unit = max((_room(node) for node in graph.nodes), default=1.0)
