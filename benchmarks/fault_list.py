@@ -51,13 +51,18 @@ FAULTS = (
     ),
     Fault("correction/solvers/newton.py", "ca * sg + sa * sb * cg", "ca * sg - sa * sb * cg", "a wrong sign in Eq. 4"),
     Fault(
-        "correction/posterior.py",
+        "correction/solvers/posterior.py",
         "chdtri(free.shape[1], ",
         "chdtri(known.rank, ",
         "directions that are fixed for those that are free",
     ),
     Fault("correction/consistency.py", "play_m / sqrt(3.0)", "play_m / sqrt(12.0)", "half the play instead of all"),
-    Fault("correction/holding.py", "self.operations[i] if j > k})", "self.operations[i] if j >= k})", "one too many"),
+    Fault(
+        "correction/relation_equations.py",
+        "self.operations[i] if j > k})",
+        "self.operations[i] if j >= k})",
+        "one too many",
+    ),
     Fault("correction/baselines/track.py", "in reversed(range(i, n))", "in range(i, n)", "undone in the wrong order"),
     Fault(
         "correction/baselines/penalty.py",

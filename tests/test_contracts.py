@@ -38,6 +38,13 @@ BREACHES = {
         ("apo_bench.cad.pieces.cutting", "apo_bench.cad.solid_moments"),
         ("apo_bench.cad.contact_faces", "apo_bench.cad.importing"),
     ],
+    "correction": [
+        ("apo_bench.correction.solvers.gauss_newton", "apo_bench.correction.contact"),
+        ("apo_bench.correction.solvers.posterior", "apo_bench.correction.consistency"),
+        ("apo_bench.correction.baselines.paper", "apo_bench.correction.problem"),
+        ("apo_bench.correction.starts", "apo_bench.correction.robust.views"),
+        ("apo_bench.correction.correctors", "apo_bench.correction.own_code.forms"),
+    ],
     "workshop": [
         ("apo_bench.trial.trial", "apo_bench.recording.importing"),
         ("apo_bench.show.card", "apo_bench.drafting.draft"),

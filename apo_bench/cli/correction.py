@@ -143,7 +143,7 @@ def _explained(observation: Observation, correction: Correction) -> Any:
     """What the contacts determine at corrected goals; None of corrections that leave contacts open, or of too many."""
     from apo_bench.correction.baselines.measured import gap_of
     from apo_bench.correction.explanation import explain
-    from apo_bench.correction.posterior import LARGEST_POSTERIOR
+    from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR
 
     if (
         not correction.ok

@@ -16,10 +16,12 @@ from apo_bench.assembly.correction_record import Consistency, Correction, Iterat
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.lowering import lowered_observation, lowered_together
 from apo_bench.correction.consistency import TEST_LEVEL
-from apo_bench.correction.ending import opposing, refused_correction, status_sentence
-from apo_bench.correction.problem import Problem, Solved, problem
+from apo_bench.correction.problem import Problem, problem_of
+from apo_bench.correction.solved import Solved, solve
 from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE
 from apo_bench.correction.starts import best_start, turned_words
+from apo_bench.correction.status import opposing, refused_correction, status_sentence
+from apo_bench.correction.suspects import contact_suspects, suspects
 from apo_bench.errors import InputError
 
 Doubt = Literal["apply", "warn", "refuse", "drop"]
@@ -80,52 +82,52 @@ class ContactCorrector:
 
     def leaving_out(self, observation: Observation, dropped: tuple[str, ...]) -> Correction:
         """Correct an observation by all contacts but those of some relations."""
-        asked = problem((lowered_observation(observation),), self.level, self.compiled)
-        solved = asked.solve(asked.without(dropped))[0]
-        (before_m,) = asked.seen_gap_m()
-        return opposing(asked.observation, self._report(asked, 0, solved, before_m, dropped))
+        problem = problem_of((lowered_observation(observation),), self.level, self.compiled)
+        solved = solve(problem, problem.without(dropped))[0]
+        (before_m,) = problem.seen_gap_m()
+        return opposing(problem.observation, self._report(problem, 0, solved, before_m, dropped))
 
     def _corrected(self, observations: Sequence[Observation]) -> list[Correction]:
         """Correct a batch, lowered, every operation seen: all at once, then by itself what is in doubt."""
-        asked = problem(observations, self.level, self.compiled)
+        problem = problem_of(observations, self.level, self.compiled)
         made = []
-        for i, (before_m, solved) in enumerate(zip(asked.seen_gap_m(), asked.solve(asked.every), strict=True)):
+        for i, (before_m, solved) in enumerate(zip(problem.seen_gap_m(), solve(problem, problem.every), strict=True)):
             sure = (solved.test.passes or self.doubt == "apply") and not solved.far and not solved.away
             if sure and _status(solved, observations[i].gap_m) == "converged":
-                made.append(self._report(asked, i, solved, before_m))
+                made.append(self._report(problem, i, solved, before_m))
             else:
-                made.append(self._in_doubt(asked.only(i), solved, before_m))
+                made.append(self._in_doubt(problem.only(i), solved, before_m))
         return made
 
-    def _in_doubt(self, asked: Problem, first: Solved, before_m: float) -> Correction:
+    def _in_doubt(self, problem: Problem, first: Solved, before_m: float) -> Correction:
         """Correct an observation whose first solution is none, or far, or fails the test: other starts, suspects."""
         if self.elsewhere:
-            asked, first = best_start(asked, first)
+            problem, first = best_start(problem, first)
         solved = first
         test = first.test
-        lost = not first.at_rest and first.worst_m <= asked.observation.gap_m
+        lost = not first.at_rest and first.worst_m <= problem.observation.gap_m
         if not test.passes and self.doubt != "apply" and first.finite and not lost:
-            test = replace(test, suspects=asked.suspects(asked.every))
-        kept = asked.every
+            test = replace(test, suspects=suspects(problem, problem.every))
+        kept = problem.every
         dropped = tuple[str, ...]()
         while self.doubt == "drop" and not solved.test.passes and solved.finite and len(dropped) < DROPS:
-            worst = asked.suspects(kept) if dropped else test.suspects
+            worst = suspects(problem, kept) if dropped else test.suspects
             if not worst:
                 break
-            dropped += (self._most_suspect(asked, kept, worst[0]),)
-            kept = asked.without(dropped)
-            solved = asked.solve(kept)[0]
-        report = self._report(asked, 0, solved, before_m, dropped, test, turned_words(asked, solved.goals))
-        return opposing(asked.observation, report)
+            dropped += (self._most_suspect(problem, kept, worst[0]),)
+            kept = problem.without(dropped)
+            solved = solve(problem, kept)[0]
+        report = self._report(problem, 0, solved, before_m, dropped, test, turned_words(problem, solved.goals))
+        return opposing(problem.observation, report)
 
-    def _most_suspect(self, asked: Problem, kept: NDArray[np.bool_], worst: Suspect) -> str:
+    def _most_suspect(self, problem: Problem, kept: NDArray[np.bool_], worst: Suspect) -> str:
         """One contact of the most suspect relation if that is enough, since the others are worth keeping; else all."""
-        single = asked.contact_suspects(kept, worst.relation)[0]
+        single = contact_suspects(problem, kept, worst.relation)[0]
         return single.relation if single.p_value >= self.level else worst.relation
 
     def _report(
         self,
-        asked: Problem,
+        problem: Problem,
         i: int,
         solved: Solved,
         before_m: float,
@@ -138,7 +140,7 @@ class ContactCorrector:
         Args:
             first: The test before anything was dropped; None if that is the one of what was solved.
         """
-        gap_m = asked.observations[i].gap_m
+        gap_m = problem.observations[i].gap_m
         rank = solved.rank
         test = first or solved.test
         status = _status(solved, gap_m)
@@ -150,7 +152,7 @@ class ContactCorrector:
             goals=solved.goals,
             status=status,
             sentence=status_sentence(status, gap_m, of) + turned + doubts,
-            freed=asked.laid.pattern.freed,
+            freed=problem.laid.pattern.freed,
             gap_before_m=before_m,
             gap_after_m=solved.worst_m,
             rank=rank,

@@ -14,8 +14,8 @@ from apo_bench.assembly.goals import Observation
 from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.baselines.measured import gap_of, goals_as_given
 from apo_bench.correction.contact import ContactCorrector
-from apo_bench.correction.ending import opposing
-from apo_bench.correction.own_code.returned import RIGID, check_correction, check_near
+from apo_bench.correction.returned import RIGID, check_correction, check_near
+from apo_bench.correction.status import opposing
 from apo_bench.errors import InputError, failed, kind
 from apo_bench.geometry.arrays import Array, NotReal, real
 from apo_bench.geometry.pose import is_rigid

@@ -22,11 +22,11 @@ from apo_bench.assembly.goals import Observation, Poses, placements
 from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.assembly.topology import ODL, Assembly, Operation
 from apo_bench.correction.directions import Direction, directions, held
-from apo_bench.correction.holding import Hold, by_relation, relation_holds
-from apo_bench.correction.posterior import LARGEST_POSTERIOR, Freedom, freedom
-from apo_bench.correction.problem import problem
+from apo_bench.correction.problem import problem_of
+from apo_bench.correction.relation_equations import RelationHold, by_relation, relation_holds
 from apo_bench.correction.shared_estimate import SharedEstimate, estimate_shared
 from apo_bench.correction.solvers.compact import linearised_by
+from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR, Freedom, freedom
 from apo_bench.correction.solvers.whitened import spread
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
@@ -61,9 +61,9 @@ class OperationExplanation:
     """Directions that are fixed, of six."""
     fixed: tuple[str, ...]
     free: tuple[FreeDirection, ...]
-    through: tuple[Hold, ...]
+    through: tuple[RelationHold, ...]
     """An irreducible set of relations that fix as much as all of them."""
-    agreeing: tuple[Hold, ...]
+    agreeing: tuple[RelationHold, ...]
     """The relations of this operation that are not needed for that."""
     covariance: Array
     """(6, 6), posterior, of the body twist at its goal, [m, rad]."""
@@ -100,7 +100,7 @@ class Explanation:
 
     assembly: Assembly
     goals: Array
-    """(n, 4, 4), at which it was asked."""
+    """(n, 4, 4), at which it was problem."""
     operations: tuple[OperationExplanation, ...]
     parts: tuple[PartExplanation, ...]
     """The parts that were moved, in the order in which they were placed."""
@@ -129,12 +129,12 @@ def explain(observation: Observation, goals: Array, dropped: Collection[str] = (
     assembly = observation.assembly
     if 6 * n > LARGEST_POSTERIOR:
         raise _too_many(n)
-    asked = problem((replace(observation, goals=goals, shared=()),))
-    system = asked.laid.system.only(0)
-    kept = asked.demands.exact & asked.without(tuple(dropped))
+    problem = problem_of((replace(observation, goals=goals, shared=()),))
+    system = problem.laid.system.only(0)
+    kept = problem.demands.exact & problem.without(tuple(dropped))
     xi = pose.log(pose.inverse(observation.goals) @ goals)
     Jr = right_jacobian(xi)
-    B = Jr @ asked.L[0]
+    B = Jr @ problem.L[0]
     _, Jt = linearised_by(system, goals, B)
     every = relation_holds(assembly)
     relations = by_relation(assembly, system, Jt, kept)

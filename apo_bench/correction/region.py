@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.lowering import lowered_observation
-from apo_bench.correction.posterior import freedom
 from apo_bench.correction.problem import seen_system
 from apo_bench.correction.solvers.compact import linearised_by
+from apo_bench.correction.solvers.posterior import freedom
 from apo_bench.correction.solvers.whitened import noise_factor, unspread
 from apo_bench.correction.tailed import drawn_radius
 from apo_bench.geometry import pose

@@ -9,8 +9,8 @@ import numpy as np
 
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.shared_error import SharedError, joint_covariance
-from apo_bench.correction.posterior import freedom
 from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
+from apo_bench.correction.solvers.posterior import freedom
 from apo_bench.correction.solvers.whitened import noise_factor, spread
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose

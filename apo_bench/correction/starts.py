@@ -14,12 +14,13 @@ import numpy as np
 
 from apo_bench.assembly.equations import largest, pattern
 from apo_bench.assembly.opposing import looking_away
-from apo_bench.correction.posterior import LARGEST_POSTERIOR
-from apo_bench.correction.problem import FAR_DEG, Problem, Solved, problem
-from apo_bench.correction.robust.inferred import inferred_goals
+from apo_bench.correction.inferred import inferred_goals
+from apo_bench.correction.problem import Problem, problem_of
+from apo_bench.correction.solved import FAR_DEG, Solved, solve
 from apo_bench.correction.solvers.curved import descended
 from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE, nearest_goals
 from apo_bench.correction.solvers.laid import laid_contacts
+from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR
 from apo_bench.correction.solvers.whitened import correction_to, scales
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.symmetry import symmetries
@@ -30,7 +31,7 @@ _MOST = 8
 """Operations of which starts are made."""
 
 
-def best_start(asked: Problem, first: Solved) -> tuple[Problem, Solved]:
+def best_start(problem: Problem, first: Solved) -> tuple[Problem, Solved]:
     """A problem that begins where the nearest solution is found, and that; both as given if no other start is better.
 
     Where faces look at each other nearby and contacts do not hold, they contradict each other wherever one begins.
@@ -38,60 +39,60 @@ def best_start(asked: Problem, first: Solved) -> tuple[Problem, Solved]:
     Args:
         first: What comes of beginning with what was seen.
     """
-    observed = asked.goals[0]
-    usable = _holds(asked, first)
-    if not first.far and (usable or _faces_oppose(asked, observed, first.goals)):
-        return asked, first
+    observed = problem.goals[0]
+    usable = _holds(problem, first)
+    if not first.far and (usable or _faces_oppose(problem, observed, first.goals)):
+        return problem, first
     if 6 * len(observed) > LARGEST_POSTERIOR:
-        return asked, first
-    usable = usable and _is_flush(asked, first)
+        return problem, first
+    usable = usable and _is_flush(problem, first)
     length = float(first.z @ first.z) * _SHORTER if usable else np.inf
-    for goals in _solutions(asked, _starts(asked, first)):
-        begun = _begun_at(asked, goals)
+    for goals in _solutions(problem, _starts(problem, first)):
+        begun = _begun_at(problem, goals)
         if begun.begin is None or np.square(begun.begin).sum() >= length:
             break
-        solved = begun.solve(begun.every)[0]
+        solved = solve(begun, begun.every)[0]
         if solved.z @ solved.z < length and _holds(begun, solved) and _is_flush(begun, solved):
             return begun, solved
-    return asked, first
+    return problem, first
 
 
-def turned_words(asked: Problem, goals: Array) -> str:
+def turned_words(problem: Problem, goals: Array) -> str:
     """Which operations the corrected goals say to have been seen turned, if another start was needed to find them."""
-    if asked.begin is None:
+    if problem.begin is None:
         return ""
-    R = np.swapaxes(asked.observation.goals[:, :3, :3], 1, 2) @ goals[:, :3, :3]
+    R = np.swapaxes(problem.observation.goals[:, :3, :3], 1, 2) @ goals[:, :3, :3]
     angles = np.degrees(np.arccos(np.clip((np.trace(R, axis1=1, axis2=2) - 1.0) / 2.0, -1.0, 1.0)))
     far = [f"operation {k + 1} by {angle:.0f} degrees" for k, angle in enumerate(angles) if angle > FAR_DEG]
     return f"; seen turned: {', '.join(far)}" if far else ""
 
 
-def _holds(asked: Problem, solved: Solved) -> bool:
+def _holds(problem: Problem, solved: Solved) -> bool:
     """Whether every contact holds with faces that look at each other."""
-    holds = solved.at_rest and solved.finite and solved.worst_m <= asked.observation.gap_m
-    return bool(holds and _faces_oppose(asked, solved.goals))
+    holds = solved.at_rest and solved.finite and solved.worst_m <= problem.observation.gap_m
+    return bool(holds and _faces_oppose(problem, solved.goals))
 
 
-def _faces_oppose(asked: Problem, *goals: Array) -> bool:
+def _faces_oppose(problem: Problem, *goals: Array) -> bool:
     """Whether the faces of every contact look at each other, at each of some goals."""
-    return not looking_away(asked.observation.assembly, asked.observation.start, np.array(goals)).any()
+    return not looking_away(problem.observation.assembly, problem.observation.start, np.array(goals)).any()
 
 
-def _is_flush(asked: Problem, solved: Solved) -> bool:
+def _is_flush(problem: Problem, solved: Solved) -> bool:
     """Whether contacts also hold with vertices laid where the goals are: seen edge-on, they lie on one line."""
     goals = solved.goals
-    return largest(_begun_at(asked, goals).measured(goals[None])[0]) <= asked.observation.gap_m
+    return largest(_begun_at(problem, goals).gaps(goals[None])) <= problem.observation.gap_m
 
 
-def _begun_at(asked: Problem, goals: Array) -> Problem:
+def _begun_at(problem: Problem, goals: Array) -> Problem:
     """The same, begun with goals, (n, 4, 4), and vertices laid there."""
-    return problem(asked.observations, asked.level, asked.kernels is not None, goals[None])
+    return problem_of(problem.observations, problem.level, problem.kernels is not None, goals[None])
 
 
-def _starts(asked: Problem, first: Solved) -> Array:
+def _starts(problem: Problem, first: Solved) -> Array:
     """Goals to begin with, (b, n, 4, 4)."""
-    observation = asked.observation
-    doubted = _doubted(asked, first)
+    observation = problem.observation
+    doubted = _doubted(problem, first)
     n = len(observation.goals)
     solids = observation.assembly.solids
     found = [inferred_goals(observation, some).goals for some in (*((k,) for k in doubted), tuple(range(n)))]
@@ -105,10 +106,10 @@ def _starts(asked: Problem, first: Solved) -> Array:
     return np.array([*found, *(goals for goals, count in zip(turned, away, strict=True) if count < away[0])])
 
 
-def _doubted(asked: Problem, first: Solved) -> Collection[int]:
+def _doubted(problem: Problem, first: Solved) -> Collection[int]:
     """The operations of which one may be seen far off: all, or those with a part in most contacts that do not hold."""
-    observation = asked.observation
-    n = len(asked.observation.goals)
+    observation = problem.observation
+    n = len(problem.observation.goals)
     if n <= _MOST:
         return range(n)
     bad = looking_away(observation.assembly, observation.start, first.goals)
@@ -119,18 +120,18 @@ def _doubted(asked: Problem, first: Solved) -> Collection[int]:
     return sorted(np.lexsort((turned, -counts))[:_MOST].tolist())
 
 
-def _solutions(asked: Problem, starts: Array) -> Iterator[Array]:
+def _solutions(problem: Problem, starts: Array) -> Iterator[Array]:
     """Goals, (n, 4, 4), that satisfy the equations, faces opposing, found from the starts; the nearest first."""
-    observation = asked.observation
+    observation = problem.observation
     (b, n, *_) = starts.shape
     L = scales(observation.covariance)
     start = np.array([observation.start[part] for part in observation.assembly.solids]).reshape(-1, 4, 4)
-    laid = laid_contacts(observation.assembly, start, asked.demands.plane, starts)
-    system = laid.system.among(asked.demands.exact)
+    laid = laid_contacts(observation.assembly, start, problem.demands.plane, starts)
+    system = laid.system.among(problem.demands.exact)
     z = correction_to(observation.goals, L, starts)
     if 6 * n <= LARGEST_DENSE:
         seen = np.broadcast_to(observation.goals, starts.shape)
-        found = [nearest_goals(system, seen, np.broadcast_to(L, (b, *L.shape)), None, z, asked.kernels)]
+        found = [nearest_goals(system, seen, np.broadcast_to(L, (b, *L.shape)), None, z, problem.kernels)]
     else:
         each = (system.only(i) for i in range(b))
         found = [nearest_goals(part, observation.goals, L, None, at) for part, at in zip(each, z, strict=True)]
@@ -139,7 +140,7 @@ def _solutions(asked: Problem, starts: Array) -> Iterator[Array]:
     e = np.concatenate([np.atleast_2d(each.e) for each in found])
     holds = np.isfinite(goals).all(axis=(1, 2, 3)) & (np.abs(e).max(axis=1, initial=0.0) <= observation.gap_m)
     holds &= ~looking_away(observation.assembly, observation.start, goals).any(axis=1)
-    z = correction_to(observation.goals, asked.L[0], goals[holds])
+    z = correction_to(observation.goals, problem.L[0], goals[holds])
     for i in np.flatnonzero(holds)[np.argsort(np.square(z).sum(axis=1))]:
         if rest[i] or 6 * n > LARGEST_DENSE:
             yield goals[i]

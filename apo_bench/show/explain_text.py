@@ -8,7 +8,7 @@ import numpy as np
 from apo_bench.assembly.topology import spelled
 from apo_bench.correction.directions import SHIFT_NAMES, TURN_NAMES, Direction
 from apo_bench.correction.explanation import Explanation, FreeDirection, OperationExplanation, PartExplanation
-from apo_bench.correction.holding import Hold
+from apo_bench.correction.relation_equations import RelationHold
 from apo_bench.correction.shared_estimate import SharedEstimate
 from apo_bench.files.json_forms import covariance_form, pose_form
 from apo_bench.geometry.arrays import Array
@@ -164,7 +164,7 @@ def _free(free: FreeDirection) -> str:
     return f"{free.direction}{_about(free)} {size(free)}{goes}"
 
 
-def _hold(hold: Hold) -> str:
+def _hold(hold: RelationHold) -> str:
     lost = "" if hold.lost is None else f", lost at {hold.lost + 1}"
     return f"{hold.relation} {hold.parts[0]} on {hold.parts[1]}, {spelled(hold.word)}{lost}"
 
@@ -222,7 +222,7 @@ def _free_forms(free: Sequence[FreeDirection], T: Array) -> Iterator[dict[str, A
         }
 
 
-def _hold_form(hold: Hold) -> dict[str, Any]:
+def _hold_form(hold: RelationHold) -> dict[str, Any]:
     return {
         "relation": hold.relation,
         "parts": list(hold.parts),

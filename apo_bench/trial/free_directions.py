@@ -18,11 +18,11 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly.equations import Equations, equations
 from apo_bench.assembly.goals import Observation
-from apo_bench.correction.posterior import freedom
 from apo_bench.correction.robust.hypotheses import UNKNOWN
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
 from apo_bench.correction.solvers.gauss_newton import nearest_goals
 from apo_bench.correction.solvers.inequalities import Inequalities, demanded, violations
+from apo_bench.correction.solvers.posterior import freedom
 from apo_bench.correction.solvers.whitened import noise_factor, spread
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array

@@ -29,8 +29,8 @@ def contact(task: Task) -> Run:
 
 
 def _whole(task: Task, nearest: Callable[..., Any]) -> Run:
-    from apo_bench.correction.posterior import jacobian_rank
     from apo_bench.correction.solvers.compact import compact_equations
+    from apo_bench.correction.solvers.posterior import jacobian_rank
 
     def run() -> Array:
         found = nearest(compact_equations(task.system, len(task.seen)), task.seen, factors(task.covariance))

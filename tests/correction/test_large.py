@@ -12,10 +12,9 @@ from scipy.sparse import csr_array
 
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Assembly, Operation
-from apo_bench.correction import posterior
 from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.correctors import correct
-from apo_bench.correction.solvers import sparse
+from apo_bench.correction.solvers import posterior, sparse
 from apo_bench.correction.solvers.compact import CompactEquations
 from apo_bench.correction.solvers.gauss_newton import NearestGoals, batch_goals, nearest_goals
 from apo_bench.geometry.arrays import Array

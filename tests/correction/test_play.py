@@ -12,7 +12,7 @@ from apo_bench.correction.contact import contact_refuse
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.many import correct_many
 from apo_bench.correction.play import fit_covariance, plays
-from apo_bench.correction.problem import problem
+from apo_bench.correction.problem import problem_of
 from apo_bench.correction.solvers.gauss_newton import nearest_goals
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.observing import observe
@@ -83,7 +83,7 @@ def test_the_length_that_play_leaves_is_that_of_soft_contacts():
     """Linear where play is: a quarter of a millimetre bends contacts of centimetres by some permille."""
     for name in ("stick_in_tower", "pocket_table"):
         seen = replace(look(name, 0), play_m=PLAY_M)
-        asked = problem((seen,))
+        asked = problem_of((seen,))
         system = asked.laid.system.only(0)
         slack_m = fit_deviation(seen.assembly, seen.play_m)
         exact = nearest_goals(system, seen.goals, asked.L[0])

@@ -16,9 +16,9 @@ from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Gap, Operation
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.many import correct_many
-from apo_bench.correction.posterior import freedom, jacobian_rank, marginals
 from apo_bench.correction.region import contains_truth
 from apo_bench.correction.solvers.gauss_newton import nearest_goals
+from apo_bench.correction.solvers.posterior import freedom, jacobian_rank, marginals
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from tests import scenes

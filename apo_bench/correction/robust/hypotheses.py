@@ -21,8 +21,8 @@ from apo_bench.assembly.opposing import looking_away
 from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.correction.consistency import SOFT_M, fit_deviation
 from apo_bench.correction.contact import ContactCorrector, contact_apply
+from apo_bench.correction.inferred import inferred_goals
 from apo_bench.correction.problem import seen_system
-from apo_bench.correction.robust.inferred import inferred_goals
 from apo_bench.correction.robust.views import GROSS, INLIER, ROOM, State, Views, merged
 from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.whitened import noise_factor

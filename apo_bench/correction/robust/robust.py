@@ -18,12 +18,12 @@ from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.correction.consistency import TEST_LEVEL
 from apo_bench.correction.contact import contact_apply
-from apo_bench.correction.ending import refused_correction
+from apo_bench.correction.inferred import inferred_goals
 from apo_bench.correction.robust.hypotheses import Case, Hypothesis, as_stated
-from apo_bench.correction.robust.inferred import inferred_goals
 from apo_bench.correction.robust.room import least_crowded
 from apo_bench.correction.robust.search import Search
 from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, Views, looked_again, views_of
+from apo_bench.correction.status import refused_correction
 from apo_bench.geometry.arrays import Array
 
 _SURE = 0.01

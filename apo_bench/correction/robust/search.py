@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly.equations import pattern
 from apo_bench.correction.consistency import p_value
-from apo_bench.correction.posterior import jacobian_rank
 from apo_bench.correction.problem import seen_system
 from apo_bench.correction.robust.hypotheses import (
     Case,
@@ -30,6 +29,7 @@ from apo_bench.correction.robust.hypotheses import (
 )
 from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, State, beliefs
 from apo_bench.correction.solvers.compact import linearised_by
+from apo_bench.correction.solvers.posterior import jacobian_rank
 from apo_bench.correction.solvers.whitened import noise_factor
 
 MOST_EXACT = 12

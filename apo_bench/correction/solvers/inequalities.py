@@ -17,10 +17,10 @@ from numpy.typing import NDArray
 from apo_bench.assembly.equations import Equations
 from apo_bench.assembly.lowering import lowered
 from apo_bench.assembly.topology import Assembly
-from apo_bench.correction.posterior import LARGEST_POSTERIOR, jacobian_rank
 from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
 from apo_bench.correction.solvers.gauss_newton import FALL, NearestGoals, damping, settles, shortened_step
 from apo_bench.correction.solvers.linear_step import shortest
+from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR, jacobian_rank
 from apo_bench.correction.solvers.whitened import pulled, spread
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array

@@ -14,16 +14,16 @@ from apo_bench.assembly.opposing import looking_away
 from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.correction.consistency import p_value
 from apo_bench.correction.correctors import correct
-from apo_bench.correction.posterior import jacobian_rank
+from apo_bench.correction.inferred import inferred_goals
 from apo_bench.correction.problem import seen_system
 from apo_bench.correction.region import contains_truth
 from apo_bench.correction.robust.hypotheses import Case, hypothesis, soft_deviation
-from apo_bench.correction.robust.inferred import inferred_goals
 from apo_bench.correction.robust.robust import RobustCorrector, contact_robust
 from apo_bench.correction.robust.room import crowding
 from apo_bench.correction.robust.search import Rest
 from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, views_of
 from apo_bench.correction.solvers.compact import linearised_by
+from apo_bench.correction.solvers.posterior import jacobian_rank
 from apo_bench.correction.solvers.whitened import noise_factor
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose

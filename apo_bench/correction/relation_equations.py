@@ -15,14 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.topology import ODL, Assembly, inverted, simplified
-from apo_bench.correction.posterior import RANK_CUT_OFF
 from apo_bench.correction.solvers.compact import CompactEquations
+from apo_bench.correction.solvers.posterior import RANK_CUT_OFF
 from apo_bench.geometry.arrays import Array
 
 
 @final
 @dataclass(frozen=True)
-class Hold:
+class RelationHold:
     """A relation that holds a part, and by which operations."""
 
     relation: str
@@ -37,7 +37,7 @@ class Hold:
     """The product D_a^-1 D_b in its equations (Eq. 26); constant poses are left out."""
 
 
-def relation_holds(assembly: Assembly) -> tuple[Hold, ...]:
+def relation_holds(assembly: Assembly) -> tuple[RelationHold, ...]:
     """Every relation of an assembly."""
     relations = assembly.relations()
     history = assembly.odls()
@@ -46,7 +46,7 @@ def relation_holds(assembly: Assembly) -> tuple[Hold, ...]:
         contact, made, lost = relations[arc[0]]
         a, b = assembly.given(contact)
         word = simplified((*inverted(history[made].get(a.part, ())), *history[made].get(b.part, ())))
-        found.append(Hold(f"R{i}", (a.part, b.part), made, lost, word))
+        found.append(RelationHold(f"R{i}", (a.part, b.part), made, lost, word))
     return tuple(found)
 
 
