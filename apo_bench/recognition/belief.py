@@ -48,6 +48,7 @@ class Belief:
         poses = dict(self.start)
         reach = {part: np.zeros((6, 6 * n)) for part in poses}
         for i, (operation, T) in enumerate(zip(self.assembly.operations[: k + 1], self.goals, strict=False)):
+            # A body twist xi of goal T is the world twist Ad(T) xi; what is carried moves on as the main part does.
             own = np.zeros((6, 6 * n))
             own[:, 6 * i : 6 * i + 6] = pose.adjoint(T)
             by = T @ pose.inverse(poses[operation.main])
@@ -58,12 +59,13 @@ class Belief:
             reach[operation.main] = own
         return PartBeliefs(poses, reach)
 
-    def given(self, e: Array, J: Array, noise: Array) -> Belief:
+    def conditioned(self, e: Array, J: Array, noise: Array) -> Belief:
         """The belief after learning that some quantities, now e (r,) with derivative J (r, 6 n), are zero up to noise.
 
         Args:
             noise: (r, r), covariance of what the quantities really are.
         """
+        # Kalman's update: K = P J^t (J P J^t + S)^-1, xi = -K e, P - K J P; symmetric again after rounding.
         PJ = self.covariance @ J.T
         K = np.linalg.solve(J @ PJ + noise, PJ.T).T
         covariance = self.covariance - K @ PJ.T

@@ -9,60 +9,21 @@ joint compatibility test", 2001).
 """
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass, replace
-from typing import NamedTuple, final
+from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.facing import Facing, face_gap, facing
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.topology import Assembly, Contact, PartFace
-from apo_bench.errors import InputError, kind
+from apo_bench.assembly.facing import Facing, facing
+from apo_bench.assembly.goals import Observation, placements
+from apo_bench.assembly.topology import Contact, PartFace
 from apo_bench.geometry.arrays import Array
 from apo_bench.recognition.belief import Belief, PartBeliefs, initial_belief
+from apo_bench.recognition.evidence import Evidence, Recognised, evidence_of, with_contacts, without_contacts
 from apo_bench.recognition.thresholds import RULES_BY_NOISE, PairThresholds, Rules, pair_thresholds, reality, slack
 
 _BEGINNINGS = 12
 """Candidates that are tried as the first of an operation, at most."""
-
-
-@final
-@dataclass(frozen=True)
-class Evidence:
-    """Why a contact is believed: what was measured when it was taken, and what was allowed."""
-
-    contact: Contact
-    made: int
-    """The operation that made it, counted from 0."""
-    gap_m: float
-    """Above 0 apart, below 0 inside each other, where the contacts taken before put the parts."""
-    angle_rad: float
-    share: float
-    """Overlap over the smaller face."""
-    most: PairThresholds
-    """The thresholds."""
-    seen_gap_m: float
-    """The gap at the goals as they were seen."""
-
-
-class Rival(NamedTuple):
-    """The next best set of contacts, where several were compared."""
-
-    assembly: Assembly
-    probability: float
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Recognised:
-    """The assembly with the contacts that were recognised, all of them asked to coincide."""
-
-    assembly: Assembly
-    evidence: tuple[Evidence, ...]
-    """One for each contact, in the order of `assembly.relations()`."""
-    probability: float | None = None
-    """Of the set among those that were compared to the end; None where sets are not compared."""
-    rival: Rival | None = None
 
 
 def recognise(
@@ -83,36 +44,18 @@ def recognise(
     """
     observation = without_contacts(observation, rules, "recognise")
     assembly = observation.assembly
-    bare = observation.assembly.operations
     belief = initial_belief(observation)
     evidence = list[Evidence]()
-    as_seen = belief if first_seen is None else replace(belief, goals=first_seen)
-    known = set(assembly.fixed)
-    for k, operation in enumerate(bare):
-        around = _Around(observation, rules, k, tuple(p for p in assembly.solids if p in known - set(operation.moves)))
+    as_seen = placements(assembly, observation.start, belief.goals if first_seen is None else first_seen)
+    standing = set(assembly.fixed)
+    for k, (operation, poses) in enumerate(zip(assembly.operations, as_seen, strict=True)):
+        others = tuple(p for p in assembly.solids if p in standing - set(operation.moves))
+        around = _Around(observation, rules, k, others)
         found = around.fixed(belief) if rules.fixed else around.likeliest(belief)
         belief = found.belief
-        evidence += around.evidence(found, as_seen.standing(k))
-        known |= set(operation.moves)
-    made = [tuple(e.contact for e in evidence if e.made == k) for k in range(len(bare))]
-    operations = tuple(replace(operation, contacts=made[k]) for k, operation in enumerate(bare))
-    return Recognised(replace(assembly, operations=operations), tuple(evidence))
-
-
-def without_contacts(observation: Observation, rules: Rules, verb: str) -> Observation:
-    """What was seen, with no contact of any operation.
-
-    Raises:
-        InputError: Something else was given to the verb.
-    """
-    for given, wanted in ((observation, Observation), (rules, Rules)):
-        if not isinstance(given, wanted):
-            raise InputError(
-                f"{kind(given)} was given to {verb}; an Observation is allowed (read_observation reads one from a "
-                "file), and as rules RULES_BY_NOISE, FIXED_RULES or Rules(...) of apo_bench.recognition.thresholds."
-            )
-    bare = tuple(replace(operation, contacts=()) for operation in observation.assembly.operations)
-    return replace(observation, assembly=replace(observation.assembly, operations=bare, gaps={}))
+        evidence += evidence_of(assembly, k, [(c.contact, c.pair, c.most) for c in found.taken], poses)
+        standing |= set(operation.moves)
+    return Recognised(with_contacts(assembly, evidence), tuple(evidence))
 
 
 class _Candidate(NamedTuple):
@@ -154,7 +97,15 @@ class _Around:
     def candidates(self, belief: Belief, taken: Collection[Contact] = ()) -> tuple[_Candidate, ...]:
         """The pairs within the thresholds that were not taken yet, the likeliest first."""
         now = belief.standing(self.k)
-        found = [c for a, b, pair in self._pairs(now, taken) for c in self._judged(a, b, pair, now, belief)]
+        solids = self.seen.assembly.solids
+        rules = self.rules
+        bounds = {"gap_m": rules.gap_m, "angle_rad": rules.angle_rad, "share": rules.share}
+        found = list[_Candidate]()
+        for a in self.seen.assembly.operations[self.k].moves:
+            for b in self.others:
+                known = {(m.face, e.face) for m, e in taken if (m.part, e.part) == (a, b)}
+                for pair in facing(solids[a], now.poses[a], solids[b], now.poses[b], **bounds, known=known):
+                    found += self._judged(a, b, pair, now, belief)
         return tuple(sorted(found, key=lambda c: (c.distance * (3 / len(c.pair.residual)), c.contact)))
 
     def fixed(self, belief: Belief) -> _Found:
@@ -170,19 +121,6 @@ class _Around:
                 best = other
         return best
 
-    def evidence(self, found: _Found, as_seen: PartBeliefs) -> Iterator[Evidence]:
-        """What speaks for the contacts, in the order of parts and faces."""
-        for c in sorted(found.taken, key=lambda c: self._place(c.contact)):
-            yield Evidence(
-                contact=c.contact,
-                made=self.k,
-                gap_m=c.pair.gap_m,
-                angle_rad=c.pair.angle_rad,
-                share=c.pair.share,
-                most=c.most,
-                seen_gap_m=self._gap(c.contact, as_seen),
-            )
-
     def _followed(self, belief: Belief, first: Contact | None) -> _Found:
         """Take the likeliest candidate (or a given one), put the goals where it closes, and look again."""
         at_first = at_hand = self.candidates(belief)
@@ -192,26 +130,16 @@ class _Around:
             chosen = next((c for c in at_hand if c.contact == first), at_hand[0])
             if chosen.distance > self.rules.most_of(len(chosen.pair.residual)):
                 break
-            belief = belief.given(chosen.pair.residual, chosen.slope, chosen.noise)
+            belief = belief.conditioned(chosen.pair.residual, chosen.slope, chosen.noise)
             taken.append(chosen)
             total += chosen.distance - chosen.gain
             at_hand = self.candidates(belief, [c.contact for c in taken])
         have = {c.contact for c in taken}
         return _Found(tuple(taken), belief, total, tuple(c.contact for c in at_first if c.contact not in have))
 
-    def _pairs(self, now: PartBeliefs, taken: Collection[Contact]) -> Iterator[tuple[str, str, Facing]]:
-        """Faces of moved parts and of those that stand there, within the bounds, with the names of the parts."""
-        solids = self.seen.assembly.solids
-        rules = self.rules
-        bounds = {"gap_m": rules.gap_m, "angle_rad": rules.angle_rad, "share": rules.share}
-        for a in self.seen.assembly.operations[self.k].moves:
-            for b in self.others:
-                known = {(m.face, e.face) for m, e in taken if (m.part, e.part) == (a, b)}
-                for pair in facing(solids[a], now.poses[a], solids[b], now.poses[b], **bounds, known=known):
-                    yield a, b, pair
-
     def _judged(self, a: str, b: str, pair: Facing, now: PartBeliefs, belief: Belief) -> Iterator[_Candidate]:
         """The pair as a candidate, if it is one."""
+        # Body twists of all goals -> world twist of part a beside part b -> gap and tilts of the pair.
         slope = pair.slope @ (now.reach[a] - now.reach[b])
         if slope.reshape(len(slope), -1, 6)[:, ~self.seen.seen].any():
             return
@@ -221,26 +149,10 @@ class _Around:
         noise = reality(pair, play_m)
         most = pair_thresholds(self.rules, C, slack(pair, play_m), pair.lengths)
         if abs(pair.gap_m) <= most.gap_m and pair.angle_rad <= most.angle_rad:
+            # Squared Mahalanobis length: C is of the goals, noise of play and softness of a contact that is there.
             e = pair.residual
             distance = float(e @ np.linalg.solve(C + noise, e))
             yield _Candidate(contact, pair, slope, noise, most, distance, _gain(C, noise, self.rules, pair.lengths))
-
-    def _place(self, contact: Contact) -> tuple[int, ...]:
-        """Where a contact stands in the order of parts and faces."""
-        solids = self.seen.assembly.solids
-        order = (self.seen.assembly.operations[self.k].moves, self.others)
-        return tuple(
-            i
-            for parts, of in zip(order, contact, strict=True)
-            for i in (parts.index(of.part), [*solids[of.part].faces, *solids[of.part].rounds].index(of.face))
-        )
-
-    def _gap(self, contact: Contact, now: PartBeliefs) -> float:
-        """The gap of a contact at given poses: at the middle of the environment face where nothing overlaps."""
-        a, b = contact
-        face_a = self.seen.assembly.face_of(a)
-        face_b = self.seen.assembly.face_of(b)
-        return face_gap(face_a, now.poses[a.part], face_b, now.poses[b.part])
 
 
 def _gain(C: Array, noise: Array, rules: Rules, lengths: int) -> float:
@@ -249,6 +161,8 @@ def _gain(C: Array, noise: Array, rules: Rules, lengths: int) -> float:
     Along every axis in which the goals leave it uncertain, (range)^2 / (2 pi variance), the range being that within
     the bounds. What earlier contacts imply anyway gains nothing: it is no coincidence.
     """
+    # Scaled by the range, eigenvectors of C are axes that are independent; an axis along which goals are no less sure
+    # than contacts are exact was decided before.
     span = np.array([2 * rules.gap_m] * lengths + [2 * rules.angle_rad] * (len(C) - lengths))
     variance, V = np.linalg.eigh(C / np.outer(span, span))
     real = np.einsum("ij,ik,kj->j", V, noise / np.outer(span, span), V)

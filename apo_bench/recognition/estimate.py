@@ -23,12 +23,11 @@ from apo_bench.assembly.lowering import lowered
 from apo_bench.assembly.shared_error import joint_covariance
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.twist import right_jacobian
+from apo_bench.recognition.thresholds import CONTACT_SOFT_M
 
-SOFT_M = 0.1e-3
-"""Standard deviation of a contact that is there, [m]: parts sink in a little."""
-_ROOM = np.repeat([40e-3, radians(23.0)], 3)
+_ROOM = frozen(np.repeat([40e-3, radians(23.0)], 3), 6)
 """(6,): standard deviation of where a part may lie by chance, near others that it does not touch, [m, rad]."""
 _CARRIED = 3.0
 """So many plays, each in its own direction, a contact of parts is off by that were carried inside another one."""
@@ -39,7 +38,7 @@ _SMALL = 1e-5
 
 @final
 @dataclass(frozen=True, eq=False)
-class Estimate:
+class GoalEstimate:
     """The likeliest goals of the first operations if some contacts hold."""
 
     assembly: Assembly
@@ -54,7 +53,7 @@ class Estimate:
     """-2 log of the Bayes factor of the contacts against none."""
 
 
-def estimate(seen: Observation, assembly: Assembly, begin: Array) -> Estimate:
+def estimate(seen: Observation, assembly: Assembly, begin: Array) -> GoalEstimate:
     """Solve for goals and contacts together.
 
     Args:
@@ -71,22 +70,25 @@ def estimate(seen: Observation, assembly: Assembly, begin: Array) -> Estimate:
     S = _softness(assembly, seen.play_m)
     xi = pose.log(back @ goals)
     for _ in range(_TURNS):
+        # Goals are seen.goals exp(xi); equations are linear in body twists at the goals, which are Jr d(xi).
         e, J = system.linearised(goals)
         Jr = right_jacobian(xi)
         J = (J.reshape(-1, n, 1, 6) @ Jr).reshape(-1, 6 * n)
         CJ = C @ J.T
         r = J @ xi.ravel() - e
         A = J @ CJ + S
+        # The likeliest xi of covariance C for which J xi - r is of covariance S: C J^t (J C J^t + S)^-1 r.
         new = (CJ @ np.linalg.solve(A, r)).reshape(n, 6)
         step = np.abs(new - xi).max(initial=0.0)
         xi = new
         goals = seen.goals[:n] @ pose.exp(xi)
         if step < _SMALL:
             break
+    # |A| and |B| are what contacts leave with the noise and in the room: see the head of this file.
     B = J @ room @ J.T + S
     gain = np.linalg.slogdet(B)[1] - np.linalg.slogdet(A)[1]
     badness = float(r @ np.linalg.solve(A, r) - gain)
-    return Estimate(assembly, goals, _left(C, J, A, Jr), _left(room, J, B, Jr), badness)
+    return GoalEstimate(assembly, goals, _left(C, J, A, Jr), _left(room, J, B, Jr), badness)
 
 
 def _left(C: Array, J: Array, A: Array, Jr: Array) -> Array:
@@ -105,6 +107,6 @@ def _softness(assembly: Assembly, play_m: float) -> Array:
     for operation in flat.operations:
         for contact in operation.contacts:
             carried = (_CARRIED - 1.0) * bool(operation.carries) * play_m**2
-            each.append(SOFT_M**2 + (flat.play(contact, play_m) ** 2 + carried) / 3.0)
+            each.append(CONTACT_SOFT_M**2 + (flat.play(contact, play_m) ** 2 + carried) / 3.0)
     count = np.diff(pattern(assembly).begin)
     return np.diag(np.repeat(np.array(each).reshape(-1) * count, count))

@@ -17,13 +17,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.facing import face_gap
 from apo_bench.assembly.goals import Observation, placements
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.geometry.arrays import Array
-from apo_bench.recognition.contacts import Evidence, Recognised, Rival, without_contacts
 from apo_bench.recognition.estimate import estimate
-from apo_bench.recognition.physics import IMPOSSIBLE, inside, refusal, surprise
+from apo_bench.recognition.evidence import Recognised, Rival, evidence_of, with_contacts, without_contacts
+from apo_bench.recognition.physics import IMPOSSIBLE, inside, physical_surprise, refusal
 from apo_bench.recognition.situation import Candidate, Situation
 from apo_bench.recognition.thresholds import Rules
 
@@ -57,12 +56,12 @@ def recognise_jointly(observation: Observation, rules: Rules = GENEROUS_RULES) -
         others = tuple(p for p in seen.assembly.solids if p in known - set(operation.moves))
         ended: dict[tuple[frozenset[Contact], ...], _History] = {}
         for history in kept:
-            for one in _Search(seen, rules, k, others, history).endings():
-                now = history.followed(one)
-                if now.badness < ended.get(now.key, _History(badness=np.inf)).badness:
-                    ended[now.key] = now
-        ranked = sorted(ended.values(), key=lambda one: one.badness)
-        kept = [one for one in ranked[:_KEPT] if one.badness <= ranked[0].badness + _HOPELESS]
+            for partial in _Search(seen, rules, k, others, history).endings():
+                longer = history.followed(partial)
+                if longer.badness < ended.get(longer.key, _History(badness=np.inf)).badness:
+                    ended[longer.key] = longer
+        ranked = sorted(ended.values(), key=lambda history: history.badness)
+        kept = [history for history in ranked[:_KEPT] if history.badness <= ranked[0].badness + _HOPELESS]
         known |= set(operation.moves)
     return _recognised(seen, kept)
 
@@ -81,9 +80,9 @@ class _History:
         """What makes it another one."""
         return tuple(frozenset(c.contact for c in some) for some in self.taken)
 
-    def followed(self, one: _Partial) -> _History:
+    def followed(self, partial: _Partial) -> _History:
         """With one operation more."""
-        return _History((*self.taken, one.taken), one.at.estimate.goals, one.surprise, one.badness)
+        return _History((*self.taken, partial.taken), partial.at.estimate.goals, partial.surprise, partial.badness)
 
 
 class _Partial(NamedTuple):
@@ -115,7 +114,9 @@ class _Search:
 
     def endings(self) -> Iterator[_Partial]:
         """Sets to which nothing can be added, first where least evidence is thrown away; none at the worst."""
-        beginning = self._with((), np.concatenate([*self._before(), self.seen.goals[self.k : self.k + 1]]))
+        goals = self.seen.goals[self.k : self.k + 1]
+        before = self.history.goals
+        beginning = self._with((), goals if before is None else np.concatenate([before, goals]))
         waiting: list[tuple[float, int, _Partial]] = [(0.0, 0, beginning)]
         ended = 0
         steps = 0
@@ -134,15 +135,17 @@ class _Search:
                 if inside(taking.at, self.rules, taking.taken, *best.parts) >= IMPOSSIBLE:
                     partial = refusing
                     continue
+                # What is thrown away where the other way is gone, in twice the logarithm: if touching is likelier (net
+                # below 0), refusing loses -net, less what one more contact would put out of the question.
                 net = best.distance - best.gain + self._rare(partial, best) - refusal(best, partial.near)
                 other, less = (taking, net) if net > 0.0 else (refusing, max(0.0, self._rival(partial, taking) - net))
                 heappush(waiting, (lost + less, steps, other))
                 partial = refusing if net > 0.0 else taking
             if not any(c.implied and self._agrees(c) for c in partial.near):
                 ended += 1
-                offended = surprise(partial.at, self.rules, partial.taken, partial.near)
-                offence = min(offence, offended)
-                yield partial._replace(surprise=partial.surprise + offended)
+                offences = physical_surprise(partial.at, self.rules, partial.taken, partial.near)
+                offence = min(offence, offences)
+                yield partial._replace(surprise=partial.surprise + offences)
         if not ended:
             yield beginning._replace(surprise=beginning.surprise + IMPOSSIBLE)
 
@@ -164,7 +167,7 @@ class _Search:
 
     def _rare(self, partial: _Partial, c: Candidate) -> float:
         """What it takes for granted that this pair touches, beside those that were taken."""
-        related = {one.parts for one in partial.taken}
+        related = {before.parts for before in partial.taken}
         return _RELATION if related and c.parts not in related else 0.0
 
     def _taking(self, partial: _Partial, some: tuple[Candidate, ...]) -> _Partial:
@@ -184,10 +187,6 @@ class _Search:
         near = at.candidates(self.rules, [c.contact for c in taken])
         return _Partial(at, taken, refused, near, self.history.surprise if surprise is None else surprise)
 
-    def _before(self) -> list[Array]:
-        """The goals of the operations before, none of the first one."""
-        return [] if self.history.goals is None else [self.history.goals]
-
 
 def _first(assembly: Assembly, sets: tuple[tuple[Candidate, ...], ...]) -> Assembly:
     """The first operations, with these contacts."""
@@ -200,36 +199,16 @@ def _first(assembly: Assembly, sets: tuple[tuple[Candidate, ...], ...]) -> Assem
 
 def _recognised(seen: Observation, kept: list[_History]) -> Recognised:
     """The best of the histories, with how likely it is, and the next best one."""
-    weights = [exp(-0.5 * (one.badness - kept[0].badness)) for one in kept]
+    weights = [exp(-0.5 * (history.badness - kept[0].badness)) for history in kept]
     likely = [weight / sum(weights) for weight in weights]
-    ordered = [tuple(_in_order(seen, k, taken) for k, taken in enumerate(one.taken)) for one in kept[:2]]
-    rival = Rival(_first(seen.assembly, ordered[1]), likely[1]) if len(kept) > 1 else None
-    return Recognised(_first(seen.assembly, ordered[0]), _evidence(seen, ordered[0]), likely[0], rival)
-
-
-def _in_order(seen: Observation, k: int, taken: tuple[Candidate, ...]) -> tuple[Candidate, ...]:
-    """In the order of parts and faces."""
-    solids = seen.assembly.solids
-    parts = (seen.assembly.operations[k].moves, tuple(solids))
-    return tuple(
-        sorted(
-            taken,
-            key=lambda c: [
-                i
-                for of, among in zip(c.contact, parts, strict=True)
-                for i in (among.index(of.part), [*solids[of.part].faces, *solids[of.part].rounds].index(of.face))
-            ],
-        )
-    )
-
-
-def _evidence(seen: Observation, sets: tuple[tuple[Candidate, ...], ...]) -> tuple[Evidence, ...]:
-    """What speaks for each contact."""
-    found = list[Evidence]()
-    for k, (taken, as_seen) in enumerate(zip(sets, placements(seen.assembly, seen.start, seen.goals), strict=True)):
-        for c in taken:
-            a, b = c.contact
-            pair = c.pair
-            seen_gap_m = face_gap(seen.assembly.face_of(a), as_seen[a.part], seen.assembly.face_of(b), as_seen[b.part])
-            found.append(Evidence(c.contact, k, pair.gap_m, pair.angle_rad, pair.share, c.most, seen_gap_m))
-    return tuple(found)
+    as_seen = placements(seen.assembly, seen.start, seen.goals)
+    evidence = [
+        [
+            each
+            for k, (taken, poses) in enumerate(zip(history.taken, as_seen, strict=True))
+            for each in evidence_of(seen.assembly, k, [(c.contact, c.pair, c.most) for c in taken], poses)
+        ]
+        for history in kept[:2]
+    ]
+    rival = Rival(with_contacts(seen.assembly, evidence[1]), likely[1]) if len(kept) > 1 else None
+    return Recognised(with_contacts(seen.assembly, evidence[0]), tuple(evidence[0]), likely[0], rival)

@@ -5,7 +5,7 @@ poses still are. Where parts are inside each other by 3 mm, give or take 5, that
 out of the question.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Collection
 from math import exp, hypot, log, sqrt
 
 import numpy as np
@@ -35,7 +35,7 @@ _BALANCED_M = 2e-3
 """How well it is known where weight acts."""
 
 
-def surprise(at: Situation, rules: Rules, taken: Collection[Candidate], near: Collection[Candidate]) -> float:
+def physical_surprise(at: Situation, rules: Rules, taken: Collection[Candidate], near: Collection[Candidate]) -> float:
     """How surprising a set of contacts is that one operation made.
 
     Args:
@@ -58,10 +58,13 @@ def refusal(c: Candidate, near: Collection[Candidate]) -> float:
         near: Pairs of faces that were not taken; of those between the same parts that look the other way none touches
             either where there is no room between.
     """
+    from scipy.special import ndtr
+
     worst = _unlikely(c.pair.gap_m, _soft(c))
     for other in near:
         if other.parts == c.parts and other.normal @ c.normal < _OPPOSITE:
-            room = sum(_normal_cdf((wall.pair.gap_m + _SOFT_M) / _soft(wall)) for wall in (c, other)) - 1.0
+            # At least so likely is it that both gaps are there at once (Bonferroni): P(A) + P(B) - 1.
+            room = sum(float(ndtr((wall.pair.gap_m + _SOFT_M) / _soft(wall))) for wall in (c, other)) - 1.0
             worst = max(worst, -2.0 * log(max(room, exp(-IMPOSSIBLE / 2))))
     return worst
 
@@ -121,21 +124,16 @@ def _hanging(at: Situation, taken: Collection[Candidate]) -> float:
         return _UNSUPPORTED
     if any(c.normal[2] < 0.0 for c in level):
         return 0.0
+    # The centre of mass of all parts that were moved, as of one density, beside the hull of the corners they stand on.
     volumes = np.array([solids[part].volume for part in at.moves])
     middles = [pose.apply(at.now.poses[part], solids[part].centroid[None])[0] for part in at.moves]
     weight = volumes @ np.array(middles) / volumes.sum()
-    off = _beside(np.concatenate(list(_feet(at, level))), weight)
+    off = _beside(np.concatenate([_overlap(at, c).corners for c in level]), weight)
     far = float(np.linalg.norm(off))
     if far <= _BALANCED_M / 2:
         return 0.0
     variance = at.variances(*level[0].parts, off[None] / far, weight)[0]
     return _unlikely(-far, sqrt(variance + _BALANCED_M**2)) - _unlikely(0.0, 1.0)
-
-
-def _feet(at: Situation, level: Collection[Candidate]) -> Iterator[Array]:
-    """The corners of what carries weight, (k, 3) each."""
-    for c in level:
-        yield _overlap(at, c).corners
 
 
 def _beside(feet: Array, weight: Array) -> Array:
@@ -156,9 +154,3 @@ def _unlikely(apart: float, deviation: float) -> float:
     from scipy.special import log_ndtr
 
     return min(-2.0 * float(log_ndtr(apart / deviation)), IMPOSSIBLE)
-
-
-def _normal_cdf(z: float) -> float:
-    from scipy.special import ndtr
-
-    return float(ndtr(z))

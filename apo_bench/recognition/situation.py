@@ -15,7 +15,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.solid import Solid
 from apo_bench.recognition.belief import Belief, PartBeliefs
-from apo_bench.recognition.estimate import Estimate
+from apo_bench.recognition.estimate import GoalEstimate
 from apo_bench.recognition.thresholds import PairThresholds, Rules, pair_thresholds, reality, slack
 
 _IMPLIED = 1.0
@@ -23,6 +23,11 @@ _IMPLIED = 1.0
 _FLAT_M = 0.2e-3
 _FLAT_RAD = radians(0.3)
 """Gaps and tilts of so much say nothing of whether faces touch: what is linear here is not more exact."""
+
+_LOOSE = PairThresholds(2e-3, radians(2.0))
+"""Added to the bounds of two parts, since overlaps lie off their middles."""
+_NARROW_M = 10e-3
+"""Overlaps that parts with play may tilt in are about as narrow."""
 
 
 class Candidate(NamedTuple):
@@ -59,7 +64,7 @@ class Situation:
     seen: Observation
     others: tuple[str, ...]
     """The parts that stand there, and are not moved by the operation."""
-    estimate: Estimate
+    estimate: GoalEstimate
 
     @property
     def k(self) -> int:
@@ -86,6 +91,7 @@ class Situation:
 
     def variances(self, a: str, b: str, directions: Array, at: Array) -> Array:
         """How uncertain it is where a point of part a, at (3,), is beside part b along directions, (k, 3), [m^2]."""
+        # A world twist (v, w) moves a point p by v + w x p, so along d by d . v + (p x d) . w.
         J = np.concatenate([directions, np.cross(at, directions)], axis=1) @ self._reach(a, b)
         return np.maximum(np.einsum("ki,ij,kj->k", J, self.estimate.covariance, J), 0.0)
 
@@ -142,12 +148,6 @@ class Situation:
     def _reach(self, a: str, b: str) -> Array:
         """(6, 6 n): the world twist of part a beside part b that body twists of the goals make."""
         return self.now.reach[a] - self.now.reach[b]
-
-
-_LOOSE = PairThresholds(2e-3, radians(2.0))
-"""Added to the bounds of two parts, since overlaps lie off their middles."""
-_NARROW_M = 10e-3
-"""Overlaps that parts with play may tilt in are about as narrow."""
 
 
 def _radius(solid: Solid) -> float:

@@ -11,7 +11,7 @@ from apo_bench.assembly.facing import Facing
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 
-_SOFT_M = 0.1e-3
+CONTACT_SOFT_M = 0.1e-3
 _SOFT_RAD = math.radians(0.1)
 """Standard deviation of a contact that is there: parts sink in a little, and the filter is linear."""
 
@@ -40,13 +40,8 @@ class Rules:
                     f"{name}={given!r} was given as a rule of recognition; above 0 and below {high:g} is allowed."
                 )
 
-    @property
-    def most(self) -> float:
-        """Largest squared Mahalanobis length of three residuals that the noise explains: a chi-square quantile."""
-        return self.most_of(3)
-
     def most_of(self, count: int) -> float:
-        """The same of so many residuals."""
+        """Largest squared Mahalanobis length of so many residuals that the noise explains: a chi-square quantile."""
         return _quantile(self.miss, count)
 
 
@@ -76,7 +71,7 @@ def pair_thresholds(rules: Rules, covariance: Array, slack: PairThresholds, leng
     """
     if rules.fixed:
         return PairThresholds(rules.gap_m, rules.angle_rad)
-    gap = _longest(rules.miss, covariance[:lengths, :lengths], _SOFT_M)
+    gap = _longest(rules.miss, covariance[:lengths, :lengths], CONTACT_SOFT_M)
     angle = _longest(rules.miss, covariance[lengths:, lengths:], _SOFT_RAD)
     return PairThresholds(min(gap + slack.gap_m, rules.gap_m), min(angle + slack.angle_rad, rules.angle_rad))
 
@@ -87,6 +82,8 @@ def _longest(miss: float, covariance: Array, soft: float) -> float:
         return math.inf
     if len(covariance) == 1:
         return _two_sided(miss) * math.sqrt(covariance[0, 0] + soft**2)
+    # The length of r Gaussian numbers of one variance is that times chi with r degrees of freedom; of two, Rayleigh's
+    # distribution, whose quantile has a closed form.
     worst = max(float(np.linalg.eigvalsh(covariance)[-1]), 0.0)
     if len(covariance) == 2:
         return math.sqrt(-2.0 * math.log(miss) * (worst + soft**2))
@@ -103,9 +100,10 @@ def reality(pair: Facing, play_m: float) -> Array:
 
     (r, r) of round faces.
     """
+    # Uniform within +-p has the variance p^2 / 3; a face of half length h may tilt by p / h.
     tilts = [play_m / max(half, play_m, 1e-9) for half in pair.half_m]
     plays = [play_m] * pair.lengths + tilts
-    soft = [_SOFT_M] * pair.lengths + [_SOFT_RAD] * len(tilts)
+    soft = [CONTACT_SOFT_M] * pair.lengths + [_SOFT_RAD] * len(tilts)
     return np.diag([x * x / 3.0 + y * y for x, y in zip(plays, soft, strict=True)])
 
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.recognition.contacts import Evidence, Recognised
+from apo_bench.recognition.evidence import Evidence, Recognised
 from apo_bench.trial.recognised_contacts import count_contacts
 
 _SCHEMA = "apo-bench/recognised/2"

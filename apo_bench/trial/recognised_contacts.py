@@ -15,7 +15,8 @@ from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.correction.correctors import correct
 from apo_bench.observation.models.isotropic import floored
-from apo_bench.recognition.contacts import Recognised, recognise
+from apo_bench.recognition.contacts import recognise
+from apo_bench.recognition.evidence import Recognised
 from apo_bench.recognition.jointly import recognise_jointly
 from apo_bench.recognition.thresholds import FIXED_RULES
 

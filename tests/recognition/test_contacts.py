@@ -313,7 +313,7 @@ def test_learning_of_contacts_is_conditioning_a_gaussian(seed: int) -> None:
     noise = np.diag([1e-4, 2e-3, 2e-3]) ** 2
     after = belief
     for J in rows:
-        after = after.given(np.zeros(3), J, noise)
+        after = after.conditioned(np.zeros(3), J, noise)
     J = np.concatenate(rows)
     R = np.kron(np.eye(2), noise)
     P = belief.covariance
@@ -348,4 +348,4 @@ def test_the_noise_hides_a_contact_as_rarely_as_it_is_said() -> None:
     draws = np.random.default_rng(0).standard_normal((20000, 3)) * sigma
     assert np.mean(np.abs(draws[:, 0]) > most.gap_m) == pytest.approx(0.01, abs=0.003)
     assert np.mean(np.hypot(draws[:, 1], draws[:, 2]) > most.angle_rad) == pytest.approx(0.01, abs=0.003)
-    assert np.mean(((draws / sigma) ** 2).sum(axis=1) > rules.most) == pytest.approx(0.01, abs=0.003)
+    assert np.mean(((draws / sigma) ** 2).sum(axis=1) > rules.most_of(3)) == pytest.approx(0.01, abs=0.003)
