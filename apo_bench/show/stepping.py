@@ -9,8 +9,7 @@ from apo_bench.assembly.goals import Poses, placements
 from apo_bench.assembly.topology import PartFace
 from apo_bench.geometry import pose
 from apo_bench.simulation.film.film import operation_words
-from apo_bench.simulation.film.still import Color, Ghost, Still, part_poses
-from apo_bench.simulation.film.track import Chapter, FilmMoment
+from apo_bench.simulation.film.still import Chapter, Color, FilmMoment, Ghost, Still, part_poses
 from apo_bench.trial.story import AS_CORRECTED, AS_SEEN, AS_TRUE, Story
 
 Faces = Literal["none", "this operation", "all"]

@@ -14,7 +14,7 @@ from apo_bench.records.run.run_file import read_run
 from apo_bench.records.salt import read_salt
 from apo_bench.records.setting_columns import settings_of
 from apo_bench.report.run.facts import scenario_files
-from apo_bench.simulation.film.track import FilmTrack
+from apo_bench.simulation.film.still import FilmTrack
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.scene import scene_of
 from apo_bench.trial.stages import observe_demonstration, simulate_demonstration

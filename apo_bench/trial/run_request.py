@@ -18,7 +18,7 @@ from apo_bench.scenario.scenario import Scenario
 from apo_bench.scenario.starts import in_the_air
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.film.film import write_film
-from apo_bench.simulation.film.track import FilmTrack
+from apo_bench.simulation.film.still import FilmTrack
 from apo_bench.simulation.scene.graphics import renderer
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.fingerprint import content_hash, spec_hash

@@ -13,8 +13,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.records.row import Row
 from apo_bench.records.settings import RANGE, TrialSettings
 from apo_bench.scenario.layout import layout_at
-from apo_bench.simulation.film.still import scenario_chapter
-from apo_bench.simulation.film.track import Chapter, FilmTrack
+from apo_bench.simulation.film.still import Chapter, FilmTrack, scenario_chapter
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.stages import SimulatedDemonstration, watch_again
 

@@ -16,9 +16,8 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.arms.arm import Hand
 from apo_bench.simulation.arms.description import GripperDescription
-from apo_bench.simulation.arms.pads import geom_reach, pads_of
 from apo_bench.simulation.arms.pressing import PROBE_WIDE, force_of
-from apo_bench.simulation.arms.rig import Rig, below, command_ends, rig_of
+from apo_bench.simulation.arms.rig import Rig, below, command_ends, geom_reach, pads_of, rig_of
 from apo_bench.simulation.frames import frame
 
 _LEVELS = 17

@@ -1,13 +1,18 @@
 """How one operation is carried out: `take` (pick, lift), then `bring` (carry, attach, release, depart).
 
-Each is a sequence of straight motions of the tip, by `Robot.follow` and `Robot.go`, and of the fingers.
+Each is a sequence of straight motions of the tip, by `Robot.follow` and `Robot.go`, and of the fingers. The macros of
+the plan are carried out in force: guarded where contacts close, by position along those that stay closed.
 """
 
+import numpy as np
+
+from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.macros import UP
-from apo_bench.simulation.execution.attach import ARRIVED_M, attach, leave, pull_out
-from apo_bench.simulation.execution.fingers import centre, check_hold, depart, grasp, release
-from apo_bench.simulation.execution.transfer import Grip, Transfer, first_contact_pose
-from apo_bench.simulation.robot.paths import shifted, smooth, with_height
+from apo_bench.simulation.execution.fingers import centre, change_grip, check_hold, depart, grasp, release
+from apo_bench.simulation.execution.search import after_search, press_in
+from apo_bench.simulation.execution.transfer import ASIDE_M, Grip, Transfer, first_contact_pose
+from apo_bench.simulation.robot.forces import Guard
+from apo_bench.simulation.robot.paths import Trajectory, paced, shifted, smooth, steady, with_height
 from apo_bench.simulation.robot.robot import Halt, Robot
 
 _LIFT = (0.4, 0.25)
@@ -16,6 +21,30 @@ _LOWER = (0.35, 0.2)
 """Peak speeds with a part, and with one that carries others, [m/s]: it drifts in the hand, the faster the more."""
 _LOST_LOAD = 0.8
 """A hand that feels less than this part of the weight of a group has lost some of it."""
+_PLACE = 0.06
+_TOUCH = 0.01
+_INSERT = 0.06
+_SLIDE = 0.005
+"""Steady speeds [m/s]: down to just above the support, onto it, along an insertion, against a part at the side."""
+_PULL = 0.1
+_LEAVE = 0.03
+"""Peak speeds [m/s] of a part that is pulled out, and of one that is moved off a side."""
+_OVERTRAVEL_M = 0.002
+"""Contact is sought this far beyond the goal."""
+_BOTTOM_M = 0.003
+"""From this far before a bottom it is felt for."""
+_ARRIVED_M = 0.001
+"""An insertion that stops earlier than this before its end was stopped by force."""
+_THROUGH = 0.15
+"""Steady speed [m/s] where only walls are that the part is between already."""
+_BEFORE_M = 0.008
+_BEHIND_M = 0.004
+"""A mouth may be so much nearer or farther than it is believed to be."""
+_BEYOND_M = 0.004
+_OFF_M = 0.0003
+"""A slide may go this much beyond the goal, this high over the floor."""
+_LOOSE_M = 0.00005
+"""Faces this far apart touch for the judge, and do not rub."""
 
 
 def take(robot: Robot, t: Transfer) -> int:
@@ -26,14 +55,11 @@ def take(robot: Robot, t: Transfer) -> int:
     """
     robot.stage = "pick"
     grasp(robot, t, t.grips[0], t.T_world_start @ t.grips[0].T_part_tip)
-    in_use = 0
-    if t.out.level:
-        in_use = int(t.out.left is not None)
-        pull_out(robot, t, t.grips[0], t.grips[1] if in_use else None)
+    in_use = _pull_out(robot, t) if t.out.level else 0
     robot.stage = "lift"
     if t.carried:
         robot.follow(smooth(robot.T, shifted(robot.T, UP, 0.004), 0.02))
-    leave(robot, t)
+    _leave(robot, t)
     robot.steady(not t.drawn)
     robot.follow(smooth(robot.T, with_height(robot.T, max(t.safe, robot.T[2, 3])), _LIFT[bool(t.carried)]))
     robot.steady(False)
@@ -48,10 +74,10 @@ def bring(robot: Robot, t: Transfer, i: int) -> None:
     """
     grip = t.grips[i]
     _carry(robot, t, grip)
-    left, grip = attach(robot, t, grip, t.grips[i + 1] if t.into.left is not None else None)
+    left, grip = _attach(robot, t, grip, t.grips[i + 1] if t.into.left is not None else None)
     release(robot, t, grip)
     depart(robot, t)
-    if left > ARRIVED_M:
+    if left > _ARRIVED_M:
         raise Halt("attach", "force_stop")
     for other in t.centring:
         centre(robot, t, other)
@@ -72,3 +98,109 @@ def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:
     check_hold(robot, grip)
     if t.carried and robot.scene.grasp == "friction" and robot.forces.load() < _LOST_LOAD * t.weight_n:
         raise Halt("carry", "lost_grasp", " or ".join(t.carried))
+
+
+def _attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[float, Grip]:
+    """Carry out the macros one after the other; returns what is left of an insertion that force stopped, and the grip.
+
+    Those that lead along the line of attach are one motion, which ends where the last of them does.
+    """
+    robot.macro = ", ".join(macro.name for macro in t.macros if macro.name != "slide-to-contact")
+    robot.stage = "attach"
+    left = 0.0
+    if t.into.level:
+        left, grip = _insert(robot, t, grip, second)
+    else:
+        _come_down(robot, t, grip)
+    for i, side in enumerate(t.sides if left <= _ARRIVED_M else ()):
+        _slide(robot, t, side, t.sides[:i])
+    return left, grip
+
+
+def _insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[float, Grip]:
+    """The guarded level line, pushed to where the grip changes and pulled from there; returns what is left of it."""
+    guard = Guard(t.into.way, t.insert_n)
+    rise = t.floats
+    T_search = None
+    if t.into.left is not None and second is not None:
+        there = shifted(shifted(t.T_world_goal, t.into.way, -t.into.left), UP, rise)
+        line = _into(robot, t, there @ grip.T_part_tip, t.into.left)
+        left, T_search = press_in(robot, t, grip, line, guard, _ARRIVED_M)
+        if left > _ARRIVED_M:
+            return left + t.into.left, grip
+        change_grip(robot, t, grip, second, after_search(T_search, shifted(there, UP, -rise) @ second.T_part_tip))
+        grip = second
+        rise = t.clearance
+        robot.follow(smooth(robot.T, shifted(robot.T, UP, rise), 0.01))
+    goal = after_search(T_search, shifted(first_contact_pose(t) @ grip.T_part_tip, UP, rise))
+    if any(macro.name == "move-to-bottom" for macro in t.macros):
+        line = _into(robot, t, shifted(goal, t.into.way, -_BOTTOM_M), _BOTTOM_M)
+        left, T_search = press_in(robot, t, grip, line, guard, _ARRIVED_M)
+        if left == 0.0:
+            beyond = after_search(T_search, shifted(goal, t.into.way, _OVERTRAVEL_M))
+            robot.follow(steady(robot.T, beyond, _TOUCH), guard)
+    else:
+        left, _ = press_in(robot, t, grip, _into(robot, t, goal, 0.0), guard, _ARRIVED_M)
+    lower = shifted(robot.T, UP, -rise - _OVERTRAVEL_M)
+    robot.follow(steady(robot.T, lower, _TOUCH), Guard(-UP, t.place_n))
+    robot.stand()
+    return left, grip
+
+
+def _come_down(robot: Robot, t: Transfer, grip: Grip) -> None:
+    """From above, slowly where contact may come any moment, until the part stands."""
+    down = Guard(t.into.way, t.place_n)
+    goal = first_contact_pose(t) @ grip.T_part_tip
+    above = steady(robot.T, shifted(goal, t.into.way, -t.slow), _PLACE)
+    left, T_search = press_in(robot, t, grip, above, down, 0.0)
+    if left == 0.0:
+        end = after_search(T_search, shifted(goal, t.into.way, _OVERTRAVEL_M))
+        press_in(robot, t, grip, steady(robot.T, end, _TOUCH), down, _OVERTRAVEL_M + t.depth / 2)
+    robot.stand()
+
+
+def _into(robot: Robot, t: Transfer, end: Array, left: float) -> Trajectory:
+    """On to `left` [m] before the goal, slowly where a mouth may be."""
+    far = float(np.linalg.norm(end[:3, 3] - robot.T[:3, 3]))
+    at = [far + left - mouth for mouth in t.mouths]
+    return paced(robot.T, end, _THROUGH, _INSERT, [(x - _BEFORE_M, x + _BEHIND_M) for x in at])
+
+
+def _slide(robot: Robot, t: Transfer, side: Array, touched: tuple[Array, ...]) -> None:
+    """Off the floor by a hair, sideways until it touches, and down again.
+
+    Args:
+        touched: Towards sides that it touches already, which it leaves by less: along one that it rubs on friction
+            would pass for the next.
+    """
+    robot.macro = "slide-to-contact"
+    robot.follow(smooth(robot.T, shifted(robot.T, UP, _OFF_M), 0.01))
+    if touched:
+        robot.follow(smooth(robot.T, shifted(robot.T, np.sum(touched, axis=0), -_LOOSE_M), 0.01))
+    robot.stand()
+    robot.follow(steady(robot.T, shifted(robot.T, side, ASIDE_M + _BEYOND_M), _SLIDE), Guard(side, t.slide_n))
+    robot.follow(steady(robot.T, shifted(robot.T, UP, -_OFF_M - _OVERTRAVEL_M), _TOUCH), Guard(-UP, t.place_n))
+    robot.stand()
+
+
+def _pull_out(robot: Robot, t: Transfer) -> int:
+    """Backwards along the way of an insertion; returns which of the grips is in use at its end."""
+    robot.stage = "lift"
+    robot.follow(smooth(robot.T, shifted(robot.T, UP, t.floats), 0.01))
+    if t.out.left is None:
+        robot.follow(smooth(robot.T, shifted(robot.T, t.out.way, -t.out.travel), _PULL))
+        return 0
+    robot.follow(smooth(robot.T, shifted(robot.T, t.out.way, -t.out.left), _PULL))
+    part = shifted(t.T_world_start, t.out.way, -t.out.left)
+    change_grip(robot, t, t.grips[0], t.grips[1], part @ t.grips[1].T_part_tip)
+    robot.follow(smooth(robot.T, shifted(robot.T, UP, t.floats), 0.01))
+    robot.follow(smooth(robot.T, shifted(robot.T, t.out.way, t.out.left - t.out.travel), _PULL))
+    return 1
+
+
+def _leave(robot: Robot, t: Transfer) -> None:
+    """Off what the part touches at its side, before it is lifted."""
+    if t.away:
+        robot.follow(smooth(robot.T, shifted(robot.T, UP, _OFF_M), 0.01))
+    for side in t.away:
+        robot.follow(smooth(robot.T, shifted(robot.T, side, ASIDE_M), _LEAVE))

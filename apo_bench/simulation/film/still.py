@@ -1,22 +1,23 @@
-"""What is shown at one moment of a trial: parts, arm and hands in one world, and what is laid over them."""
+"""What was seen of a demonstration or a replay, kept moment by moment; and what is shown at one moment of it."""
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, final
 
 import mujoco
 import numpy as np
 
-from apo_bench.assembly.goals import Poses, placements
+from apo_bench.assembly.goals import Plan, Poses, placements
 from apo_bench.assembly.topology import PartFace
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.solid import Face
-from apo_bench.simulation.film.track import NO_HANDS, Chapter, FilmMoment
-from apo_bench.simulation.hooks import Doing
+from apo_bench.simulation.hooks import Doing, Hooks
 from apo_bench.simulation.scene.render import arm_home, place_for_picture
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import initial_state, place
+from apo_bench.simulation.scene.world import World, initial_state, place
 
+NO_HANDS = frozen(np.zeros((0, 3)), None, 3)
 Color = tuple[float, float, float]
 IN_PLACE = "in place"
 HAND_M = 0.012
@@ -24,6 +25,52 @@ HAND_COLOR = (0.90, 0.70, 0.60)
 GHOST_OPACITY = 0.4
 _OFF_M = 0.004
 """How far before a flat face its name stands."""
+
+
+class FilmMoment(NamedTuple):
+    """A state of a world, and what is done in it."""
+
+    time_s: float
+    qpos: Array
+    doing: Doing
+    hands: Array
+    """Where the hands of the human are, (2, 3), [m]; of a replay (0, 3)."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Chapter:
+    """A demonstration or a replay from its beginning to its end."""
+
+    title: str
+    world: World
+    start: Poses
+    """Before the first moment; what is fixed stays there."""
+    moments: tuple[FilmMoment, ...]
+    ending: str
+    """What came of it, in a sentence."""
+    good: bool | None
+    """Whether that is a success; None where nobody asks."""
+
+
+@final
+@dataclass(eq=False)
+class FilmTrack:
+    """Keeps a demonstration or a replay: pass its `hooks` as `watch`."""
+
+    plan: Plan | None = None
+    """What is replayed; None of a demonstration."""
+    moments: list[FilmMoment] = field(default_factory=list)
+
+    @property
+    def hooks(self) -> Hooks:
+        return Hooks(before_replay=self._begin, after_tick=self._keep)
+
+    def _begin(self, plan: Plan) -> None:
+        self.plan = plan
+
+    def _keep(self, data: Any, doing: Doing) -> None:
+        self.moments.append(FilmMoment(float(data.time), np.array(data.qpos), doing, np.array(data.mocap_pos)))
 
 
 class Ghost(NamedTuple):
