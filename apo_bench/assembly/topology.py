@@ -140,8 +140,7 @@ class Assembly:
 
     def face_of(self, of: PartFace) -> Face | RoundFace:
         """A face, flat or round."""
-        solid = self.solids[of.part]
-        return solid.rounds[of.face] if of.face in solid.rounds else self.face(of)
+        return self.sheets[of] if of in self.sheets else self.solids[of.part].face(of.face)
 
     def is_round(self, contact: Contact) -> bool:
         """Whether a contact is of other faces than two flat ones."""

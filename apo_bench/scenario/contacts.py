@@ -66,15 +66,10 @@ def _contact(node: JsonNode, main: str, solids: Mapping[str, Solid]) -> tuple[Co
         pair.fail(f"a pair is needed, such as {_EXAMPLE}, or a table, such as {_TABLE}")
     above, below = (pair.child(value, name) for value, name in zip(pair.value, ("first", "second"), strict=True))
     contact = Contact(_face(above, main, solids), _face(below, None, solids))
-    a, b = (_face_of(solids, of) for of in contact)
+    a, b = (solids[of.part].face(of.face) for of in contact)
     if contact_kind(a, b) is None:
         refuse(node, f"'{contact}': {_described(a)} and {_described(b)} make no contact; {_POSSIBLE}")
     return contact, _gap(keys, node, contact, a.fit or b.fit or geometric_play(a, b) > 0.0)
-
-
-def _face_of(solids: Mapping[str, Solid], of: PartFace) -> Face | RoundFace:
-    solid = solids[of.part]
-    return solid.rounds[of.face] if of.face in solid.rounds else solid.faces[of.face]
 
 
 def _described(face: Face | RoundFace) -> str:
@@ -90,7 +85,9 @@ def _described(face: Face | RoundFace) -> str:
 
 
 def _gap(keys: Mapping[str, JsonNode], node: JsonNode, contact: Contact, fits: bool) -> Gap:
-    kind = _kind(keys["kind"]) if "kind" in keys else Gap().kind
+    kind: GapKind = keys["kind"].value if "kind" in keys else Gap().kind
+    if kind not in _KINDS:
+        keys["kind"].fail(f"{', '.join(_KINDS[:-1])} or {_KINDS[-1]} is needed")
     if "gap_mm" not in keys:
         if kind == "clearance" and not fits:
             refuse(node, f"'{contact}': faces without play have no clearance; say gap_mm = [lowest, highest]")
@@ -103,13 +100,6 @@ def _gap(keys: Mapping[str, JsonNode], node: JsonNode, contact: Contact, fits: b
             "a lowest number up to 0 and a higher one from 0 are needed", "the faces of the goals coincide"
         )
     return Gap(kind, 1e-3 * low, 1e-3 * high)
-
-
-def _kind(node: JsonNode) -> GapKind:
-    for kind in _KINDS:
-        if node.value == kind:
-            return kind
-    node.fail(f"{', '.join(_KINDS[:-1])} or {_KINDS[-1]} is needed")
 
 
 def _check(contact: Contact, node: JsonNode, moves: tuple[str, ...], there: set[str]) -> None:

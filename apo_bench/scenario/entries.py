@@ -11,14 +11,22 @@ from apo_bench.assembly.topology import Operation
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.holds import FINGER_ROOM_M, PAD_M, holds, holds_whole
-from apo_bench.geometry.solid import Solid, all_boxes, extent
+from apo_bench.geometry.solid import Solid
 from apo_bench.insertion.line import Preference
 from apo_bench.io.documents import JsonNode
 from apo_bench.parts import load_part, part_path
 from apo_bench.parts.allowed import FACE_OR_PART_NAME
 from apo_bench.scenario.contacts import Asked, check_kinds, read_contacts
-from apo_bench.scenario.keys import LARGEST_LENGTH_MM, read_pose, read_span, read_unit_axis, refuse, refuse_name
+from apo_bench.scenario.grasps import read_grasp
+from apo_bench.scenario.keys import (
+    LARGEST_LENGTH_MM,
+    read_point,
+    read_pose,
+    read_span,
+    read_unit_axis,
+    refuse,
+    refuse_name,
+)
 from apo_bench.scenario.scenario import Grasp, Shift, Turn
 
 _MOST_PARTS = 50
@@ -28,14 +36,6 @@ _MOST_SHIFTS = 20
 """In a scenario, in a scenario, of an operation, in a scenario: what is checked in a moment."""
 _ARM = "arm"
 """What the robot is called in a scene."""
-_RAISED = 0.15
-"""Height of a grasp over the middle of the part, as a part of the height of the part."""
-_OPENING_M = 0.046
-"""How far each finger of the arm that comes with the benchmark opens."""
-_MOST_HELD_M = 2 * _OPENING_M - FINGER_ROOM_M
-"""Width that the arm can hold where the file does not say how: so much room its fingers want before they close."""
-_LEVEL = 1e-6
-"""Vertical component below which a unit vector is level."""
 
 
 @final
@@ -159,7 +159,7 @@ def _entry(
         gaps,
         goal,
         _attach(keys["attach"]) if "attach" in keys else Preference(),
-        _grasp(keys.get("grasp"), node, parts[main].solid, poses[main]),
+        read_grasp(keys.get("grasp"), node, parts[main].solid, poses[main]),
         _varies(keys["vary"], k) if "vary" in keys else (),
     )
 
@@ -188,83 +188,14 @@ def _attach(node: JsonNode) -> Preference:
     return Preference(direction, travel_m)
 
 
-def _grasp(node: JsonNode | None, entry: JsonNode, solid: Solid, before: Array) -> Grasp:
-    """The grasp; unless the file says otherwise, above the middle, across the narrower level axis of a part of boxes.
-
-    Where that leaves pads beside the part, and of other parts, it is the best place that the shape offers.
-    """
-    keys = node.fields((), ("at_mm", "across")) if node else {}
-    low, high = solid.bounds
-    level = [axis for axis in range(3) if abs(before[2, axis]) < _LEVEL]
-    across = None
-    point = _above_middle(solid, before)
-    if "at_mm" in keys:
-        point = 1e-3 * keys["at_mm"].numbers(3)
-        over = PAD_M[1] * np.round(before[2, :3], 9)
-        ends = np.minimum(low, low + over), np.maximum(high, high + over)
-        if ((point < ends[0]) | (point > ends[1])).any():
-            span = " to ".join("(" + ", ".join(f"{1e3 * x:g}" for x in corner) + ")" for corner in ends)
-            needed = f"a point of the part, or up to {1e3 * PAD_M[1]:g} mm over it, from {span} mm, is needed"
-            keys["at_mm"].fail(needed, "pads reach so far below the point")
-    if "across" in keys:
-        across = read_unit_axis(keys["across"])
-        if abs((before[:3, :3] @ across)[2]) > _LEVEL:
-            keys["across"].fail(
-                "an axis that is level where the part is picked is needed", "the gripper comes from above"
-            )
-    elif len(level) >= 2:
-        across = np.eye(3)[min(level, key=lambda axis: (high - low)[axis])]
-    stated = Grasp(point, across) if across is not None else None
-    if stated and (keys.keys() == {"at_mm", "across"} or _holds_box(solid, stated, before)):
-        ends = extent(solid.pieces, stated.across)
-        if keys or ends[1] - ends[0] <= _MOST_HELD_M or not holds(solid, np.round(before[2, :3], 9), _OPENING_M):
-            return stated
-    return _by_shape(keys, entry, solid, before, point)
-
-
-def _holds_box(solid: Solid, grasp: Grasp, T: Array) -> bool:
-    """Whether this is a grasp of a part of boxes, with the part between the pads."""
-    up = T[2, :3]
-    return all_boxes(solid.pieces) and holds_whole(solid.pieces, grasp.point, grasp.across, np.round(up, 9))
-
-
-def _by_shape(keys: Mapping[str, JsonNode], entry: JsonNode, solid: Solid, T: Array, point: Array) -> Grasp:
-    """The best place for pads; of those that are near to what is stated, if something is."""
-    grasps = [Grasp(hold.point, hold.across) for hold in holds(solid, np.round(T[2, :3], 9), _OPENING_M)]
-    if "across" in keys:
-        across = read_unit_axis(keys["across"])
-        grasps = [grasp for grasp in grasps if abs(grasp.across @ across) > 1.0 - _LEVEL]
-    if not grasps:
-        size = " x ".join(f"{round(1e3 * x, 1):g}" for x in solid.bounds[1] - solid.bounds[0])
-        refuse(
-            entry,
-            f"'{entry.value['move']}', {size} mm, has no opposite faces, and no shaft, within {1e3 * _MOST_HELD_M:g} "
-            f"mm of each other that pads from above reach; the gripper opens to {2e3 * _OPENING_M:g} mm, so say "
-            "grasp = { at_mm = [x, y, z], across = [x, y, z] }, give it something to hold, or let it stand otherwise",
-        )
-    if "at_mm" in keys:
-        return Grasp(point, min(grasps, key=lambda grasp: float(np.linalg.norm(grasp.point - point))).across)
-    return grasps[0]
-
-
-def _above_middle(solid: Solid, T: Array) -> Array:
-    """Over the middle of the part as it stands, so that fingers which reach below it clear what it stands on."""
-    low, high = solid.bounds
-    up = T[2, :3]
-    point: Array = (low + high) / 2 + _RAISED * (np.abs(up) @ (high - low)) * up
-    return np.clip(point, low, high)
-
-
 def _varies(node: JsonNode, operation: int) -> tuple[Shift | Turn, ...]:
     many = node.items(node.key) if isinstance(node.value, list) else (node,)
-    return tuple(_turn(each, operation) if _is_turn(each) else _shift(each, operation) for each in many)
+    return tuple(_vary(each, operation) for each in many)
 
 
-def _is_turn(node: JsonNode) -> bool:
-    return isinstance(node.value, dict) and "about" in node.value
-
-
-def _shift(node: JsonNode, operation: int) -> Shift:
+def _vary(node: JsonNode, operation: int) -> Shift | Turn:
+    if isinstance(node.value, dict) and "about" in node.value:
+        return _turn(node, operation)
     keys = node.fields(("along", "mm"))
     low, high = read_span(keys["mm"], -LARGEST_LENGTH_MM, LARGEST_LENGTH_MM)
     return Shift(operation, read_unit_axis(keys["along"]), 1e-3 * low, 1e-3 * high)
@@ -273,7 +204,5 @@ def _shift(node: JsonNode, operation: int) -> Shift:
 def _turn(node: JsonNode, operation: int) -> Turn:
     keys = node.fields(("about", "deg"), ("at_mm",))
     low, high = np.radians(read_span(keys["deg"], -360.0, 360.0))
-    point = 1e-3 * keys["at_mm"].numbers(3) if "at_mm" in keys else np.zeros(3)
-    if np.abs(point).max() > 1e-3 * LARGEST_LENGTH_MM:
-        keys["at_mm"].fail(f"three lengths from -{LARGEST_LENGTH_MM:g} to {LARGEST_LENGTH_MM:g} mm are needed")
+    point = read_point(keys["at_mm"]) if "at_mm" in keys else np.zeros(3)
     return Turn(operation, read_unit_axis(keys["about"]), point, float(low), float(high))

@@ -18,8 +18,7 @@ _AXES = {f"{sign}{'xyz'[i]}": value for sign, value in (("", 1.0), ("+", 1.0), (
 
 def refuse(node: JsonNode, sentence: str) -> NoReturn:
     """Raise the error of a key."""
-    place = f"{node.file}, {node.key}" if node.key else node.file
-    raise InputError(f"{place}: {sentence}.")
+    raise InputError(f"{node.place}: {sentence}.")
 
 
 def refuse_name(node: JsonNode, kind: str, given: str, allowed: Iterable[str]) -> NoReturn:
@@ -29,13 +28,19 @@ def refuse_name(node: JsonNode, kind: str, given: str, allowed: Iterable[str]) -
 def read_pose(node: JsonNode) -> Array:
     """`{ at_mm = [x, y, z], turn_deg = [rx, ry, rz] }` as (4, 4), [m]."""
     keys = node.fields(("at_mm",), ("turn_deg",))
-    at = keys["at_mm"].numbers(3)
+    at = read_point(keys["at_mm"])
     turn = keys["turn_deg"].numbers(3) if "turn_deg" in keys else np.zeros(3)
-    if np.abs(at).max() > LARGEST_LENGTH_MM:
-        keys["at_mm"].fail(f"three lengths from -{LARGEST_LENGTH_MM:g} to {LARGEST_LENGTH_MM:g} mm are needed")
     if np.abs(turn).max() > 360:
         keys["turn_deg"].fail("three angles from -360 to 360 degrees are needed")
-    return pose.at(1e-3 * at, turn)
+    return pose.at(at, turn)
+
+
+def read_point(node: JsonNode) -> Array:
+    """`[x, y, z]` in mm, (3,), [m]."""
+    at_mm = node.numbers(3)
+    if np.abs(at_mm).max() > LARGEST_LENGTH_MM:
+        node.fail(f"three lengths from -{LARGEST_LENGTH_MM:g} to {LARGEST_LENGTH_MM:g} mm are needed")
+    return 1e-3 * at_mm
 
 
 def read_any_pose(node: JsonNode) -> Array:
