@@ -34,7 +34,7 @@ FAULTS = (
     ),
     Fault("geometry/overlap.py", "area / of.area)", "area / self.area)", "a share of the wrong overlap"),
     Fault("geometry/convex.py", "- u[..., k] * v", "+ u[..., k] * v", "a cross product of edges is none"),
-    Fault("geometry/drop.py", " and low_b[2] < high_a[2])", ")", "what lies above is met on the way down"),
+    Fault("geometry/drop.py", " and low_b[2] < high_a[2]", "", "what lies above is met on the way down"),
     Fault("geometry/swept.py", "return max(0.0, at - _SLACK_M)", "return max(0.0, at)", "the slack is kept"),
     Fault("geometry/symmetry.py", '"nij,mji->nm"', '"nij,mij->nm"', "a turn instead of its inverse"),
     Fault(

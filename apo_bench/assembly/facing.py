@@ -1,47 +1,18 @@
 """Faces of two solids that look at each other: how far apart, how far from parallel, how much they cover each other."""
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple, final
+from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.facing_round import measure_round, round_pairs
+from apo_bench.assembly.facing_round import Facing, measure_round, round_pairs
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.convex import ball_around
 from apo_bench.geometry.overlap import face_area, overlap
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, Solid
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Facing:
-    """Two faces with opposite normals, one of which covers part of the other.
-
-    Of round faces axes take the place of normals: `apo_bench.assembly.facing_round` says what is measured then.
-    """
-
-    a: str
-    """The face of the first solid."""
-    b: str
-    """The face of the second one."""
-    gap_m: float
-    """From the middle of the overlap, on b, to the plane of a: above 0 apart, below 0 inside each other."""
-    angle_rad: float
-    """Between the normal of a and the opposite of that of b."""
-    share: float
-    """Area of the overlap over that of the smaller face, 0 to 1."""
-    residual: Array
-    """(3,): the gap, [m], and the parts of the normal of a along two axes in the plane of b, [rad] while small."""
-    slope: Array
-    """(3, 6): its derivative by a twist (v, w) of the first solid in the world, about the origin, b at rest."""
-    half_m: tuple[float, ...]
-    """Half the extent of the overlap across the two axes, (2,), so that a tilt about them opens it by as much."""
-    lengths: int = 1
-    """How many of the residuals are lengths; the others are tilts."""
 
 
 def opposed(a: Face, T_a: Array, b: Face, T_b: Array, angle_rad: float) -> bool:
@@ -89,13 +60,11 @@ def facing(
         pair = _pair(posed_a, i, T_a, posed_b, j, T_b, share)
         if pair is not None and abs(pair.gap_m) <= gap_m:
             yield pair
-    for one, other in round_pairs(a, b):
-        if (one.name, other.name) not in known:
-            m = measure_round(one, T_a, other, T_b)
-            if abs(m.gap_m) <= gap_m and m.angle_rad <= angle_rad and m.share >= share:
-                yield Facing(
-                    one.name, other.name, m.gap_m, m.angle_rad, m.share, m.residual, m.slope, m.half_m, m.lengths
-                )
+    for face, other in round_pairs(a, b):
+        if (face.name, other.name) not in known:
+            measured = measure_round(face, T_a, other, T_b)
+            if abs(measured.gap_m) <= gap_m and measured.angle_rad <= angle_rad and measured.share >= share:
+                yield measured
 
 
 def face_gap(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> float:

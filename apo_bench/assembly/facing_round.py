@@ -6,9 +6,10 @@ tilts. A turn about the axis changes none of them, so it does not matter how a p
 """
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import lru_cache
 from itertools import product
-from typing import NamedTuple
+from typing import final
 
 import numpy as np
 
@@ -25,23 +26,32 @@ _LOOSEST_M = 0.6e-3
 _SAME_M = 1e-9
 
 
-class RoundMeasure(NamedTuple):
-    """What is between two faces of which one is round."""
+@final
+@dataclass(frozen=True, eq=False)
+class Facing:
+    """Two faces that look at each other, one of which covers part of the other; of round ones axes count as normals."""
 
-    residual: Array
-    """(r,): lengths, [m], then tilts, [rad] while small."""
-    slope: Array
-    """(r, 6): its derivative by a twist (v, w) of the first solid in the world, about the origin, the other at rest."""
-    lengths: int
-    """How many of the residuals are lengths."""
+    a: str
+    """The face of the first solid."""
+    b: str
+    """The face of the second one."""
     gap_m: float
-    """How far walls are from where they should be; of a shaft on a plane above 0 apart, below 0 inside each other."""
+    """From the middle of the overlap, on b, to the plane of a: above 0 apart, below 0 inside each other; of round faces
+    how far walls are from where they should be."""
     angle_rad: float
-    """Between the axes, or between an axis and a plane."""
+    """Between the normal of a and the opposite of that of b; between axes, or between an axis and a plane."""
     share: float
-    """What is common of their lengths over the shorter one; of cones that of their radii."""
+    """Area of the overlap over that of the smaller face, 0 to 1; what is common of the lengths of round faces over the
+    shorter one; of cones that of their radii."""
+    residual: Array
+    """(r,): lengths, [m], then tilts, [rad] while small: the gap and the parts of the normal of a along two axes in the
+    plane of b."""
+    slope: Array
+    """(r, 6): its derivative by a twist (v, w) of the first solid in the world, about the origin, b at rest."""
     half_m: tuple[float, ...]
-    """Half the length that holds each tilt."""
+    """Half the extent of the overlap across the axis of each tilt, so that a tilt about it opens it by as much."""
+    lengths: int = 1
+    """How many of the residuals are lengths; the others are tilts."""
 
 
 def round_pairs(a: Solid, b: Solid) -> Iterator[tuple[Face | RoundFace, Face | RoundFace]]:
@@ -53,21 +63,21 @@ def round_pairs(a: Solid, b: Solid) -> Iterator[tuple[Face | RoundFace, Face | R
 def _fitting(a: Solid, b: Solid) -> tuple[tuple[Face | RoundFace, Face | RoundFace], ...]:
     every: list[list[Face | RoundFace]] = [[*solid.faces.values(), *solid.rounds.values()] for solid in (a, b)]
     return tuple(
-        (one, other)
-        for one, other in product(*every)
-        if contact_kind(one, other) not in (None, "plane on plane")
-        and _TIGHTEST_M <= geometric_play(one, other) <= _LOOSEST_M
+        (face, other)
+        for face, other in product(*every)
+        if contact_kind(face, other) not in (None, "plane on plane")
+        and _TIGHTEST_M <= geometric_play(face, other) <= _LOOSEST_M
     )
 
 
-def measure_round(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> RoundMeasure:
+def measure_round(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> Facing:
     """Measure two posed faces that can make a contact, of which at least one is round."""
     if isinstance(a, Face) or isinstance(b, Face):
         return _shaft_on_plane(a, T_a, b, T_b)
     return _in_hole(a, T_a, b, T_b) if contact_kind(a, b) == "shaft in hole" else _cone(a, T_a, b, T_b)
 
 
-def _shaft_on_plane(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> RoundMeasure:
+def _shaft_on_plane(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> Facing:
     (shaft, T_shaft), (flat, T_flat) = ((b, T_b), (a, T_a)) if isinstance(a, Face) else ((a, T_a), (b, T_b))
     assert isinstance(shaft, RoundFace)
     assert isinstance(flat, Face)
@@ -78,7 +88,9 @@ def _shaft_on_plane(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: A
     height = float(touch.off.mean(axis=0) @ n)
     slope = np.array([[*n, *np.cross(middle, n)], [0.0, 0.0, 0.0, *np.cross(u, n)]])
     whole = min(shaft.length, float(np.ptp(flat.outline @ (T_flat[:3, :3].T @ u))))
-    return RoundMeasure(
+    return Facing(
+        a=a.name,
+        b=b.name,
         residual=np.array([height, n @ u]),
         slope=-slope if isinstance(a, Face) else slope,
         lengths=1,
@@ -89,7 +101,7 @@ def _shaft_on_plane(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: A
     )
 
 
-def _in_hole(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> RoundMeasure:
+def _in_hole(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Facing:
     """A cylinder in a cylinder."""
     touch = mate(a, T_a, b, T_b)
     u = T_a[:3, :3] @ a.axis
@@ -99,7 +111,9 @@ def _in_hole(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> RoundMeasure
     p = touch.points.mean(axis=0)
     off = across @ touch.off.mean(axis=0)
     half = touch.length_m / 2
-    return RoundMeasure(
+    return Facing(
+        a=a.name,
+        b=b.name,
         residual=np.array([*off, *(across @ u)]),
         slope=np.array([*_offsets(across, p), *_tilts(across, u)]),
         lengths=2,
@@ -110,20 +124,22 @@ def _in_hole(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> RoundMeasure
     )
 
 
-def _cone(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> RoundMeasure:
+def _cone(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Facing:
     """A cone in a cone, or on a rim, compared where both have one radius."""
-    u = _wider(a, T_a)
-    w = _wider(b, T_b)
+    u = T_a[:3, :3] @ a.wider
+    w = T_b[:3, :3] @ b.wider
     across = (T_b[:3, :3] @ b.frame[:3, :2]).T
     slope = abs(a.slope if a.kind == "cone" else b.slope)
     rows = np.array([*across, w * slope / np.hypot(1.0, slope)])
     low = max(min(a.radii), min(b.radii))
     high = min(max(a.radii), max(b.radii))
-    p, q = (pose.apply(T, _where(face, (low + high) / 2)[None])[0] for face, T in ((a, T_a), (b, T_b)))
+    p, q = (pose.apply(T, face.where_wide((low + high) / 2)[None])[0] for face, T in ((a, T_a), (b, T_b)))
     tilts = np.zeros((0, 3)) if "rim" in (a.kind, b.kind) else across
     spans = [abs(float(np.subtract(*face.radii))) for face in (a, b) if face.kind == "cone"]
     common = (high - low) / min(spans) if len(spans) == 2 else float(high >= low - _SAME_M)
-    return RoundMeasure(
+    return Facing(
+        a=a.name,
+        b=b.name,
         residual=np.array([*(rows @ (p - q)), *(tilts @ u)]),
         slope=np.array([*_offsets(rows, p), *_tilts(tilts, u)]),
         lengths=3,
@@ -142,16 +158,3 @@ def _offsets(rows: Array, p: Array) -> Array:
 def _tilts(rows: Array, u: Array) -> Array:
     """Derivatives, (r, 6), of the parts of an axis of the first solid along directions, (r, 3)."""
     return np.hstack([np.zeros((len(rows), 3)), np.cross(u, rows)])
-
-
-def _where(face: RoundFace, radius: float) -> Array:
-    """The point of the axis where a cone has a radius; the middle of a rim."""
-    if face.kind == "rim":
-        return np.asarray(face.middle)
-    return np.asarray(face.point + (face.span[0] + (radius - face.radii[0]) / face.slope) * face.axis)
-
-
-def _wider(face: RoundFace, T: Array) -> Array:
-    """The axis, world; of a cone, or of what sits on a rim, towards where it is wider."""
-    sign = float(np.sign(face.slope)) if face.kind == "cone" else 1.0
-    return np.asarray((-sign if face.kind == "rim" and not face.hole else sign) * (T[:3, :3] @ face.axis))

@@ -127,8 +127,7 @@ class _Sheets:
         """The middle of a face in the plane across a cone where both are as wide."""
         cone = self._assembly.round_face(cone_of)
         other = self._assembly.round_face(other_of)
-        height = cone.span[0] + (other.radius - cone.radii[0]) / cone.slope
-        at = (cone.point + height * cone.axis)[None]
+        at = cone.where_wide(other.radius)[None]
         plane = self._sheet(cone_of, f"{1e6 * other.radius:.3f}", at, _outward(cone), cone.fit)
         return Contact(plane, self._sheet(other_of, "middle", other.middle[None], _outward(other), other.fit))
 

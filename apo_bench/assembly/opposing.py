@@ -8,8 +8,8 @@ to a right angle; planes through an axis have no sense.
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.equations import pattern
 from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.pattern import pattern
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry.arrays import Array
 

@@ -12,7 +12,7 @@ from math import isfinite, sqrt
 import numpy as np
 from scipy.special import chdtrc
 
-from apo_bench.assembly.equations import pattern
+from apo_bench.assembly.pattern import pattern
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.play import plays
 from apo_bench.correction.solvers.gauss_newton import SMALLEST

@@ -17,9 +17,9 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.equations import pattern
 from apo_bench.assembly.goals import Observation, Poses, placements
 from apo_bench.assembly.lowering import lowered_observation
+from apo_bench.assembly.pattern import pattern
 from apo_bench.assembly.topology import ODL, Assembly, Operation
 from apo_bench.correction.directions import Direction, directions, held
 from apo_bench.correction.problem import problem_of

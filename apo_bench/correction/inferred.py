@@ -14,9 +14,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.equations import pattern
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.kinds import contact_kind
+from apo_bench.assembly.pattern import pattern
 from apo_bench.assembly.topology import Assembly, Contact, product
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, remembered

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.equations import pattern
+from apo_bench.assembly.pattern import pattern
 from apo_bench.assembly.topology import Assembly, Contact, PartFace
 from apo_bench.geometry.arrays import Array, frozen, remembered
 

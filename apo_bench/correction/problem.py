@@ -12,8 +12,9 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.equations import equations, pattern
+from apo_bench.assembly.equations import equations
 from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.pattern import pattern
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.consistency import (
     TEST_LEVEL,

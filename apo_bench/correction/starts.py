@@ -12,8 +12,8 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
-from apo_bench.assembly.equations import largest, pattern
-from apo_bench.assembly.opposing import looking_away
+from apo_bench.assembly.equations import largest
+from apo_bench.assembly.pattern import looking_away, pattern
 from apo_bench.correction.inferred import inferred_goals
 from apo_bench.correction.problem import Problem, problem_of
 from apo_bench.correction.solved import FAR_DEG, Solved, solve

@@ -11,7 +11,8 @@ from itertools import combinations, product
 
 import numpy as np
 
-from apo_bench.assembly.facing import Facing, facing
+from apo_bench.assembly.facing import facing
+from apo_bench.assembly.facing_round import Facing
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.kinds import contact_kind, geometric_play, play_mm
 from apo_bench.assembly.topology import Assembly, Contact, PartFace

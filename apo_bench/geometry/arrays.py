@@ -48,17 +48,13 @@ def frozen(value: ArrayLike, *shape: int | None) -> Array:
         ValueError: The shape differs, or a number is complex or not finite.
     """
     array = real(value)
-    if shape and (array.ndim != len(shape) or any(map(_differ, shape, array.shape))):
+    if shape and (array.ndim != len(shape) or any(s not in (None, n) for s, n in zip(shape, array.shape, strict=True))):
         wanted = ", ".join("*" if s is None else str(s) for s in shape)
         raise ValueError(f"an array of shape ({wanted}) is needed, {array.shape} was given")
     if np.count_nonzero(np.isfinite(array)) < array.size:  # twice as quick as `all`
         raise ValueError("every number must be finite, a NaN or an infinity was given")
     array.setflags(write=False)
     return array
-
-
-def _differ(wanted: int | None, length: int) -> bool:
-    return wanted is not None and wanted != length
 
 
 def freeze(record: Any, **shapes: tuple[int | None, ...]) -> None:
@@ -87,15 +83,13 @@ def copyable(record: type[Record]) -> type[Record]:
 
 
 def _reduced(record: Any) -> tuple[Any, ...]:
-    return _again, (type(record), {f.name: _plain(getattr(record, f.name)) for f in fields(record)})
+    values = {field.name: getattr(record, field.name) for field in fields(record)}
+    plain = {name: dict(value) if isinstance(value, MappingProxyType) else value for name, value in values.items()}
+    return _again, (type(record), plain)
 
 
 def _again(record: type[Any], values: Mapping[str, Any]) -> Any:
     return record(**values)
-
-
-def _plain(value: Any) -> Any:
-    return dict(value) if isinstance(value, MappingProxyType) else value
 
 
 def remembered(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:

@@ -17,9 +17,15 @@ _AT_ONCE = 100_000
 
 def drop(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
     """How far `a` can go straight down until it meets `b`, to 2 um, [m]; infinite if it passes it by."""
-    if not _above(a, T_a, b, T_b):
+    low_a, high_a = upright_bounds(a.pieces, T_a[:3, :3], T_a[:3, 3])
+    low_b, high_b = upright_bounds(b.pieces, T_b[:3, :3], T_b[:3, 3])
+    over = (low_a[:2] < high_b[:2]).all() and (low_b[:2] < high_a[:2]).all() and low_b[2] < high_a[2]
+    if not over:
         return np.inf
-    low, high = _span(a, T_a, b, T_b)
+    # Between the first and the last way at which the boxes around both may meet: first coarsely, then between the last
+    # place without and the first place with a meeting.
+    low = max(0.0, float(low_a[2] - high_b[2]))
+    high = float(high_a[2] - low_b[2])
     for step in (_STEP_M, TOUCH_M):
         ways = np.linspace(low, high, min(int((high - low) / step) + 2, _MOST_PLACES))
         met = _first_met(a, T_a, ways, b, T_b)
@@ -44,15 +50,3 @@ def drop_depths(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> Arra
     """How deep `a` is in `b` once it went down so far, (k,), [m]; negative where they are apart."""
     at = T_a[:3, 3] - np.outer(ways, (0.0, 0.0, 1.0))
     return intrusion_depths(a.pieces, T_a[:3, :3], at, b.pieces, T_b)
-
-
-def _above(a: Solid, T_a: Array, b: Solid, T_b: Array) -> bool:
-    """Whether the boxes around both, whose sides are those of the world, lie over one another in part."""
-    (low_a, high_a), (low_b, high_b) = (upright_bounds(s.pieces, T[:3, :3], T[:3, 3]) for s, T in ((a, T_a), (b, T_b)))
-    return bool((low_a[:2] < high_b[:2]).all() and (low_b[:2] < high_a[:2]).all() and low_b[2] < high_a[2])
-
-
-def _span(a: Solid, T_a: Array, b: Solid, T_b: Array) -> tuple[float, float]:
-    """From where on they may meet, and until where."""
-    (low_a, high_a), (low_b, high_b) = (upright_bounds(s.pieces, T[:3, :3], T[:3, 3]) for s, T in ((a, T_a), (b, T_b)))
-    return max(0.0, float(low_a[2] - high_b[2])), float(high_a[2] - low_b[2])

@@ -73,8 +73,8 @@ def _coaxial(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Mate:
     """A shaft in a hole, in either order: both cylinders, or both cones."""
     ends = pose.apply(T_a, a.ends)
     origin = pose.apply(T_b, b.point[None])[0]
-    u = _wider(a, T_a)
-    v = _wider(b, T_b)
+    u = T_a[:3, :3] @ a.wider
+    v = T_b[:3, :3] @ b.wider
     along = T_b[:3, :3] @ b.axis
     at = (ends - origin) @ along
     low = max(at.min(), b.span[0])
@@ -93,12 +93,12 @@ def _coaxial(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Mate:
 def _on_rim(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Mate:
     """A cone on the rim of a hole, or the rim of a shaft in a countersink, in either order."""
     (cone, T_cone), (rim, T_rim) = ((a, T_a), (b, T_b)) if b.kind == "rim" else ((b, T_b), (a, T_a))
-    u = _wider(a, T_a)
-    v = _wider(b, T_b)
+    u = T_a[:3, :3] @ a.wider
+    v = T_b[:3, :3] @ b.wider
     middle = pose.apply(T_rim, rim.middle[None])
     on_cone = pose.apply(T_cone, cone.point[None])
-    points = middle if a.kind == "rim" else middle - _across(middle - on_cone, _wider(cone, T_cone))
-    off = _across(middle - on_cone, _wider(cone, T_cone)) * (1.0 if a.kind == "rim" else -1.0)
+    points = middle if a.kind == "rim" else middle - _across(middle - on_cone, T_cone[:3, :3] @ cone.wider)
+    off = _across(middle - on_cone, T_cone[:3, :3] @ cone.wider) * (1.0 if a.kind == "rim" else -1.0)
     rise, sine = _rise(cone, T_cone, rim, T_rim)
     fits = min(cone.radii) - _RIM_M * _EDGE_ON <= rim.radius <= max(cone.radii) + _RIM_M * _EDGE_ON
     over = fits and float(np.linalg.norm(off)) < rim.radius
@@ -131,25 +131,12 @@ def _on_plane(shaft: RoundFace, T_shaft: Array, flat: Face, T_flat: Array, *, of
     return Mate(points, np.outer(heights, n), axis, np.pi / 2 - angle, 0.0, 0.0, common, length)
 
 
-def _wider(face: RoundFace, T: Array) -> Array:
-    """The axis, world; of a cone or a rim towards where what is inside of it is wider.
-
-    A rim looks out of its part: the cone of a shaft that sits in a hole gets wider that way, the countersink that a
-    shaft's end sits in gets narrower.
-    """
-    if face.kind == "cone":
-        sign = np.sign(face.slope)
-    else:
-        sign = -1.0 if face.kind == "rim" and not face.hole else 1.0
-    return np.asarray(sign * (T[:3, :3] @ face.axis))
-
-
 def _rise(cone: RoundFace, T_cone: Array, other: RoundFace, T_other: Array) -> tuple[float, float]:
     """How far the shaft of a cone and another cone, or a rim, is from its seat, and the sine of the cone."""
-    seat = cone.point + (cone.span[0] + (other.radius - cone.radii[0]) / cone.slope) * cone.axis
+    seat = cone.where_wide(other.radius)
     between = pose.apply(T_cone, seat[None])[0] - pose.apply(T_other, other.middle[None])[0]
     sign = -1.0 if cone.hole else 1.0
-    return float(sign * between @ _wider(cone, T_cone)), abs(cone.slope) / float(np.hypot(1.0, cone.slope))
+    return float(sign * between @ (T_cone[:3, :3] @ cone.wider)), abs(cone.slope) / float(np.hypot(1.0, cone.slope))
 
 
 def _across(v: Array, axis: Array) -> Array:

@@ -71,6 +71,23 @@ class RoundFace:
         """The middle of the axis within the face, (3,), [m]."""
         return np.asarray(self.ends.mean(axis=0))
 
+    @property
+    def wider(self) -> Array:
+        """The axis, (3,); of a cone or a rim towards where what is inside of it is wider.
+
+        A rim looks out of its part: the cone of a shaft that sits in a hole gets wider that way, the countersink that a
+        shaft's end sits in gets narrower.
+        """
+        if self.kind == "cone":
+            return np.asarray(np.sign(self.slope) * self.axis)
+        return -self.axis if self.kind == "rim" and not self.hole else self.axis
+
+    def where_wide(self, radius: float) -> Array:
+        """The point of the axis, (3,), where a cone has a radius, [m]; the middle of a rim."""
+        if self.kind == "rim":
+            return self.middle
+        return np.asarray(self.point + (self.span[0] + (radius - self.radii[0]) / self.slope) * self.axis)
+
     @cached_property
     def frame(self) -> Array:
         """A frame on the axis, z along it, x towards the middle of the face if there is one, (4, 4)."""

@@ -1,7 +1,5 @@
 """The exponential of SE(3) with its derivative, as matrix polynomials: few operations for many twists."""
 
-from __future__ import annotations
-
 from math import factorial
 
 import numpy as np

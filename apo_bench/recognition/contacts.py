@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.facing import Facing, facing
+from apo_bench.assembly.facing import facing
+from apo_bench.assembly.facing_round import Facing
 from apo_bench.assembly.goals import Observation, placements
 from apo_bench.assembly.topology import Contact, PartFace
 from apo_bench.geometry.arrays import Array

@@ -17,9 +17,10 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.equations import equations, pattern
+from apo_bench.assembly.equations import equations
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.lowering import lowered
+from apo_bench.assembly.pattern import pattern
 from apo_bench.assembly.shared_error import joint_covariance
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose

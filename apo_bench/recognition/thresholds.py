@@ -7,7 +7,7 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly.facing import Facing
+from apo_bench.assembly.facing_round import Facing
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 

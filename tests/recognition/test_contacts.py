@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly.facing import Facing, facing
+from apo_bench.assembly.facing import facing
+from apo_bench.assembly.facing_round import Facing
 from apo_bench.assembly.goals import Observation, placements
 from apo_bench.assembly.topology import Assembly, Contact, Gap, Operation
 from apo_bench.correction.correctors import correct

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly.facing import Facing, facing
-from apo_bench.assembly.facing_round import measure_round, round_pairs
+from apo_bench.assembly.facing import facing
+from apo_bench.assembly.facing_round import Facing, measure_round, round_pairs
 from apo_bench.assembly.goals import placements
 from apo_bench.assembly.kinds import contact_kind
 from apo_bench.geometry import pose

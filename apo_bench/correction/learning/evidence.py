@@ -14,9 +14,10 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.equations import equations, pattern
+from apo_bench.assembly.equations import equations
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.lowering import lowered_observation
+from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.play import fit_covariance
 from apo_bench.correction.solvers.compact import compact_equations
 from apo_bench.correction.solvers.posterior import RANK_CUT_OFF

@@ -15,10 +15,9 @@ from typing import final
 import numpy as np
 
 from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.equations import pattern
 from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.opposing import looking_away
 from apo_bench.assembly.outlier_model import OutlierModel
+from apo_bench.assembly.pattern import looking_away, pattern
 from apo_bench.correction.consistency import SOFT_M, fit_deviation
 from apo_bench.correction.contact import ContactCorrector, contact_apply
 from apo_bench.correction.inferred import inferred_goals

@@ -15,7 +15,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.equations import pattern
+from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.consistency import p_value
 from apo_bench.correction.problem import seen_system
 from apo_bench.correction.robust.hypotheses import (

@@ -6,7 +6,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.equations import Pattern, pattern
+from apo_bench.assembly.pattern import Pattern, pattern
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.solvers.compact import CompactEquations, moments
 from apo_bench.correction.solvers.words import Words
@@ -41,7 +41,7 @@ class Laid:
         return np.asarray(np.maximum.reduceat(np.abs(e), self.pattern.begin[:-1], axis=-1))
 
     def looking_away(self, forms: Array) -> NDArray[np.bool_]:
-        """Which contacts have faces that do not look at each other, (*, c), as `assembly.opposing` has it."""
+        """Which contacts have faces that do not look at each other, (*, c), as `looking_away` has it."""
         cosines = (forms[..., :3] * self.pattern.onto[:, :3]).sum(axis=-1)
         return np.asarray(cosines > self.pattern.opposing)
 
