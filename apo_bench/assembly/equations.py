@@ -10,21 +10,18 @@ the operations are preceded by one operation per part that puts it at its start.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import NamedTuple, final
+from typing import final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.kinds import OPPOSING, contact_kind
-from apo_bench.assembly.lowering import lowered
-from apo_bench.assembly.topology import ODL, Assembly, Contact, Operation, inverted, product, simplified
+from apo_bench.assembly.pattern import cross_rows, pattern
+from apo_bench.assembly.topology import Assembly, product
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, remembered
-from apo_bench.geometry.solid import Face
+from apo_bench.geometry.arrays import Array
 
 
 @final
@@ -97,12 +94,14 @@ class Equations:
         points = np.array(self._points(F))
         forms = np.array(self._forms(F))
         inverse = self.inverse[self.contact].T
+        # T goes to the plane, so both are taken behind it, at j + 1; T^-1 goes to the vertex: both before it, at j.
         side = np.arange(w)[:, None] + ~inverse, np.arange(m)
         a = forms[side][..., :3].reshape(-1, 3)
         p = points[side][..., :3].reshape(-1, 3)
-        rows = np.concatenate([a, _cross(p, a)], axis=1).reshape(w, m, 6) * np.where(inverse, -1.0, 1.0)[..., None]
+        rows = np.concatenate([a, cross_rows(p, a)], axis=1).reshape(w, m, 6) * np.where(inverse, -1.0, 1.0)[..., None]
         J = np.zeros((m, n + 1, 6))
         columns = self._columns(n)[self.contact]
+        # One letter after the other, since an operation that occurs twice in a word gets both of its rows.
         for j in range(w):
             J[np.arange(m), columns[:, j]] += rows[j]
         return np.einsum("mi,mi->m", self.plane, points[0]), J[:, :n].reshape(m, 6 * n)
@@ -150,6 +149,7 @@ def equations(assembly: Assembly, start: Poses, goals: Array, free: Collection[i
     vertex = np.array(known.corners)
     for c in np.flatnonzero(known.laid):
         rows = slice(known.begin[c], known.begin[c + 1])
+        # v = (D_a^-1 D_b)^-1 v_a takes corners of a to the frame of b; there v - (n v) n lays them onto the plane of b.
         corners = pose.apply(pose.inverse(product(known.words[c], stack)), vertex[rows, :3])
         n = known.onto[c]
         vertex[rows, :3] = corners - np.outer(corners @ n[:3] + n[3], n[:3])
@@ -157,78 +157,6 @@ def equations(assembly: Assembly, start: Poses, goals: Array, free: Collection[i
         constants, known.letters, known.inverse, known.made, known.contact, known.plane[known.contact], vertex
     )
     return system if free is None else system.among(system.containing(free))
-
-
-@final
-@dataclass(frozen=True, eq=False)
-class Pattern:
-    """What the equations of an assembly have in common, wherever its parts are: c contacts with m vertices."""
-
-    words: tuple[ODL, ...]
-    """D_a^-1 D_b of each contact, simplified; term k stands for the start of part k, then for the operations."""
-    letters: NDArray[np.intp]
-    """(c, w), as `Equations` has it; so are `inverse`, `made` and `contact`."""
-    inverse: NDArray[np.bool_]
-    made: NDArray[np.intp]
-    contact: NDArray[np.intp]
-    begin: NDArray[np.intp]
-    """(c + 1,): contact i has the vertices begin[i] .. begin[i + 1] - 1."""
-    plane: Array
-    """(c, 4): n of Eq. 1, frame of the manipulated part."""
-    onto: Array
-    """(c, 4): the plane of the other face, frame of the environment part."""
-    corners: Array
-    """(m, 4): the corners of the smaller face, homogeneous, in the frame of its own part."""
-    laid: NDArray[np.bool_]
-    """(c,): whether that is the manipulated face, so that its corners are laid onto the other one at the goals."""
-    freed: tuple[int, ...]
-    """The operations whose motion parameters occur, the most recent first."""
-    opposing: Array
-    """(c,): the largest cosine between normals of faces that look at each other; infinite of planes through an axis."""
-
-
-@remembered
-def pattern(assembly: Assembly) -> Pattern:
-    """What the equations of an assembly have in common; its contacts are those of `lowered(assembly)`."""
-    if (low := lowered(assembly)) is not assembly:
-        return pattern(low)
-    parts = tuple(assembly.solids)
-    chosen = _words(assembly, parts)
-    c = len(chosen)
-    width = max((len(word) for _, _, word in chosen), default=0)
-    padding = (len(parts) + len(assembly), False)
-    padded = [[*word, *[padding] * (width - len(word))] for _, _, word in chosen]
-    table = np.array(padded, dtype=np.intp).reshape(c, width, 2)
-    flats = {of: _flat(assembly.face(of)) for contact, _, _ in chosen for of in contact}
-    pairs = [(flats[contact.manipulated], flats[contact.environment]) for contact, _, _ in chosen]
-    laid = [_smaller(a, b) for a, b in pairs]
-    corners = [(a if own else b).corners for (a, b), own in zip(pairs, laid, strict=True)]
-    begin = np.cumsum([0, *map(len, corners)])
-    return Pattern(
-        words=tuple(word for _, _, word in chosen),
-        letters=np.array(table[..., 0]),
-        inverse=table[..., 1].astype(np.bool_),
-        made=np.array([made for _, made, _ in chosen], dtype=np.intp),
-        contact=np.repeat(np.arange(c), np.diff(begin)).astype(np.intp),
-        begin=begin.astype(np.intp),
-        plane=np.array([a.plane for a, _ in pairs]).reshape(-1, 4),
-        onto=np.array([b.plane for _, b in pairs]).reshape(-1, 4),
-        corners=np.concatenate([np.zeros((0, 4)), *(np.column_stack([v, np.ones(len(v))]) for v in corners)]),
-        laid=np.array(laid, dtype=np.bool_),
-        freed=tuple(
-            sorted({k - len(parts) for _, _, word in chosen for k, _ in word if k >= len(parts)}, reverse=True)
-        ),
-        opposing=np.array([_opposing(assembly, contact) for contact, _, _ in chosen]),
-    )
-
-
-def _opposing(assembly: Assembly, contact: Contact) -> float:
-    if not assembly.face(contact.manipulated).opposes:
-        return math.inf
-    tilts = (
-        contact in assembly.origin and contact_kind(*map(assembly.face_of, assembly.origin[contact])) == "cone on rim"
-    )
-    return 0.0 if tilts else OPPOSING
 
 
 def largest_gap(assembly: Assembly, start: Poses, goals: Array) -> float:
@@ -239,59 +167,3 @@ def largest_gap(assembly: Assembly, start: Poses, goals: Array) -> float:
 def largest(e: Array) -> float:
     """The largest |e|, 0 of none."""
     return float(np.max(np.abs(e), initial=0.0))
-
-
-def _words(assembly: Assembly, parts: tuple[str, ...]) -> list[tuple[Contact, int, ODL]]:
-    """Every contact ever made, the operation that made it, and D_a^-1 D_b, simplified.
-
-    Term k stands for the start of part k, then for the operations.
-    """
-    rooted = Assembly(assembly.solids, (*map(Operation, parts), *assembly.operations), assembly.fixed)
-    return [
-        (contact, k - len(parts), simplified((*inverted(D[contact.manipulated.part]), *D[contact.environment.part])))
-        for k, (operation, D) in enumerate(zip(rooted.operations, rooted.walk(), strict=True))
-        for contact in operation.contacts
-    ]
-
-
-_MOST_CORNERS = 8
-"""Of an outline with more, such as a circle, those farthest out in so many directions say as much."""
-
-
-class _Flat(NamedTuple):
-    """What the equations need of a face, measured once."""
-
-    corners: Array
-    plane: Array
-    area: float
-
-
-def _flat(face: Face) -> _Flat:
-    """Corners (k, 3), face equation of Eq. 1 (4,), area inside the outline (Newell's formula)."""
-    corners = face.outline
-    if face.stated_normal is not None:
-        return _Flat(corners, face.plane, 0.0)
-    twice = _cross(corners, np.concatenate([corners[1:], corners[:1]])).sum(axis=0)
-    size = math.sqrt(twice @ twice)
-    n = twice / size
-    return _Flat(_outermost(corners, n), np.append(n, -(corners @ n).sum() / len(corners)), size / 2)
-
-
-def _outermost(corners: Array, n: Array) -> Array:
-    """At most `_MOST_CORNERS` corners of an outline, in its order: any three that lie in no line fix its plane."""
-    if len(corners) <= _MOST_CORNERS:
-        return corners
-    x = corners[1] - corners[0]
-    x = x / math.sqrt(x @ x)
-    turn = 2.0 * np.pi * np.arange(_MOST_CORNERS) / _MOST_CORNERS
-    ways = np.outer(np.cos(turn), x) + np.outer(np.sin(turn), np.cross(n, x))
-    return np.asarray(corners[np.unique((corners @ ways.T).argmax(axis=0))])
-
-
-def _smaller(manipulated: _Flat, environment: _Flat) -> bool:
-    return environment.area > manipulated.area * (1 + 1e-9)
-
-
-def _cross(a: Array, b: Array) -> Array:
-    """Cross products, (m, 3): as `np.cross`, quicker on few rows."""
-    return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]

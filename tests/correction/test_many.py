@@ -7,12 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from apo_bench.assembly.pattern import pattern
 from numpy.testing import assert_allclose
 
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.pattern import pattern
 from apo_bench.assembly.topology import Gap
 from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.many import BATCH, correct_many

@@ -6,12 +6,12 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from apo_bench.assembly.pattern import looking_away, pattern
 from numpy.testing import assert_allclose
 
 from apo_bench.assembly.equations import largest_gap
 from apo_bench.assembly.goals import Demonstration, placements
 from apo_bench.assembly.outlier_model import OutlierModel
+from apo_bench.assembly.pattern import looking_away, pattern
 from apo_bench.correction.consistency import p_value
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.inferred import inferred_goals

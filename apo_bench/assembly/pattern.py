@@ -1,0 +1,172 @@
+"""What the contact equations of an assembly have in common, wherever its parts are; and which faces look away.
+
+The equations say that vertices of one face lie in the plane of the other, whichever way the two look: a cube upside
+down inside the table satisfies them as well as one that stands on it. So this is asked apart (`looking_away`). Nothing
+keeps a cone on a rim from tilting, so it may by up to a right angle; planes through an axis have no sense.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly.goals import Poses
+from apo_bench.assembly.kinds import OPPOSING, contact_kind
+from apo_bench.assembly.lowering import lowered
+from apo_bench.assembly.topology import ODL, Assembly, Contact, Operation, inverted, simplified
+from apo_bench.geometry.arrays import Array, remembered
+from apo_bench.geometry.solid import Face
+
+_MOST_CORNERS = 8
+"""Of an outline with more, such as a circle, those farthest out in so many directions say as much."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Pattern:
+    """What the equations of an assembly have in common, wherever its parts are: c contacts with m vertices."""
+
+    words: tuple[ODL, ...]
+    """D_a^-1 D_b of each contact, simplified; term k stands for the start of part k, then for the operations."""
+    letters: NDArray[np.intp]
+    """(c, w), as `Equations` has it; so are `inverse`, `made` and `contact`."""
+    inverse: NDArray[np.bool_]
+    made: NDArray[np.intp]
+    contact: NDArray[np.intp]
+    begin: NDArray[np.intp]
+    """(c + 1,): contact i has the vertices begin[i] .. begin[i + 1] - 1."""
+    plane: Array
+    """(c, 4): n of Eq. 1, frame of the manipulated part."""
+    onto: Array
+    """(c, 4): the plane of the other face, frame of the environment part."""
+    corners: Array
+    """(m, 4): the corners of the smaller face, homogeneous, in the frame of its own part."""
+    laid: NDArray[np.bool_]
+    """(c,): whether that is the manipulated face, so that its corners are laid onto the other one at the goals."""
+    freed: tuple[int, ...]
+    """The operations whose motion parameters occur, the most recent first."""
+    opposing: Array
+    """(c,): the largest cosine between normals of faces that look at each other; infinite of planes through an axis."""
+
+
+@remembered
+def pattern(assembly: Assembly) -> Pattern:
+    """What the equations of an assembly have in common; its contacts are those of `lowered(assembly)`."""
+    if (low := lowered(assembly)) is not assembly:
+        return pattern(low)
+    parts = tuple(assembly.solids)
+    chosen = _words(assembly, parts)
+    c = len(chosen)
+    width = max((len(word) for _, _, word in chosen), default=0)
+    padding = (len(parts) + len(assembly), False)
+    padded = [[*word, *[padding] * (width - len(word))] for _, _, word in chosen]
+    table = np.array(padded, dtype=np.intp).reshape(c, width, 2)
+    flats = {of: _flat(assembly.face(of)) for contact, _, _ in chosen for of in contact}
+    pairs = [(flats[contact.manipulated], flats[contact.environment]) for contact, _, _ in chosen]
+    laid = [environment.area > manipulated.area * (1 + 1e-9) for manipulated, environment in pairs]
+    corners = [(a if own else b).corners for (a, b), own in zip(pairs, laid, strict=True)]
+    begin = np.cumsum([0, *map(len, corners)])
+    return Pattern(
+        words=tuple(word for _, _, word in chosen),
+        letters=np.array(table[..., 0]),
+        inverse=table[..., 1].astype(np.bool_),
+        made=np.array([made for _, made, _ in chosen], dtype=np.intp),
+        contact=np.repeat(np.arange(c), np.diff(begin)).astype(np.intp),
+        begin=begin.astype(np.intp),
+        plane=np.array([a.plane for a, _ in pairs]).reshape(-1, 4),
+        onto=np.array([b.plane for _, b in pairs]).reshape(-1, 4),
+        corners=np.concatenate([np.zeros((0, 4)), *(np.column_stack([v, np.ones(len(v))]) for v in corners)]),
+        laid=np.array(laid, dtype=np.bool_),
+        freed=tuple(
+            sorted({k - len(parts) for _, _, word in chosen for k, _ in word if k >= len(parts)}, reverse=True)
+        ),
+        opposing=np.array([_opposing(assembly, contact) for contact, _, _ in chosen]),
+    )
+
+
+def _opposing(assembly: Assembly, contact: Contact) -> float:
+    if not assembly.face(contact.manipulated).opposes:
+        return math.inf
+    tilts = (
+        contact in assembly.origin and contact_kind(*map(assembly.face_of, assembly.origin[contact])) == "cone on rim"
+    )
+    return 0.0 if tilts else OPPOSING
+
+
+def looking_away(assembly: Assembly, start: Poses, goals: Array) -> NDArray[np.bool_]:
+    """Which contacts have faces that do not look at each other when they are made, (*, c), in the order of
+    `relations()`; those of round faces as `lowered` has them.
+
+    Args:
+        goals: (*, n, 4, 4), world frame, [m].
+    """
+    known = pattern(assembly)
+    constant = np.array([start[part] for part in assembly.solids]).reshape(-1, 4, 4)[:, :3, :3]
+    lead = goals.shape[:-3]
+    R = np.concatenate(
+        [
+            np.broadcast_to(constant, (*lead, *constant.shape)),
+            goals[..., :3, :3],
+            np.broadcast_to(np.eye(3), (*lead, 1, 3, 3)),
+        ],
+        axis=-3,
+    )
+    # The normal of a is carried along the word D_a^-1 D_b into the frame of b: n F_1 .. F_w, of the rotations alone.
+    turned = np.concatenate([R, np.swapaxes(R, -1, -2)], axis=-3)
+    rows = known.letters + known.inverse * R.shape[-3]
+    n = np.broadcast_to(known.plane[:, None, :3], (*lead, len(rows), 1, 3))
+    for j in range(rows.shape[1]):
+        n = n @ turned[..., rows[:, j], :, :]
+    return np.asarray((n[..., 0, :] * known.onto[:, :3]).sum(axis=-1) > known.opposing)
+
+
+def _words(assembly: Assembly, parts: tuple[str, ...]) -> list[tuple[Contact, int, ODL]]:
+    """Every contact ever made, the operation that made it, and D_a^-1 D_b, simplified.
+
+    Term k stands for the start of part k, then for the operations.
+    """
+    rooted = Assembly(assembly.solids, (*map(Operation, parts), *assembly.operations), assembly.fixed)
+    return [
+        (contact, k - len(parts), simplified((*inverted(D[contact.manipulated.part]), *D[contact.environment.part])))
+        for k, (operation, D) in enumerate(zip(rooted.operations, rooted.walk(), strict=True))
+        for contact in operation.contacts
+    ]
+
+
+class _Flat(NamedTuple):
+    """What the equations need of a face, measured once."""
+
+    corners: Array
+    plane: Array
+    area: float
+
+
+def _flat(face: Face) -> _Flat:
+    """Corners (k, 3), face equation of Eq. 1 (4,), area inside the outline (Newell's formula)."""
+    corners = face.outline
+    if face.stated_normal is not None:
+        return _Flat(corners, face.plane, 0.0)
+    # Newell: the sum of c_i x c_i+1 over the corners is twice the area along the normal.
+    twice = cross_rows(corners, np.concatenate([corners[1:], corners[:1]])).sum(axis=0)
+    size = math.sqrt(twice @ twice)
+    n = twice / size
+    return _Flat(_outermost(corners, n), np.append(n, -(corners @ n).sum() / len(corners)), size / 2)
+
+
+def _outermost(corners: Array, n: Array) -> Array:
+    """At most `_MOST_CORNERS` corners of an outline, in its order: any three that lie in no line fix its plane."""
+    if len(corners) <= _MOST_CORNERS:
+        return corners
+    x = corners[1] - corners[0]
+    x = x / math.sqrt(x @ x)
+    turn = 2.0 * np.pi * np.arange(_MOST_CORNERS) / _MOST_CORNERS
+    # Directions in the plane, evenly turned; the corner that is farthest out along each of them is kept.
+    ways = np.outer(np.cos(turn), x) + np.outer(np.sin(turn), np.cross(n, x))
+    return np.asarray(corners[np.unique((corners @ ways.T).argmax(axis=0))])
+
+
+def cross_rows(a: Array, b: Array) -> Array:
+    """Cross products, (m, 3): as `np.cross`, quicker on few rows."""
+    return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
