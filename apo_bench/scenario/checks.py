@@ -15,6 +15,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.intrusion import intrusion
 from apo_bench.geometry.mate import mate
 from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry.solid import Face
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.order import check_order
 from apo_bench.scenario.scenario import Scenario
@@ -26,6 +27,7 @@ _ANGLE_DEG = 0.01
 """Normals of faces that are said to touch are opposite within this, and axes parallel."""
 _NO_PLAY_MM = 1e-6
 """A shaft with less play is as thick as its hole."""
+_ALONG = "vary along an axis that no contact fixes"
 _INTRUSION_M = 1e-6
 """Parts that only touch are less deep in each other."""
 
@@ -131,30 +133,40 @@ def _stays(scenario: Scenario, contact: Contact) -> bool:
 
 
 def _check_contact(scenario: Scenario, file: str, case: _Case, key: str, contact: Contact, poses: Poses) -> None:
-    if scenario.assembly.is_round(contact):
-        _check_round(scenario, file, case, key, contact, poses)
-        return
-    face = scenario.assembly.face(contact.manipulated)
-    on = scenario.assembly.face(contact.environment)
-    T_face = poses[contact.manipulated.part]
-    T_on = poses[contact.environment.part]
-    n_face = T_face[:3, :3] @ face.normal
-    n_on = T_on[:3, :3] @ on.normal
-    angle = _angle_deg(n_face, -n_on)
+    """Faces look at each other, meet, and cover some of each other."""
+    a, b = map(scenario.assembly.face_of, contact)
+    T_a, T_b = (poses[of.part] for of in contact)
+    kind = contact_kind(a, b)
+    if isinstance(a, Face) and isinstance(b, Face):
+        n = T_b[:3, :3] @ b.normal
+        angle = _angle_deg(T_a[:3, :3] @ a.normal, -n)
+        height = float(n @ (pose.apply(T_a, a.outline).mean(axis=0) - pose.apply(T_b, b.outline[:1])[0]))
+        apart = abs(height)
+        tilted = f"the faces look {180 - angle:.4g} degrees apart"
+        straighten = "180 are needed: turn the part, or name faces that look at each other"
+        off = f"the faces are {1e3 * apart:.4g} mm {'apart' if height > 0 else 'too deep'}"
+        meet = "move a goal until they meet exactly"
+        beside = "the faces lie in one plane but do not overlap"
+        common = overlap(a, T_a, b, T_b)
+    else:
+        touch = mate(a, T_a, b, T_b)
+        angle = 0.0 if kind == "cone on rim" else float(np.degrees(touch.angle_rad))
+        apart = touch.gap_m
+        what = "the axis is tilted against the plane" if kind == "shaft on plane" else "the axes are turned"
+        tilted = f"{what} by {angle:.4g} degrees"
+        straighten = "0 are needed: turn the part"
+        off = _apart(kind, 1e3 * apart)
+        meet = "move a goal until they meet"
+        beside = "the faces have no length in common"
+        common = touch.common
+    varied = "vary" in case.key
     if angle > _ANGLE_DEG:
-        sentence = f"'{contact}': the faces look {180 - angle:.4g} degrees apart"
-        raise _refuse(file, case, key, sentence, "180 are needed: turn the part, or name faces that look at each other")
-    gap = float(n_on @ (pose.apply(T_face, face.outline).mean(axis=0) - pose.apply(T_on, on.outline[:1])[0]))
-    if abs(gap) > _GAP_M:
-        sentence = f"'{contact}': the faces are {1e3 * abs(gap):.4g} mm {'apart' if gap > 0 else 'too deep'}"
-        remedy = (
-            "vary along an axis that no contact fixes" if "vary" in case.key else "move a goal until they meet exactly"
-        )
-        raise _refuse(file, case, key, sentence, remedy)
-    if not overlap(face, T_face, on, T_on):
-        sentence = f"'{contact}': the faces lie in one plane but do not overlap"
-        remedy = "vary by less" if "vary" in case.key else "move a goal until they do, or take the contact out"
-        raise _refuse(file, case, key, sentence, remedy)
+        raise _refuse(file, case, key, f"'{contact}': {tilted}", straighten)
+    if apart > _GAP_M:
+        raise _refuse(file, case, key, f"'{contact}': {off}", _ALONG if varied else meet)
+    if not common:
+        remedy = "vary by less" if varied else "move a goal until they do, or take the contact out"
+        raise _refuse(file, case, key, f"'{contact}': {beside}", remedy)
 
 
 def without_play(assembly: Assembly, clearance_mm: float) -> tuple[Contact, str] | None:
@@ -191,24 +203,6 @@ def _check_play(scenario: Scenario, file: str) -> None:
             f"{file}, operation {k + 1}, contacts, contact {number}: {sentence}; make the hole wider, or mark it as "
             "fit and give a clearance."
         )
-
-
-def _check_round(scenario: Scenario, file: str, case: _Case, key: str, contact: Contact, poses: Poses) -> None:
-    m, e = contact
-    face_of = scenario.assembly.face_of
-    kind = contact_kind(face_of(m), face_of(e))
-    touch = mate(face_of(m), poses[m.part], face_of(e), poses[e.part])
-    angle = float(np.degrees(touch.angle_rad))
-    if angle > _ANGLE_DEG and kind != "cone on rim":
-        what = "the axis is tilted against the plane" if kind == "shaft on plane" else "the axes are turned"
-        raise _refuse(file, case, key, f"'{contact}': {what} by {angle:.4g} degrees", "0 are needed: turn the part")
-    if touch.gap_m > _GAP_M:
-        remedy = "vary along an axis that no contact fixes" if "vary" in case.key else "move a goal until they meet"
-        raise _refuse(file, case, key, f"'{contact}': {_apart(kind, 1e3 * touch.gap_m)}", remedy)
-    if not touch.common:
-        sentence = f"'{contact}': the faces have no length in common"
-        remedy = "vary by less" if "vary" in case.key else "move a goal until they do, or take the contact out"
-        raise _refuse(file, case, key, sentence, remedy)
 
 
 def _apart(kind: ContactKind | None, gap_mm: float) -> str:
