@@ -15,8 +15,8 @@ from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Face
 from apo_bench.parts.making.body import Body
 from apo_bench.parts.making.cells import bands, bore_cell, clipped, convex_cells, wedges
-from apo_bench.parts.making.frustums import Frustum, at_height, heights_of, tangent
-from apo_bench.parts.making.moments import Moments, extruded
+from apo_bench.parts.making.frustums import Frustum, at_height, chamfered, heights_of, prism, raised, tangent, without
+from apo_bench.parts.making.moments import extruded
 from apo_bench.parts.making.outline import Outline, arc_of, circle, goes_on, outline_moments, receding, ring
 
 _NARROW_MM = 6e-3
@@ -55,14 +55,8 @@ def bore(
 
     The chamfers of `name` are called `name_chamfer_low` and `name_chamfer_high`.
     """
-    a = chamfer_low
-    b = chamfer_high
-    steps = [Frustum(low + a, high - b, radius, name=name, fit=fit, sides=sides)]
-    if a:
-        steps.insert(0, Frustum(low, low + a, radius + a, radius, name and f"{name}_chamfer_low", sides=sides))
-    if b:
-        steps.append(Frustum(high - b, high, radius, radius + b, name and f"{name}_chamfer_high", sides=sides))
-    return Bore(at, tuple(steps))
+    wall = Frustum(low, high, radius, name=name, fit=fit, sides=sides)
+    return Bore(at, tuple(chamfered(wall, chamfer_low, chamfer_high, 1.0)))
 
 
 def extrude(
@@ -102,17 +96,17 @@ def extrude(
         return extrude(outline, low, high, holes=[*holes, hole], bores=others, bottom=bottom, top=top, fit=fit)
     for cell in cells:
         rest = rest.difference(Polygon(cell))
-    prisms = [_prism(cell, low, high) for cell in (*beside, *convex_cells(rest))]
+    prisms = [prism(cell, low, high) for cell in (*beside, *convex_cells(rest))]
     flat = outline_moments(outline)
     for hole in holes:
         flat = flat.plus(outline_moments(hole), -1.0)
     moments = extruded(flat, low, high)
     for each in bores:
-        for step in each.steps:
-            moments = moments.plus(step.moments().moved(np.eye(3), np.array([*each.at, 0.0])), -1.0)
+        moments = without(moments, each.steps, each.at)
     pieces = [*prisms, *(piece for b, cell in zip(bores, cells, strict=True) for piece in _bored(b, cell, low, high))]
-    flats = [*_sides(outline, low, high, False)[0], *(f for h in holes for f in _sides(h, low, high, True)[0])]
-    rounds = [*_sides(outline, low, high, False)[1], *(f for h in holes for f in _sides(h, low, high, True)[1])]
+    sides = [_sides(outline, low, high, False), *(_sides(hole, low, high, True) for hole in holes)]
+    flats = [flat for own, _ in sides for flat in own]
+    rounds = [wall for _, own in sides for wall in own]
     rounds += [step.wall(each.at, hole=True) for each in bores for step in each.steps]
     flats += _ends(outline, holes, bores, low, high, bottom, top, fit)
     flats += [face for each in bores for face in _ledges(each, low, high)]
@@ -120,7 +114,7 @@ def extrude(
         tuple(Hull("", 1e-3 * piece) for piece in pieces),
         tuple(flats),
         tuple(rounds),
-        Moments(1e-9 * moments.size, 1e-12 * moments.first, 1e-15 * moments.second),
+        moments.in_metres,
     )
 
 
@@ -166,21 +160,13 @@ def _bored(each: Bore, cell: Array, low: float, high: float) -> Iterator[Array]:
     for a, b in pairwise(heights):
         step = next((s for s in each.steps if s.part(a, b)), None)
         if step is None:
-            yield _prism(cell, a, b)
+            yield prism(cell, a, b)
             continue
         r_a = step.at(a)
         r_b = step.at(b)
         for n, area in wedges(cell, at, step.count):
             ends = [clipped(area, -n, -float(n @ at) - r) for r in (r_a, r_b)]
-            yield np.concatenate([_raised(_each_once(end), z) for end, z in zip(ends, (a, b), strict=True)])
-
-
-def _prism(cell: Array, low: float, high: float) -> Array:
-    return np.concatenate([_raised(cell, low), _raised(cell, high)])
-
-
-def _raised(flat: Array, z: float) -> Array:
-    return np.column_stack([flat, np.full(len(flat), z)])
+            yield np.concatenate([raised(_each_once(end), z) for end, z in zip(ends, (a, b), strict=True)])
 
 
 def _each_once(flat: Array) -> Array:
@@ -258,7 +244,7 @@ def _ledges(each: Bore, low: float, high: float) -> Iterator[Face]:
 
 def flat_face(name: str, outline: Array, holes: Sequence[Array], z: float, up: bool, fit: bool = False) -> Face:
     """A level face from rings in mm, all counter-clockwise, that looks up or down."""
-    turned = [1e-3 * _raised(straightened(each), z) for each in (outline, *holes)]
+    turned = [1e-3 * raised(straightened(each), z) for each in (outline, *holes)]
     if up:
         return Face(name, turned[0], tuple(hole[::-1] for hole in turned[1:]), fit)
     return Face(name, turned[0][::-1], tuple(turned[1:]), fit)

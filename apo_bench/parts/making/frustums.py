@@ -1,7 +1,7 @@
 """Lengths of bores and shafts: how wide they are, from where to where along their axis."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
@@ -66,6 +66,43 @@ class Frustum:
         point = np.array([1e-3 * at[0], 1e-3 * at[1], 0.0])
         axis = np.array([0.0, 0.0, 1.0])
         return RoundFace(self.name, point, axis, span, (1e-3 * a, 1e-3 * b), hole, self.fit)
+
+
+def chamfered(wall: Frustum, at_low: float, at_high: float, sign: float) -> list[Frustum]:
+    """A cylinder with chamfers of 45 degrees in its length, [mm]; those of `name` are `name_chamfer_low` and `.._high`.
+
+    Args:
+        at_low: How long the chamfer at its beginning is; 0: there is none.
+        sign: 1 if they are wider than the cylinder, as in a bore, -1 if they are narrower, as on a shaft.
+    """
+    r = wall.radius
+    called = wall.name and f"{wall.name}_chamfer"
+    plain = replace(wall, fit=False)
+    steps = [replace(wall, low=wall.low + at_low, high=wall.high - at_high)]
+    if at_low:
+        begin = replace(plain, high=wall.low + at_low, radius=r + sign * at_low, end_radius=r)
+        steps.insert(0, replace(begin, name=called and f"{called}_low"))
+    if at_high:
+        end = replace(plain, low=wall.high - at_high, end_radius=r + sign * at_high)
+        steps.append(replace(end, name=called and f"{called}_high"))
+    return steps
+
+
+def without(moments: Moments, steps: Sequence[Frustum], at: tuple[float, float] = (0.0, 0.0)) -> Moments:
+    """What is left of moments without those of some lengths about an axis along z."""
+    for step in steps:
+        moments = moments.plus(step.moments().moved(np.eye(3), np.array([*at, 0.0])), -1.0)
+    return moments
+
+
+def raised(flat: Array, z: float) -> Array:
+    """Points of a plane, (k, 2), at a height, (k, 3)."""
+    return np.column_stack([flat, np.full(len(flat), z)])
+
+
+def prism(flat: Array, low: float, high: float) -> Array:
+    """The corners, (2 k, 3), of a prism over points of a plane, (k, 2)."""
+    return np.concatenate([raised(flat, low), raised(flat, high)])
 
 
 def at_height(steps: Sequence[Frustum], height: float, above: bool) -> tuple[float, int]:

@@ -28,6 +28,11 @@ class Moments(NamedTuple):
         return Moments(self.size, m + self.size * t, second)
 
     @property
+    def in_metres(self) -> Moments:
+        """Of a solid whose lengths are in mm."""
+        return Moments(1e-9 * self.size, 1e-12 * self.first, 1e-15 * self.second)
+
+    @property
     def centroid(self) -> Array:
         return np.asarray(self.first / self.size)
 

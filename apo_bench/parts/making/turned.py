@@ -13,8 +13,16 @@ from apo_bench.geometry.solid import Face
 from apo_bench.parts.making.body import Body
 from apo_bench.parts.making.cells import clipped, wedges
 from apo_bench.parts.making.extrude import flat_face
-from apo_bench.parts.making.frustums import Frustum, at_height, heights_of, inscribed, tangent
-from apo_bench.parts.making.moments import Moments
+from apo_bench.parts.making.frustums import (
+    Frustum,
+    at_height,
+    chamfered,
+    heights_of,
+    inscribed,
+    raised,
+    tangent,
+    without,
+)
 
 _SAME_MM = 1e-6
 _NARROW_MM = 6e-3
@@ -42,15 +50,13 @@ def turned(
     moments = outer[0].moments()
     for step in outer[1:]:
         moments = moments.plus(step.moments())
-    for step in inner:
-        moments = moments.plus(step.moments(), -1.0)
     pieces = [p for a, b in pairwise(heights) for p in _length(outer, inner, a, b)]
     rounds = [step.wall((0.0, 0.0), hole) for steps, hole in ((outer, False), (inner, True)) for step in steps]
     return Body(
         tuple(pieces),
         tuple(face for z in heights for face in _flats(outer, inner, z, (flats or {}).get(z, ""), fit)),
         tuple(rounds),
-        Moments(1e-9 * moments.size, 1e-12 * moments.first, 1e-15 * moments.second),
+        without(moments, inner).in_metres,
     )
 
 
@@ -66,13 +72,7 @@ def shaft(
     top: str = "",
 ) -> Body:
     """A cylinder along z with chamfers of 45 degrees, [mm]; those of `name` are `name_chamfer_low` and `..._high`."""
-    a = chamfer_low
-    b = chamfer_high
-    steps = [Frustum(low + a, high - b, radius, name=name)]
-    if a:
-        steps.insert(0, Frustum(low, low + a, radius - a, radius, name and f"{name}_chamfer_low"))
-    if b:
-        steps.append(Frustum(high - b, high, radius, radius - b, name and f"{name}_chamfer_high"))
+    steps = chamfered(Frustum(low, high, radius, name=name), chamfer_low, chamfer_high, -1.0)
     return turned(steps, flats={low: bottom, high: top})
 
 
@@ -95,14 +95,14 @@ def _length(outer: Sequence[Frustum], inner: Sequence[Frustum], a: float, b: flo
         cells = [wedges(inscribed((0.0, 0.0), r, n), np.zeros(2), n) for r in (low, high)]
         for (u, first), (_, last) in zip(*cells, strict=True):
             ends = [(clipped(first, -u, -bore.at(a)), a), (clipped(last, -u, -bore.at(b)), b)]
-            yield Hull("", 1e-3 * np.concatenate([np.column_stack([c, np.full(len(c), z)]) for c, z in ends]))
+            yield Hull("", 1e-3 * np.concatenate([raised(*end) for end in ends]))
 
 
 def _ring(radius: float, sides: int, z: float) -> Array:
     """The corners of a level polygon on a circle; its middle, if it is a point."""
     if radius < _SAME_MM:
         return np.array([[0.0, 0.0, z]])
-    return np.column_stack([inscribed((0.0, 0.0), radius, sides), np.full(sides, z)])
+    return raised(inscribed((0.0, 0.0), radius, sides), z)
 
 
 def _flats(
