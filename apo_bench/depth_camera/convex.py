@@ -28,6 +28,7 @@ def convex_of(hull: Hull) -> Convex:
     if hull.cylinder is not None:
         moved = hull.cylinder._replace(center=hull.cylinder.center - hull.center)
         return Convex(planes, np.zeros((0, 2, 3)), moved)
+    # Two corners are the ends of an edge if at least two planes go through both.
     corners = hull.corners - hull.center
     on = np.abs(corners @ planes[:, :3].T - planes[:, 3]) < 100 * _ON_M
     shared = on.astype(np.int64) @ on.T.astype(np.int64)
@@ -55,6 +56,7 @@ def convex_distance(convex: Convex, points: Array) -> tuple[Array, Array]:
         return _cylinder_distance(convex.cylinder, points)
     n = convex.planes[:, :3]
     d = convex.planes[:, 3]
+    # Over a side the farthest plane says the distance; where its foot is beyond another plane, the nearest edge does.
     room = points @ n.T - d
     first = room.argmax(axis=1)
     distance = room[np.arange(len(points)), first]
@@ -84,6 +86,7 @@ def _nearest_on_edges(edges: Array, points: Array) -> Array:
 
 
 def _cylinder_distance(cylinder: Cylinder, points: Array) -> tuple[Array, Array]:
+    # Along the axis and across it: beyond the mantle, beyond an end, or beyond both, then from the rim.
     off = points - cylinder.center
     z = off @ cylinder.axis
     across = off - z[:, None] * cylinder.axis
@@ -99,6 +102,7 @@ def _cylinder_distance(cylinder: Cylinder, points: Array) -> tuple[Array, Array]
 
 def convex_passage(convex: Convex, start: Array, ways: Array) -> tuple[Array, Array]:
     """Where rays, (n, 3), from a point enter a piece, and where they leave it, (n,) each; sooner if they miss."""
+    # n . (s + t w) = d at t = (d - n . s) / (n . w): entered by planes against the way, left by planes along it.
     rate = ways @ convex.planes[:, :3].T
     room = convex.planes[:, 3] - convex.planes[:, :3] @ start
     with np.errstate(divide="ignore", invalid="ignore"):

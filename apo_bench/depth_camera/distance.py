@@ -84,6 +84,8 @@ def _first_of_all(least: Array) -> list[int]:
 
 def _box_distance(shape: Shape, points: Array) -> tuple[Array, Array]:
     """`signed_distance` of boxes alone."""
+    # In the axes of each box, (*, k, 3): outside, the distance is the length of what is beyond its sides; inside, the
+    # depth under the nearest side.
     local = np.einsum("...ki,kij->...kj", points[..., None, :] - shape.center, shape.turn)
     beyond = np.abs(local) - shape.half
     outside = np.maximum(beyond, 0.0)
@@ -108,6 +110,7 @@ def strike_distances(shape: Shape, origin: Array, rays: Array) -> tuple[Array, N
         origin: (3,), frame of the shape, outside of it, [m].
         rays: (n, 3), unit vectors.
     """
+    # A ray o + t w is in a box where |o + t w| <= half along all axes: from the last entry to the first exit (slabs).
     best = np.full(len(rays), np.inf)
     which = np.full(len(rays), -1, dtype=np.int64)
     for k, (center, half, turn) in enumerate(zip(*shape[:3], strict=True)):
@@ -131,6 +134,7 @@ def strike_distances(shape: Shape, origin: Array, rays: Array) -> tuple[Array, N
 
 def _in_cone(to: Array, radius: float, rays: Array) -> NDArray[np.int64]:
     """The rays that may meet a ball at `to`, (3,), seen from where they begin."""
+    # The tangents from here meet the ball at a distance sqrt(far^2 - radius^2), which is far times their cosine.
     far = float(np.linalg.norm(to))
     if far <= radius:
         return np.arange(len(rays))

@@ -12,9 +12,8 @@ from apo_bench.assembly.topology import Assembly
 from apo_bench.depth_camera.convex import alike
 from apo_bench.depth_camera.distance import Shape, join_shapes, shape_of, strike_distances
 from apo_bench.depth_camera.locate import ALIKE, Appearance, LocatedModel, Model, locate, model_shares
-from apo_bench.depth_camera.range_finder import RangeFinder
+from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder
 from apo_bench.depth_camera.regions import Regions, regions
-from apo_bench.depth_camera.view import View
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_pieces
@@ -149,7 +148,7 @@ def _gone(owners: Sequence[NDArray[np.int64]], parts: tuple[str, ...], compared:
     return frozenset(part for part, n, m in zip(parts, seen, gone, strict=True) if n and m >= _GONE * n)
 
 
-def _owners(view: View, shapes: Mapping[str, Shape], believed: Poses) -> NDArray[np.int64]:
+def _owners(view: PinholeView, shapes: Mapping[str, Shape], believed: Poses) -> NDArray[np.int64]:
     """Which part every few pixels of a view should show, by number, -1 for none."""
     owner = np.concatenate([np.full(len(shape.center), i) for i, shape in enumerate(shapes.values())])
     scene = join_shapes(_posed(shape, believed[part]) for part, shape in shapes.items())
@@ -203,8 +202,5 @@ def _alike(a: Shape, b: Shape) -> bool:
 
 def _turned(found: LocatedModel, T: Array) -> Array:
     """The covariance of a pose that looks the same: body twists turn along, S^-1 xi S."""
-    S = pose.inverse(T) @ found.T
-    A = np.zeros((6, 6))
-    A[:3, :3] = A[3:, 3:] = S[:3, :3]
-    A[:3, 3:] = pose.hat(S[:3, 3]) @ S[:3, :3]
+    A = pose.adjoint(pose.inverse(T) @ found.T)
     return np.asarray(A @ found.covariance @ A.T)

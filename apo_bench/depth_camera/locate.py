@@ -8,12 +8,10 @@ from typing import final
 import numpy as np
 
 from apo_bench.depth_camera.distance import Shape, signed_distance
-from apo_bench.depth_camera.explained import share_explained
-from apo_bench.depth_camera.fit import Fits, Points, covariance, refine
-from apo_bench.depth_camera.regions import Mask, median_filtered
-from apo_bench.depth_camera.starts import starts
-from apo_bench.depth_camera.view import View
-from apo_bench.geometry.arrays import Array
+from apo_bench.depth_camera.fit import Points, ShapeFits, covariance, refine, starts
+from apo_bench.depth_camera.range_finder import PinholeView
+from apo_bench.depth_camera.regions import Mask, median_filtered, share_explained
+from apo_bench.geometry.arrays import Array, frozen
 
 _COARSE = 150
 _MIDDLE = 500
@@ -23,9 +21,8 @@ _BEST = 4
 """Starts that are followed further: one fit in some ends beside the true place, so never only one."""
 _WIDTH_M = 0.0015
 """Points this far away from a surface are half doubted; three standard deviations if that is more."""
-_WELL_SEEN = np.array([0.001] * 3 + [np.radians(1.0)] * 3)
+_WELL_SEEN = frozen([0.001] * 3 + [np.radians(1.0)] * 3, 6)
 """A main part that is known this well by its own points needs no help of what it carries, [m, rad]."""
-_WELL_SEEN.flags.writeable = False
 _WIDE_M = 0.012
 """The width at which a fit begins; it is narrowed from there, so that no end of a part is left behind."""
 _LEAST_EXPLAINED = 0.6
@@ -52,7 +49,7 @@ class Model:
 class Appearance:
     """What appeared between two firings."""
 
-    views: Sequence[View]
+    views: Sequence[PinholeView]
     images: Array
     """(views, height, width), the later images, [m]."""
     masks: Sequence[Mask]
@@ -66,14 +63,14 @@ class Appearance:
 
         at = []
         rays = []
-        number = []
+        numbers = []
         for v, (view, image, mask) in enumerate(zip(self.views, self.images, self.masks, strict=True)):
             pixels = np.flatnonzero(binary_erosion(mask) & np.isfinite(image))
             ray = view.rays[pixels]
             at.append(view.origin + image.ravel()[pixels, None] * ray)
             rays.append(ray)
-            number.append(np.full(len(pixels), v))
-        return Points(np.concatenate(at), np.concatenate(rays), np.concatenate(number))
+            numbers.append(np.full(len(pixels), v))
+        return Points(*map(np.concatenate, (at, rays, numbers)))
 
     @cached_property
     def smooth(self) -> Array:
@@ -136,7 +133,7 @@ def _fine(shape: Shape, appearance: Appearance, points: Points, T: Array) -> tup
     return T, covariance(shape, points, T, appearance.width_m, appearance.noise_m, appearance.bias_m)
 
 
-def _coarse(model: Model, appearance: Appearance, points: Points) -> Fits:
+def _coarse(model: Model, appearance: Appearance, points: Points) -> ShapeFits:
     """The best few of the fits from all starts."""
     begun = starts(model.shape, points.at, model.same)
     first = refine(model.shape, points.thinned(_COARSE), begun, max(_WIDE_M, 3.0 * appearance.width_m), 10)

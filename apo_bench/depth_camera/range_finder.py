@@ -1,16 +1,50 @@
-"""The range finder: where its views stand, and what its sensor makes of true distances."""
+"""The range finder: its pinhole views, where they stand, and what its sensor makes of true distances."""
 
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import NamedTuple, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from apo_bench.depth_camera.view import View, look_at
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, frozen
 
 VIEWED_POINT_M = (0.05, 0.0, 0.03)
 """The point of the table that all views look at."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PinholeView:
+    """A pinhole camera: its pose, and how it divides its picture into pixels."""
+
+    T_world_view: Array
+    """(4, 4), [m]; x to the right of the picture, y down, z along the optical axis."""
+    width: int
+    height: int
+    fov_deg: float
+    """Vertical opening angle."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "T_world_view", frozen(self.T_world_view, 4, 4))
+
+    @property
+    def origin(self) -> Array:
+        """Where all rays begin, (3,), world, [m]."""
+        return self.T_world_view[:3, 3]
+
+    @cached_property
+    def rays(self) -> Array:
+        """Unit vectors through the middles of the pixels, row by row, (height * width, 3), world."""
+        # A pixel at (u, v) looks along (u - middle, v - middle, focal), focal the distance of the picture in pixels.
+        focal = self.height / 2 / np.tan(np.radians(self.fov_deg) / 2)
+        v, u = np.mgrid[: self.height, : self.width]
+        x = (u + 0.5 - self.width / 2) / focal
+        y = (v + 0.5 - self.height / 2) / focal
+        rays = np.stack([x, y, np.ones_like(x)], axis=-1).reshape(-1, 3) @ self.T_world_view[:3, :3].T
+        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+        rays.flags.writeable = False
+        return rays
 
 
 class RangeImage(NamedTuple):
@@ -22,8 +56,21 @@ class RangeImage(NamedTuple):
     """The cosine of the angle between the ray and the normal of what it strikes, 0 (grazing) to 1."""
 
 
+def look_at(from_m: ArrayLike, at_m: ArrayLike) -> Array:
+    """The pose (4, 4) of a camera that stands at a point, looks at another and holds its picture upright, [m]."""
+    origin = np.asarray(from_m, dtype=np.float64)
+    at = np.asarray(at_m, dtype=np.float64)
+    z = (at - origin) / np.linalg.norm(at - origin)
+    x = np.cross(z, (0.0, 0.0, 1.0))
+    x /= np.linalg.norm(x)
+    T = np.eye(4)
+    T[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
+    T[:3, 3] = origin
+    return T
+
+
 @lru_cache(maxsize=4)
-def _two_views(width: int = 400, height: int = 300) -> tuple[View, ...]:
+def _two_views(width: int = 400, height: int = 300) -> tuple[PinholeView, ...]:
     """From the left in front and from the right behind, 45 degrees high: together they see every side of a part.
 
     One view is not enough: of a stick that lies in a tower only its ends can be seen, and only one of them from
@@ -33,7 +80,7 @@ def _two_views(width: int = 400, height: int = 300) -> tuple[View, ...]:
     height_m = 0.67
     at = np.array(VIEWED_POINT_M)
     ways = (np.array([side * 0.707 * reach, side * 0.707 * reach, height_m]) for side in (1.0, -1.0))
-    return tuple(View(look_at(at + way, at), width, height, 48.0) for way in ways)
+    return tuple(PinholeView(look_at(at + way, at), width, height, 48.0) for way in ways)
 
 
 @final
@@ -41,7 +88,7 @@ def _two_views(width: int = 400, height: int = 300) -> tuple[View, ...]:
 class RangeFinder:
     """A range finder and its errors. A level of L mm means a standard deviation of L mm per ray."""
 
-    views: tuple[View, ...] = field(default_factory=_two_views)
+    views: tuple[PinholeView, ...] = field(default_factory=_two_views)
     bias: float = 0.1
     """Standard deviation, over the level, of an error that all rays of one view and firing have in common: white noise
     averages out over a part, so this is what stays; a tenth, as repeated measurements of a fixed object differ by 0.1

@@ -10,12 +10,11 @@ from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.assembly.topology import Assembly
 from apo_bench.depth_camera.follow import Event, Expected, follow_demonstration
 from apo_bench.depth_camera.range_finder import RangeFinder, RangeImage
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.observation.models.isotropic import floored
 
-_UNSEEN = np.diag(np.repeat([0.1, 1.0], 3) ** 2)
+_UNSEEN = frozen(np.diag(np.repeat([0.1, 1.0], 3) ** 2), 6, 6)
 """The covariance that stands beside an operation that was not seen, [m, rad]."""
-_UNSEEN.flags.writeable = False
 
 
 @final
@@ -44,8 +43,8 @@ class RangeSensor:
         covariance = np.repeat(_UNSEEN[None], len(assembly), axis=0)
         seen = np.zeros(len(assembly), dtype=np.bool_)
         for event in events:
-            if event.found is not None and event.operation is not None:
-                k = event.operation
+            k = event.operation
+            if event.found is not None and k is not None:
                 goals[k] = event.found.T
                 covariance[k] = event.found.covariance
                 seen[k] = True

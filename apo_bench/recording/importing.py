@@ -22,7 +22,7 @@ from apo_bench.recording.doubts import check_arrangement, check_direction, uncle
 from apo_bench.recording.log import PoseTrack
 from apo_bench.recording.operations import SeenOperation, seen_operation
 from apo_bench.recording.ordering import NoOrder, Stated
-from apo_bench.recording.rests import Rest, least_rest_s
+from apo_bench.recording.rests import RestSpan, least_rest_s
 from apo_bench.recording.stays import Stay, Stays, all_stays
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario
@@ -151,7 +151,7 @@ def _imported(
     )
 
 
-def _covariance(rest: Rest | None, camera: CameraFile) -> Array:
+def _covariance(rest: RestSpan | None, camera: CameraFile) -> Array:
     """(6, 6), of the goal that a rest shows: what frames differ by averages out, what stays does not."""
     if rest is None:
         return np.diag(UNSEEN_DEVIATION**2)

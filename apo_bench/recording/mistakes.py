@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.recording.camera_file import CameraFile
-from apo_bench.recording.rests import Rest
+from apo_bench.recording.rests import RestSpan
 from apo_bench.recording.stays import Stay, Stays
 
 _OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
@@ -69,7 +69,7 @@ def reversed_in_time(stays: Stays) -> Stays:
     """The same, played backwards."""
     end = max(stay.ends for known in stays.values() for stay in known)
 
-    def backwards(rest: Rest) -> Rest:
+    def backwards(rest: RestSpan) -> RestSpan:
         return replace(rest, begins=end - rest.ends, ends=end - rest.begins)
 
     return {
@@ -81,7 +81,7 @@ def reversed_in_time(stays: Stays) -> Stays:
 def _changed(stays: Stays, models: Mapping[str, Array], change: Callable[[Array, Array], Array]) -> Stays:
     """The stays of the same parts at other poses, which change says from a pose and the frame of its part, (4, 4)."""
 
-    def other(part: str, rest: Rest) -> Rest:
+    def other(part: str, rest: RestSpan) -> RestSpan:
         return replace(rest, mean=replace(rest.mean, T=change(rest.T, models.get(part, _SAME))))
 
     return {

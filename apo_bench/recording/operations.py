@@ -15,7 +15,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.recording.log import PoseTrack
 from apo_bench.recording.ordering import quiet, taken
-from apo_bench.recording.rests import Rest
+from apo_bench.recording.rests import RestSpan
 from apo_bench.recording.stays import Stay, Stays, poses_at
 from apo_bench.scenario.nominal import nominal_operations
 from apo_bench.scenario.scenario import Scenario
@@ -38,7 +38,7 @@ class SeenOperation:
 
     stay: Stay | None
     """Where its main part stayed; None if it was not seen."""
-    rest: Rest | None
+    rest: RestSpan | None
     """The rest of it that is the goal: that at which the next operation began."""
     path: PoseTrack | None
     """Of the main part, from its stay before to this one, world."""

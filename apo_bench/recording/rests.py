@@ -44,7 +44,7 @@ _Span = tuple[int, int]
 
 @final
 @dataclass(frozen=True, eq=False)
-class Rest:
+class RestSpan:
     """A stretch of a track in which the part rests."""
 
     first: int
@@ -64,7 +64,7 @@ class Rest:
         return self.mean.T
 
 
-def rests_of(track: PoseTrack) -> tuple[Rest, ...]:
+def rests_of(track: PoseTrack) -> tuple[RestSpan, ...]:
     """The rests of a track, in order of time: looked for in frames that are new, averaged over all."""
     stride = _stride(track)
     t = track.t[::stride]
@@ -83,7 +83,7 @@ def rests_of(track: PoseTrack) -> tuple[Rest, ...]:
     means = [average(track.T[a : b + 1]) for a, b in spans]
     common = common_scatter(means)
     return tuple(
-        Rest(a, b, float(track.t[a]), float(track.t[b]), pooled_mean(mean, common))
+        RestSpan(a, b, float(track.t[a]), float(track.t[b]), pooled_mean(mean, common))
         for (a, b), mean in zip(spans, means, strict=True)
     )
 

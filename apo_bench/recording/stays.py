@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.recording.log import PoseTrack
-from apo_bench.recording.rests import Rest, rests_of
+from apo_bench.recording.rests import RestSpan, rests_of
 
 _ADJUSTED_M = 0.01
 _ADJUSTED_RAD = np.radians(10.0)
@@ -24,7 +24,7 @@ class Stay:
     """A part at one place, adjusted or not."""
 
     part: str
-    rests: tuple[Rest, ...]
+    rests: tuple[RestSpan, ...]
 
     @property
     def begins(self) -> float:
@@ -38,7 +38,7 @@ class Stay:
     def seconds(self) -> float:
         return sum(rest.seconds for rest in self.rests)
 
-    def at(self, t: float) -> Rest:
+    def at(self, t: float) -> RestSpan:
         """The rest at a time, else the last one before it."""
         return next((rest for rest in reversed(self.rests) if rest.begins <= t), self.rests[0])
 
@@ -52,9 +52,9 @@ def all_stays(tracks: Mapping[str, PoseTrack]) -> Stays:
     return {part: stays_of(part, rests_of(track)) for part, track in tracks.items()}
 
 
-def stays_of(part: str, rests: Sequence[Rest]) -> tuple[Stay, ...]:
+def stays_of(part: str, rests: Sequence[RestSpan]) -> tuple[Stay, ...]:
     """The stays of a part, in order of time."""
-    groups: list[list[Rest]] = []
+    groups: list[list[RestSpan]] = []
     for rest in rests:
         if groups and _is_adjusted(groups[-1][-1], rest):
             groups[-1].append(rest)
@@ -73,7 +73,7 @@ def poses_at(stays: Mapping[str, Sequence[Stay]], t: float) -> Mapping[str, Arra
     return {part: stay.at(t).T for part, stay in latest.items()}
 
 
-def _is_adjusted(before: Rest, after: Rest) -> bool:
+def _is_adjusted(before: RestSpan, after: RestSpan) -> bool:
     off = pose.log(pose.inverse(before.T) @ after.T)
     near = np.linalg.norm(off[:3]) < _ADJUSTED_M and np.linalg.norm(off[3:]) < _ADJUSTED_RAD
     return bool(near and after.begins - before.ends < _ADJUSTED_S)

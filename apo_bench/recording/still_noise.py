@@ -8,7 +8,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.residuals import Residuals
 from apo_bench.recording.log import Log, PoseTrack
-from apo_bench.recording.rests import Rest, rests_of
+from apo_bench.recording.rests import rests_of
 
 _MOST_GAP = 1.5
 """A time between two frames that is so many times the usual one has frames missing."""
@@ -48,7 +48,7 @@ def still_residuals(log: Log) -> Residuals:
     )
 
 
-def _errors(camera: Camera, track: PoseTrack, rest: Rest) -> Array:
+def _errors(camera: Camera, track: PoseTrack, rest: RestSpan) -> Array:
     """(n, 6), (x, y, along; rx, ry, about), [m, rad]: from the mean of a rest to each frame.
 
     A mean of n frames takes part of each error with it, so what is left is as much larger as it was made smaller.

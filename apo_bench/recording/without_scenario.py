@@ -12,7 +12,7 @@ from apo_bench.recording.arranging import solved_camera, staying
 from apo_bench.recording.camera_file import CameraFile
 from apo_bench.recording.camera_pose import CameraPose
 from apo_bench.recording.log import PoseTrack
-from apo_bench.recording.rests import Rest
+from apo_bench.recording.rests import RestSpan
 from apo_bench.recording.stays import Stay, Stays, all_stays
 
 
@@ -24,7 +24,7 @@ class Put(NamedTuple):
     stay: Stay
 
     @property
-    def rest(self) -> Rest:
+    def rest(self) -> RestSpan:
         return self.stay.rests[-1]
 
 
@@ -87,7 +87,7 @@ def _put(moves: Sequence[_Move]) -> Put:
     return Put(first.stay.part, tuple(move.stay.part for move in others), first.stay)
 
 
-def deviations(rest: Rest, camera: CameraFile) -> tuple[float, float]:
+def deviations(rest: RestSpan, camera: CameraFile) -> tuple[float, float]:
     """Standard deviations per axis of one rest, [m, rad]: of its mean, and of what stays; else that of one frame."""
     C = rest.mean.covariance + staying(camera, rest.mean)
     return float(np.sqrt(np.trace(C[:3, :3]) / 3.0)), float(np.sqrt(np.trace(C[3:, 3:]) / 3.0))

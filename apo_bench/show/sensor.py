@@ -11,8 +11,7 @@ import numpy as np
 from apo_bench.assembly.topology import Assembly
 from apo_bench.depth_camera.distance import strike_distances
 from apo_bench.depth_camera.follow import Event
-from apo_bench.depth_camera.range_finder import RangeFinder
-from apo_bench.depth_camera.view import View
+from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -211,7 +210,7 @@ def _draw_row(row: Any, watched: DemonstrationImages, images: Sequence[Array], e
         bar.set_label("measured - model [mm]", fontsize=7)
 
 
-def _expected(view: View, T: Array, shape: Any) -> Array:
+def _expected(view: PinholeView, T: Array, shape: Any) -> Array:
     """The range image of the fitted model alone, (height, width), [m]."""
     # rays in the frame of the model, where its faces are known
     origin = pose.apply(pose.inverse(T), view.origin[None])[0]

@@ -9,13 +9,10 @@ from hypothesis import strategies as st
 
 from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.depth_camera.distance import Shape, join_shapes, shape_of, signed_distance, strike_distances
-from apo_bench.depth_camera.explained import share_explained
-from apo_bench.depth_camera.fit import PRIOR, Points, covariance, refine
+from apo_bench.depth_camera.fit import PRIOR, Points, covariance, distinct, refine, starts
 from apo_bench.depth_camera.follow import Expected, follow_demonstration
-from apo_bench.depth_camera.range_finder import RangeFinder, RangeImage
-from apo_bench.depth_camera.regions import median_filtered, regions, without_small
-from apo_bench.depth_camera.starts import distinct, starts
-from apo_bench.depth_camera.view import View, look_at
+from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder, RangeImage, look_at
+from apo_bench.depth_camera.regions import median_filtered, regions, share_explained, without_small
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.symmetry import nearest_symmetric_pose, quarter_turns, symmetries
@@ -27,7 +24,7 @@ SHAPES = {name: shape_of(solid.pieces) for name, solid in SOLIDS.items()}
 STANDING = pose.at((0.05, 0.02, 0.0), (0.0, 0.0, 25.0))
 
 
-def range_of(shape: Shape, view: View) -> Array:
+def range_of(shape: Shape, view: PinholeView) -> Array:
     """True distances of a shape in the world, and of a table, (height, width)."""
     table = Shape(np.array([[0.0, 0.0, -0.01]]), np.array([[0.6, 0.6, 0.01]]), np.eye(3)[None])
     distance, _ = strike_distances(join_shapes([shape, table]), view.origin, view.rays)
@@ -38,7 +35,7 @@ def posed(shape: Shape, T: Array) -> Shape:
     return Shape(shape.center @ T[:3, :3].T + T[:3, 3], shape.half, T[:3, :3] @ shape.turn)
 
 
-def points_on(shape: Shape, T: Array, views: tuple[View, ...] | None = None) -> Points:
+def points_on(shape: Shape, T: Array, views: tuple[PinholeView, ...] | None = None) -> Points:
     """What the views of the range finder see of a shape at T, without any error."""
     at = []
     rays = []
@@ -268,7 +265,7 @@ def test_levels_scale_one_draw_and_level_zero_is_exact() -> None:
 
 
 def test_views_look_where_they_say() -> None:
-    view = View(look_at((1.0, 0.5, 0.8), (0.1, 0.0, 0.0)), 41, 31, 40.0)
+    view = PinholeView(look_at((1.0, 0.5, 0.8), (0.1, 0.0, 0.0)), 41, 31, 40.0)
     to = np.array([0.1, 0.0, 0.0]) - view.origin
     assert view.rays[15 * 41 + 20] == pytest.approx(to / np.linalg.norm(to))
     assert view.rays[0] @ view.T_world_view[:3, 0] < 0.0

@@ -14,7 +14,7 @@ from apo_bench.recording.importing import ImportedRecording
 from apo_bench.recording.log import Log
 from apo_bench.recording.objects_file import ObjectsFile
 from apo_bench.recording.operations import approaches
-from apo_bench.recording.rests import Rest
+from apo_bench.recording.rests import RestSpan
 from apo_bench.recording.without_scenario import UnplannedRecording
 
 _HEADS = ("", "part", "rests from", "until s", "frames", "outliers", "x mm", "y mm", "z mm", "a frame is off by")
@@ -89,7 +89,7 @@ def _starts(stood: Mapping[str, str]) -> str:
     return "; ".join(f"{', '.join(parts[whence])} {how[whence]}" for whence in how if parts[whence])
 
 
-def rest_lines(rests: Sequence[tuple[str, Rest | None]], X: Array, times: Mapping[str, Array]) -> list[str]:
+def rest_lines(rests: Sequence[tuple[str, RestSpan | None]], X: Array, times: Mapping[str, Array]) -> list[str]:
     """One line for each operation: when its part came to rest, and what its frames show; then the outliers.
 
     Args:
@@ -164,7 +164,7 @@ def _paths(recording: ImportedRecording) -> Iterator[str]:
         yield f"{operation} ends along {way} of the part for {1e3 * approach.end.length_m:.0f} mm, {how}"
 
 
-def _rest_cells(rest: Rest, X: Array) -> list[str]:
+def _rest_cells(rest: RestSpan, X: Array) -> list[str]:
     S = rest.mean.scatter
     p = 1e3 * (X @ rest.T)[:3, 3]
     off = f"{1e3 * np.sqrt(np.trace(S[:3, :3]) / 3.0):.2f} mm {np.degrees(np.sqrt(np.trace(S[3:, 3:]) / 3.0)):.2f} deg"

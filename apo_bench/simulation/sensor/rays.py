@@ -6,8 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.depth_camera.range_finder import RangeFinder, RangeImage
-from apo_bench.depth_camera.view import View
+from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder, RangeImage
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.scene.world import World
 
@@ -39,7 +38,7 @@ class Sight:
     def __init__(self, world: World) -> None:
         self._model = world.model
         self._own = mujoco.MjData(world.model)
-        self._fixed: dict[int, tuple[View, Strike]] = {}
+        self._fixed: dict[int, tuple[PinholeView, Strike]] = {}
 
     def look(self, qpos: Array) -> None:
         """Put all parts where a simulation has them."""
@@ -47,7 +46,7 @@ class Sight:
         self._own.mocap_pos[:, 2] = _AWAY_M
         mujoco.mj_kinematics(self._model, self._own)
 
-    def strike(self, view: View) -> Strike:
+    def strike(self, view: PinholeView) -> Strike:
         """Send out all rays of a view; what does not move is met only once."""
         if id(view) not in self._fixed:
             self._fixed[id(view)] = view, self._fixed_parts(view)
@@ -64,7 +63,7 @@ class Sight:
         cosine[near] = np.abs(np.einsum("ni,ni->n", normals[near], view.rays[near]))
         return Strike(distance, cosine, normal, geom)
 
-    def _fixed_parts(self, view: View) -> Strike:
+    def _fixed_parts(self, view: PinholeView) -> Strike:
         moving = self._model.body_weldid[self._model.geom_bodyid] != 0
         places = np.array(self._own.geom_xpos)
         self._own.geom_xpos[moving, 2] = _AWAY_M
@@ -73,7 +72,7 @@ class Sight:
         cosine = np.abs(np.einsum("ni,ni->n", normal, view.rays))
         return Strike(np.where(geom < 0, np.inf, distance), np.where(geom < 0, 0.0, cosine), normal, geom)
 
-    def _cast(self, view: View, fixed: bool) -> tuple[NDArray[np.int32], Array, Array]:
+    def _cast(self, view: PinholeView, fixed: bool) -> tuple[NDArray[np.int32], Array, Array]:
         """Numbers of geoms, distances and normals, of everything, or of what can move."""
         n = len(view.rays)
         geom = np.empty(n, np.int32)

@@ -9,8 +9,7 @@ from typing import Any, final
 
 import numpy as np
 
-from apo_bench.depth_camera.range_finder import VIEWED_POINT_M, RangeFinder, RangeImage
-from apo_bench.depth_camera.view import View, look_at
+from apo_bench.depth_camera.range_finder import VIEWED_POINT_M, PinholeView, RangeFinder, RangeImage, look_at
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.scene.world import World
 from apo_bench.simulation.sensor.rays import Sight, Strike
@@ -25,9 +24,9 @@ _STILL = 5e-5
 
 
 @lru_cache(maxsize=1)
-def _front_view() -> View:
+def _front_view() -> PinholeView:
     """Obliquely from the front, 160 x 120: a pixel is 6 mm wide, and a motion of some millimetres changes few."""
-    return View(look_at((0.85, -0.35, 0.75), VIEWED_POINT_M), 160, 120, 45.0)
+    return PinholeView(look_at((0.85, -0.35, 0.75), VIEWED_POINT_M), 160, 120, 45.0)
 
 
 @final
@@ -35,7 +34,7 @@ def _front_view() -> View:
 class TvCamera:
     """How it sees, and when it calls something a change."""
 
-    view: View = field(default_factory=_front_view)
+    view: PinholeView = field(default_factory=_front_view)
     noise: float = 2.0 / 255.0
     """Standard deviation of the brightness of a pixel, where white is 1."""
     changed: float = 12.0 / 255.0
