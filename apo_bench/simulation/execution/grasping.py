@@ -12,6 +12,7 @@ from apo_bench.geometry.holds import held_width, holds, holds_whole
 from apo_bench.geometry.intrusion import intrusion_depths, upright_bounds
 from apo_bench.geometry.solid import Piece, Solid, all_boxes, extent
 from apo_bench.scenario.scenario import Grasp
+from apo_bench.simulation.frames import frame
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.robot.near import Obstacle, obstacle
 from apo_bench.simulation.robot.paths import shifted
@@ -76,7 +77,7 @@ def clear_across(scene: Scene, part: str, across: Array, place: RestingPart) -> 
     It is clear open and closed: fingers that close flush with a wall beside the part stem against it.
     """
     up = _upwards(place.T)
-    level = across - (across @ up) * up
+    level = across - (across @ up) * up  # without its vertical part
     level /= np.linalg.norm(level)
     stays = Stroke(place.T, up, 0.0, place.around)
     able = [grasp for grasp in _candidates(scene, part, place.T) if abs(grasp.across @ level) > 0.99]
@@ -115,12 +116,7 @@ def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[Rest
 def tip_frame(grasp: Grasp, T_part: Array) -> Array:
     """The tip in the part's frame, (4, 4): looking down where the part stands like this, closing along `across`."""
     ahead = T_part[:3, :3].T @ np.array([0.0, 0.0, -1.0])
-    T = np.eye(4)
-    T[:3, 0] = grasp.across
-    T[:3, 1] = np.cross(ahead, grasp.across)
-    T[:3, 2] = ahead
-    T[:3, 3] = grasp.point
-    return T
+    return frame(np.column_stack([grasp.across, np.cross(ahead, grasp.across), ahead]), grasp.point)
 
 
 def half_width(pieces: tuple[Piece, ...], grasp: Grasp, T: Array) -> float:
@@ -213,6 +209,7 @@ def _clear(
         opening = min(width + _STAND_OFF_M, scene.arm.opening_m)
         points = np.array([grasp.point for grasp in same])
         struck = np.zeros(len(same), dtype=np.bool_)
+        # All points of one direction and width at once: the tip has one orientation at a place.
         for place in places:
             R = (place.T @ tip_frame(Grasp(np.zeros(3), np.array(across)), place.T))[:3, :3]
             at = points @ place.T[:3, :3].T + place.T[:3, 3]

@@ -9,6 +9,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.simulation.execution.spiral import RADIUS_M, Easing, Spiral
 from apo_bench.simulation.execution.transfer import Grip, Transfer
+from apo_bench.simulation.frames import frame
 from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth
 from apo_bench.simulation.robot.robot import Robot
@@ -115,6 +116,5 @@ def _bring(robot: Robot, T: Array, way: Array) -> None:
 
 def _turned(yaw_deg: float, about: Array) -> Array:
     """The turn about the vertical through a point, (4, 4), world."""
-    T = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw_deg))
-    T[:3, 3] = about - T[:3, :3] @ about
-    return T
+    R = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw_deg))[:3, :3]
+    return frame(R, about - R @ about)

@@ -91,6 +91,8 @@ class Spiral:
         self._left = self._left - 1
         if self.found or self._r > self.radius or self._left < 0 or side > push + self.guard.newton:
             return None
+        # Pushed back, the tip goes on by what yields to the rest of the press, and along r = pitch angle / 2 pi by
+        # d angle = d arc / r; let go of, it goes ahead.
         if push > self.press / 4:
             self._speed = _YIELD * (self.press - push)
             self._angle += self.step_s * _ACROSS / max(self._r, _INNER_M)

@@ -121,9 +121,10 @@ class Hands:
 
     def _leap(self, hand: int, line: Trajectory, n: int, begin: int, data: Any, steps: int) -> None:
         """Be so many steps further on a line at once, with what is held."""
-        at = begin + steps + np.array([0.0, TINY_S / self._step_s])
+        at = begin + steps + np.array([0.0, TINY_S / self._step_s])  # then, and a little later, in steps
         after, later = line.poses(line.progress(_trailing(at, n, self._step_s)))
         for part, T_hand_part in self._held[hand].items():
+            # Where the hand would be that has the part where it is: the part trails behind the real one.
             before = part_pose(self.world, data, part) @ pose.inverse(T_hand_part)
             take_along(self.world, data, (part,), (before, after, later))
         self._put(data, hand, line.poses(line.progress(at[:1] / n))[0])

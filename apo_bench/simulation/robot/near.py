@@ -111,6 +111,7 @@ def _near(moving: Iterable[Moving], obstacles: Sequence[Obstacle], line: Traject
 
     What turns is taken as the box around all that it sweeps, and nothing else is looked at.
     """
+    # Upright boxes first: only where the box around what moves meets the box around what rests are pieces looked at.
     R = line.start[:3, :3]
     start = line.start[:3, 3]
     tips = start + s[:, None] * (line.end[:3, 3] - start)
@@ -150,6 +151,8 @@ def _swept(low: Array, high: Array, turn: Array) -> tuple[Array, Array]:
         turn: (3,), the rotation vector, world, [rad]. Without its level part everything turns about the vertical; with
             it nothing is further from there than that part times how far it is from the origin.
     """
+    # Turned about an axis that is off the vertical by a level part w, a point at r moves up or out by |w| |r| at most;
+    # about the vertical it stays within its distance from the axis.
     corner = np.maximum(np.abs(low), np.abs(high))
     off = float(np.hypot(*turn[:2]) * np.linalg.norm(corner))
     reach = float(np.hypot(*corner[:2])) + off

@@ -210,9 +210,12 @@ class Robot:
         opening = self.opening()
         start = min(max(fingers.commanded(self.data), opening - fingers.slack), opening + fingers.slack)
         ticks = max(1, round(abs(to - start) / self.arm.limits.fingers_m_s / TICK_S))
-        if self.fidelity == "contact" and not self.forces.held and self._may_open(to):
-            fingers.put(self.data, to)
-            return self._pass(ticks * TICK_S)
+        if self.fidelity == "contact" and not self.forces.held:
+            # Nothing may be near the empty hand, neither as it is nor with its fingers where they go.
+            moving = moving_with_tip(self.scene, self.data, self.tip(), max(to, opening), ())
+            if clear(self.scene, self.data, moving, self.T):
+                fingers.put(self.data, to)
+                return self._pass(ticks * TICK_S)
         for i in range(1, ticks + round(fingers.longest_s / TICK_S)):
             fingers.command(self.data, start + (to - start) * min(1.0, i / ticks))
             self.wait(TICK_S)
@@ -273,11 +276,6 @@ class Robot:
         moving = moving_with_tip(self.scene, self.data, self.tip(), self.opening(), held)
         spans = near_spans(self.scene, self.data, moving, held, line, s)
         return spans if spans and spans[-1][1] == n else [*spans, (n, n)]
-
-    def _may_open(self, to: float) -> bool:
-        """Whether nothing is near the empty hand, neither as it is nor with its fingers somewhere else."""
-        moving = moving_with_tip(self.scene, self.data, self.tip(), max(to, self.opening()), ())
-        return clear(self.scene, self.data, moving, self.T)
 
     def _pass(self, seconds: float) -> None:
         """Let time pass in which nothing is felt."""

@@ -69,6 +69,8 @@ def _cut(solid: Solid, pieces: tuple[Piece, ...], clearance_m: float) -> Mapping
 
 def _walls(face: RoundFace, pieces: Iterable[Piece], clearance_m: float) -> Iterator[_Wall]:
     """The wedges whose side is a wall of a hole, with where the wall ends."""
+    # A wall of a cone of slope k has the normal (-u, k) / sqrt(1 + k^2) in (outwards, along the axis), and touches the
+    # cone. The clearance moves it along its normal, so the radius by clearance / w.
     w = 1.0 / np.sqrt(1.0 + face.slope**2)
     radius = face.radii[0] - face.slope * face.span[0] + clearance_m * face.fit / w
     wedges = []
@@ -107,6 +109,7 @@ def _sectors(walls: Sequence[_Wall]) -> Iterator[list[_Wall]]:
         first = left[0].cut
         group = [wall for wall in left if np.abs(wall.cut - first).max() < _ON_M]
         left = [wall for wall in left if np.abs(wall.cut - first).max() >= _ON_M]
+        # in the order of their middles along the line that fits these best: the first right singular vector
         middle = np.array([wall.hull.corners.mean(axis=0) for wall in group])
         along = np.linalg.svd(middle - middle.mean(axis=0))[2][0]
         yield [group[i] for i in np.argsort(middle @ along)]
@@ -121,6 +124,8 @@ def _beyond(wall: _Wall) -> Hull | None:
 
 def _within(hull: Hull, cut: Array) -> Hull:
     """What of a piece is on the inner side of a plane (n, d), n . x <= d, that goes through it."""
+    # The corners below the plane, and where the lines from those to the corners above it cross it; the hull of all that
+    # is the piece that was cut off, since lines through its inside end inside it.
     height = hull.corners @ cut[:3] - cut[3]
     low = hull.corners[height <= 0.0]
     high = hull.corners[height > 0.0]
@@ -135,6 +140,7 @@ def _hull_of(name: str, points: Array) -> Hull:
     """The piece around points, with its corners alone."""
     from scipy.spatial import ConvexHull
 
+    # Qhull divides sides into triangles: of each plane one is kept, and a corner is where three of these meet.
     around = ConvexHull(points)
     sides = around.equations[first_of_each(around.equations[:, :3], signed=True)]
     corners = points[around.vertices]

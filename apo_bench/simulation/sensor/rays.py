@@ -50,18 +50,16 @@ class Sight:
         """Send out all rays of a view; what does not move is met only once."""
         if id(view) not in self._fixed:
             self._fixed[id(view)] = view, self._fixed_parts(view)
-        known = self._fixed[id(view)][1]
-        distance = np.array(known.distance)
-        cosine = np.array(known.cosine)
-        normal = np.array(known.normal)
-        geom = np.array(known.geom)
-        struck, far, normals = self._cast(view, fixed=False)
-        near = np.flatnonzero((struck >= 0) & (far < distance))
-        distance[near] = far[near]
-        geom[near] = struck[near]
-        normal[near] = normals[near]
-        cosine[near] = np.abs(np.einsum("ni,ni->n", normals[near], view.rays[near]))
-        return Strike(distance, cosine, normal, geom)
+        fixed = self._fixed[id(view)][1]
+        geom, distance, normal = self._cast(view, fixed=False)
+        nearer = (geom >= 0) & (distance < fixed.distance)
+        cosine = np.abs(np.einsum("ni,ni->n", normal, view.rays))
+        return Strike(
+            np.where(nearer, distance, fixed.distance),
+            np.where(nearer, cosine, fixed.cosine),
+            np.where(nearer[:, None], normal, fixed.normal),
+            np.where(nearer, geom, fixed.geom),
+        )
 
     def _fixed_parts(self, view: PinholeView) -> Strike:
         moving = self._model.body_weldid[self._model.geom_bodyid] != 0
