@@ -29,8 +29,7 @@ from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.render import camera_view, picture
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.statistics.rates import wilson
-from apo_bench.trial.scene import scene_of
-from apo_bench.trial.stages import simulate_demonstration
+from apo_bench.trial.stages import scene_of, simulate_demonstration
 from apo_bench.trial.trial import run_trial
 from benchmarks.generated import FAMILIES, generated, scenario_of
 

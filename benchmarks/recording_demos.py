@@ -20,8 +20,7 @@ from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.human.demonstration import demonstrate
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import part_pose
-from apo_bench.trial.scene import scene_of
-from apo_bench.trial.stages import DEMONSTRATION, LAYOUT, stream
+from apo_bench.trial.stages import DEMONSTRATION, LAYOUT, scene_of, stream
 from benchmarks.recording_forms import RATE_HZ, Tracked
 
 BEGINS_S = 100.0

@@ -16,8 +16,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.show.believed_picture import belief_panel, draw_beliefs
 from apo_bench.simulation.film.film import frames
 from apo_bench.simulation.scene.scene import build_scene
-from apo_bench.trial.request import Request
-from apo_bench.trial.run_request import run_request
+from apo_bench.trial.request import Request, run_request
 from apo_bench.trial.stages import observe_demonstration, simulate_demonstration
 from apo_bench.trial.story import Story
 

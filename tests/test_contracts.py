@@ -69,7 +69,7 @@ BREACHES = {
     ],
     "work": [
         ("apo_bench.sweeps.work.environment_lock", "apo_bench.sweeps.work.dispatch"),
-        ("apo_bench.sweeps.work.messages", "apo_bench.sweeps.work.stopping"),
+        ("apo_bench.sweeps.work.messages", "apo_bench.sweeps.work.worker"),
     ],
     "judge": [
         ("apo_bench.judging.verdict", "apo_bench.observation.noise"),

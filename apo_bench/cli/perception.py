@@ -1,7 +1,5 @@
 """Two commands on what a camera sees: `apo-bench eye | recognise`, poses from depth images, contacts from poses."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

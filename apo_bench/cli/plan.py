@@ -123,7 +123,7 @@ def plan_command(
         where = f"at the goals of {observation}, {_by(method)}"
         axes = "directions in the frame of the assembly, until in the world"
     if arm is not None:
-        from apo_bench.trial.plan_warning import arm_sentence
+        from apo_bench.trial.planning import arm_sentence
 
         notes.append(arm_sentence(loaded, None if observation is None else plan, arm))
     lines = plan_lines(plan, loaded)
@@ -143,8 +143,7 @@ def _planned(
 ) -> tuple[Scenario, Plan, list[str]]:
     """The scenario, the plan that a method makes of an observation of it, and what is to be said with it."""
     from apo_bench.files.observation import read_observation_file
-    from apo_bench.trial.plan_warning import plan_warning
-    from apo_bench.trial.planning import apply_method
+    from apo_bench.trial.planning import apply_method, plan_warning
 
     seen, loaded, assumed = read_observation_file(
         observation, scenario, deviation_mm=deviations[0], deviation_deg=deviations[1]

@@ -41,8 +41,7 @@ def replay_command(
 ) -> None:
     """Run one trial: demonstrate, observe, plan by a method, replay, judge."""
     from apo_bench.cli.terminal import print_row
-    from apo_bench.trial.request import Request
-    from apo_bench.trial.run_request import run_request
+    from apo_bench.trial.request import Request, run_request
 
     check_outputs([(video, "--video", (".mp4", ".gif")), (save_observation, "--save-observation", (".json",))])
     if view:
@@ -68,7 +67,7 @@ def replay_command(
             if trial_limit is None:
                 row = run_request(request, stories.append if view else None)
             else:
-                from apo_bench.sweeps.local.alone import run_request_alone
+                from apo_bench.sweeps.local.pool import run_request_alone
 
                 row = run_request_alone(request, trial_limit)
     except KeyboardInterrupt as error:

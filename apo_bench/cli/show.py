@@ -100,7 +100,7 @@ def _corrected(scenario: Scenario, observed: Observation, method: str, step: int
     from apo_bench.records.method import with_simulated
     from apo_bench.show.believed_picture import belief_panel
     from apo_bench.trial.fitting import fitting_plan
-    from apo_bench.trial.plan_warning import plan_warning
+    from apo_bench.trial.planning import plan_warning
 
     correction = correct_named(observed, with_simulated(method))
     if not correction.ok:

@@ -82,7 +82,7 @@ def _picture_of(
     from apo_bench.scenario.file import scenario_names
     from apo_bench.simulation.scene.render import picture
     from apo_bench.trial.fingerprint import content_hash, spec_hash
-    from apo_bench.trial.scene import scene_key, scene_of
+    from apo_bench.trial.stages import scene_key, scene_of
 
     if row["scenario"] not in files and row["scenario"] not in scenario_names():
         raise InputError(f"run.json says no file of the scenario '{row['scenario']}'")

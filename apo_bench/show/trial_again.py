@@ -16,8 +16,7 @@ from apo_bench.records.setting_columns import settings_of
 from apo_bench.report.run.facts import scenario_files
 from apo_bench.simulation.film.still import FilmTrack
 from apo_bench.trial.fingerprint import content_hash, spec_hash
-from apo_bench.trial.scene import scene_of
-from apo_bench.trial.stages import observe_demonstration, simulate_demonstration
+from apo_bench.trial.stages import observe_demonstration, scene_of, simulate_demonstration
 from apo_bench.trial.story import Story, trial_story
 from apo_bench.trial.trial import noise_of, run_trial
 

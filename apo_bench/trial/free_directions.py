@@ -7,8 +7,6 @@ Problems", 23). Where that leads nowhere, it is begun at points of an even sprea
 as far as it fits. After each move the goals are put back onto all contacts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple, final
@@ -47,6 +45,25 @@ Fits = Callable[[Array], bool]
 """Whether a plan with these goals, (n, 4, 4), fits."""
 
 
+class _Held(NamedTuple):
+    """The contacts that hold at goals, and what puts other goals back onto them."""
+
+    system: Equations
+    compact: CompactEquations
+    exact: NDArray[np.bool_]
+    inequalities: Inequalities
+    kept: NDArray[np.bool_]
+    limits: Array
+    """(c,): how far each contact may be off, [m]."""
+    L: Array
+
+    def put_back(self, goals: Array) -> Array | None:
+        """The nearest goals at which every contact holds as well as before; None if none were found."""
+        found = nearest_goals(self.compact.among(self.kept & self.exact), goals, self.L)
+        off = violations(self.system, self.exact, self.inequalities, found.goals)
+        return found.goals if found.finite and (off <= self.limits)[self.kept].all() else None
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class FreeSpace:
@@ -68,25 +85,6 @@ class FreeSpace:
     def place(self, s: Array) -> Array | None:
         """The same, put back onto the contacts; None if that cannot be."""
         return self.held.put_back(self.tangent(s))
-
-
-class _Held(NamedTuple):
-    """The contacts that hold at goals, and what puts other goals back onto them."""
-
-    system: Equations
-    compact: CompactEquations
-    exact: NDArray[np.bool_]
-    inequalities: Inequalities
-    kept: NDArray[np.bool_]
-    limits: Array
-    """(c,): how far each contact may be off, [m]."""
-    L: Array
-
-    def put_back(self, goals: Array) -> Array | None:
-        """The nearest goals at which every contact holds as well as before; None if none were found."""
-        found = nearest_goals(self.compact.among(self.kept & self.exact), goals, self.L)
-        off = violations(self.system, self.exact, self.inequalities, found.goals)
-        return found.goals if found.finite and (off <= self.limits)[self.kept].all() else None
 
 
 def free_space(observation: Observation, goals: Array) -> FreeSpace | None:

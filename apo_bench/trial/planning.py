@@ -1,8 +1,10 @@
-"""What a method makes of an observation: a plan, or why there is none."""
+"""What a method makes of an observation: a plan, or why there is none; and what speaks against a plan."""
 
 import math
 from dataclasses import dataclass
 from typing import Any, final
+
+import numpy as np
 
 from apo_bench.assembly.correction_record import Correction, Look
 from apo_bench.assembly.equations import largest_gap
@@ -10,9 +12,12 @@ from apo_bench.assembly.goals import Observation, Plan
 from apo_bench.assembly.reached import Outcome
 from apo_bench.correction.own_code.own import correct_named
 from apo_bench.geometry.arrays import Array
+from apo_bench.prediction.failure import predict
 from apo_bench.records.method import with_simulated
+from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.arm_checks.plan_check import arm_moves
+from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.by_heart import goals_by_heart
 from apo_bench.trial.fitting import FittingPlan, fitting_plan
 from apo_bench.trial.stages import observation_failure
@@ -83,3 +88,45 @@ def _uncorrected(observation: Observation, goals: Array, failure: Outcome | None
     if failure:
         return MethodResult(None, failure, gap_m, math.nan)
     return MethodResult(Plan(observation.assembly, observation.start, goals), None, gap_m, gap_m)
+
+
+def plan_warning(scenario: Scenario, plan: Plan, correction: Correction | None) -> str:
+    """`the stated noise does not explain the correction (p = 0.0004); foretold: operation 3 (stick) will fail: ..`.
+
+    Empty if nothing speaks against it.
+
+    Args:
+        correction: What the corrector returned; None where none was asked.
+    """
+    sentences = []
+    test = None if correction is None else correction.test_after or correction.test
+    if test is not None and not test.passes:
+        sentences.append(f"the stated noise does not explain the correction (p = {test.p_value:.2g})")
+    prediction = predict(plan, scenario.clearance_mm, scenario.thresholds, scenario.attach)
+    if prediction.fails:
+        sentences.append(f"foretold: {prediction.sentence}")
+    return "; ".join(sentences)
+
+
+def arm_sentence(scenario: Scenario, plan: Plan | None, arm: str) -> str:
+    """`panda_primitive: operation 3 (shaft) will fail: the arm holds its way to 0.089 mm only, and ..`.
+
+    Where nothing fails, how much room its joints have.
+
+    Args:
+        plan: None: the nominal one in the middle of its place on the table.
+
+    Raises:
+        InputError: The arm is unknown, or its gripper cannot hold a part.
+    """
+    scene = build_scene(scenario, arm=arm)
+    if plan is None:
+        x, y = scenario.site.center_m
+        yaw = float(np.mean(scenario.site.yaw_rad))
+        at = layout_at(scenario, x, y, yaw, clearance_mm=scene.clearance_mm)
+        plan = Plan(scenario.assembly, at.start, at.goals)
+    moves = arm_moves(plan, scene)
+    found = predict(plan, scene.clearance_mm, scenario.thresholds, scenario.attach, moves)
+    margins = [move.margin_deg for move in moves if move.margin_deg is not None]
+    room = f"; its joints stay {min(margins):.0f} deg from their limits" if margins and not found.fails else ""
+    return f"{arm}: {found.sentence}{room}"

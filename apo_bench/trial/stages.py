@@ -25,14 +25,16 @@ from apo_bench.records.outcomes import sentence
 from apo_bench.records.robot_error import NO_ROBOT_ERROR, robot_sigmas
 from apo_bench.records.row import Predicted
 from apo_bench.records.salt import Salt
-from apo_bench.records.settings import RANGE
+from apo_bench.records.settings import RANGE, SETTINGS, TrialSettings
+from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
+from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.arm_checks.plan_check import arm_moves
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.human.demonstration import demonstrate
 from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene.scene import Scene, build_scene
 
 if TYPE_CHECKING:
     from apo_bench.depth_camera.range_sensor import RangeSensor
@@ -218,3 +220,24 @@ def trial_outcome(attempt: Attempt) -> Outcome:
     found = verdict.rests_on
     why = f": {found.why}" if found.why else ""
     return Outcome("judge", found.code, None, sentence(found.code) + why)
+
+
+_SHAPING = tuple(name for name, info in SETTINGS.items() if info.scene)
+
+
+def scene_of(settings: TrialSettings, scenario: Scenario | None = None) -> Scene:
+    """Compile the scene of a trial.
+
+    Args:
+        scenario: That of the settings, if it is loaded already.
+
+    Raises:
+        InputError: There is no such scenario or arm, or a part cannot have the clearance.
+    """
+    found = load_scenario(settings.scenario) if scenario is None else scenario
+    return build_scene(found, **{name: getattr(settings, name) for name in _SHAPING})
+
+
+def scene_key(settings: TrialSettings) -> tuple[Any, ...]:
+    """Equal where the same scene serves."""
+    return (settings.scenario, *(getattr(settings, name) for name in _SHAPING))

@@ -1,7 +1,5 @@
 """A trial to be looked at: what was demonstrated and replayed, and the goals as seen, as corrected and as they are."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import final

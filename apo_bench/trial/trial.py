@@ -23,7 +23,6 @@ from apo_bench.trial.outcome_columns import confidence_columns, method_columns, 
 from apo_bench.trial.planning import MethodResult, apply_method
 from apo_bench.trial.recognised_contacts import count_contacts, with_recognised_contacts
 from apo_bench.trial.row import head, lost, misbehaved, result
-from apo_bench.trial.scene import scene_of
 from apo_bench.trial.stages import (
     RELATIONS,
     SimulatedDemonstration,
@@ -34,6 +33,7 @@ from apo_bench.trial.stages import (
     predicted_outcome,
     range_sensor,
     replay_and_judge,
+    scene_of,
     simulate_demonstration,
     stream,
     trial_outcome,

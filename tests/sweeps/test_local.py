@@ -34,8 +34,7 @@ from apo_bench.sweeps.local import pool
 from apo_bench.sweeps.local.pool import FALSE_STARTS, run_locally
 from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.sweeps.work.environment_lock import EnvironmentLock, versions
-from apo_bench.sweeps.work.messages import Unit
-from apo_bench.sweeps.work.stopping import Stopped, listening
+from apo_bench.sweeps.work.messages import Stopped, Unit, listening
 from apo_bench.sweeps.work.worker import Worker
 from apo_bench.trial.fingerprint import content_hash
 from apo_bench.trial.row import lost, misbehaved

@@ -30,7 +30,7 @@ from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.sweeps.ray import backend as on_ray
 from apo_bench.sweeps.ray import pool, task
-from apo_bench.sweeps.ray.runtime_files import runtime_files
+from apo_bench.sweeps.ray.driver import runtime_files
 from apo_bench.sweeps.sweep import names_of, run_sweep
 from apo_bench.sweeps.work import dispatch
 from apo_bench.sweeps.work.dispatch import Dispatch

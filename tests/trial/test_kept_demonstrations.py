@@ -21,8 +21,7 @@ from apo_bench.sweeps.grid import SweepSettings
 from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.trial import kept_demonstrations
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations, decides, demonstration_key
-from apo_bench.trial.scene import scene_of
-from apo_bench.trial.stages import SimulatedDemonstration
+from apo_bench.trial.stages import SimulatedDemonstration, scene_of
 from tests.trial.test_code_version import PACKAGE, reached
 
 SPEC = TrialSettings("block_on_block", seed=7, careless=1.0)

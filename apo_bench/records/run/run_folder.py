@@ -6,14 +6,12 @@ run.json       grids, code, content, versions, command line
 torn.txt       half lines that an interrupted sweep left behind, if any
 """
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import IO, Any, final
+from typing import IO, Any, Self, final
 
 from apo_bench.errors import InputError
 from apo_bench.io.reading import each_line
@@ -61,7 +59,7 @@ class RunFolder:
                 f"the folder '{folder}' cannot be written ({error.strerror}); choose another one with --out."
             ) from error
 
-    def __enter__(self) -> RunFolder:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -1,16 +1,18 @@
-"""Local processes that share the work of a sweep; one that dies or hangs costs one trial, and is replaced."""
+"""Local processes that share the work of a sweep, or run one trial; one that dies or hangs costs one trial."""
 
 import time
 from collections.abc import Sequence
 from multiprocessing import connection
 from typing import Any, final
 
+from apo_bench.records.row import Row
+from apo_bench.records.settings import TrialSettings
 from apo_bench.sweeps.local.process import Process
-from apo_bench.sweeps.work.dispatch import Dispatch, Job
+from apo_bench.sweeps.work.dispatch import STARTING_S, Dispatch, Job, check_limit
 from apo_bench.sweeps.work.environment_lock import EnvironmentLock
-from apo_bench.sweeps.work.messages import Unit
-from apo_bench.sweeps.work.stopping import Check, never
+from apo_bench.sweeps.work.messages import Check, Unit, listening, never
 from apo_bench.sweeps.work.worker import Emit, Worker
+from apo_bench.trial.request import Request, checked_request, lost_request, work_on
 
 _TURN_S = 0.5
 """How often the clock and the signals are looked at while nothing else happens."""
@@ -162,3 +164,46 @@ def _work(number: int, lock: EnvironmentLock, say: Any, pipe: Any) -> None:
             say("done")
     finally:
         worker.close()
+
+
+def run_request_alone(request: Request, limit_s: float) -> Row:
+    """What `run_request` does, in a process of its own that may take so much wall time.
+
+    What it does after it has said its row, such as writing a film, has no limit.
+
+    Raises:
+        InputError: A setting that is not allowed, or two that contradict each other.
+        RuntimeError: The trial could not be run.
+        KeyboardInterrupt: A signal asked for an end.
+    """
+    scenario, settings = checked_request(request)
+    check_limit(limit_s)
+    with listening() as check:
+        process = Process(_work_on_request, request, settings)
+        patience_s = 0.0
+        try:
+            row = _row(process, limit_s, check)
+            if isinstance(row, str):
+                return lost_request(request, settings, scenario, row)
+            process.wait(check)
+            patience_s = GOING_S
+            return row
+        finally:
+            process.end(patience_s)
+
+
+def _row(process: Process, limit_s: float, check: Check) -> Row | str:
+    """The row, or the code of a trial without one."""
+    if process.wait(check, STARTING_S) is None:
+        code = process.exit_code
+        how = "is not ready in time" if code is None else f"ends with exit code {code}"
+        raise RuntimeError(f"the process of the trial {how} before it has begun; see that memory is not short.")
+    began = time.monotonic()
+    message = process.wait(check, limit_s)
+    if message is None and process.exit_code is not None:
+        return "worker_died"
+    return "time_limit" if message is None or time.monotonic() - began > limit_s else message[1]
+
+
+def _work_on_request(request: Request, settings: TrialSettings, say: Any, pipe: Any) -> None:
+    work_on(request, settings, say)

@@ -1,7 +1,5 @@
 """The work of a sweep on a Ray cluster, as the sweep sees it; Ray itself stays in another process (`driver`)."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 import os
@@ -18,11 +16,9 @@ from typing import final
 from apo_bench.errors import InputError
 from apo_bench.sweeps.local.pool import GOING_S, GRACE_S
 from apo_bench.sweeps.local.process import Process
-from apo_bench.sweeps.ray.driver import ClusterPlan, drive
-from apo_bench.sweeps.ray.runtime_files import runtime_files
+from apo_bench.sweeps.ray.driver import ClusterPlan, drive, runtime_files
 from apo_bench.sweeps.work.environment_lock import EnvironmentLock
-from apo_bench.sweeps.work.messages import Unit
-from apo_bench.sweeps.work.stopping import Check, never
+from apo_bench.sweeps.work.messages import Check, Unit, never
 from apo_bench.sweeps.work.worker import Emit
 
 _TURN_S = 0.2
@@ -109,44 +105,6 @@ class _OtherWay(Exception):
         self.plan = plan
 
 
-def _drive(plan: ClusterPlan, emit: Emit, check: Check) -> None:
-    with tempfile.TemporaryDirectory() as folder:
-        log = Path(folder) / "ray.log"
-        driver = Process(drive, plan, str(log))
-        patience_s = 0.0
-        try:
-            _listen(driver, plan, _Joining(plan, log), emit, check)
-            patience_s = GOING_S
-        except KeyboardInterrupt:
-            _end_cleanly(driver, emit)
-            raise
-        finally:
-            driver.end(patience_s)
-
-
-def _listen(driver: Process, plan: ClusterPlan, joining: _Joining, emit: Emit, check: Check) -> None:
-    """Take rows until the last word."""
-    while True:
-        is_alive = driver.exit_code is None
-        kind, *said = driver.wait(check, _TURN_S) or (None,)
-        if kind == "row":
-            emit(*said)
-        elif kind == "starting":
-            joining.give(_STARTING_S)
-        elif kind == "connected":
-            joining.give(math.inf)
-        elif kind == "none":
-            raise _OtherWay(replace(plan, address="local", auth=None))
-        elif kind == "done":
-            return
-        elif is_alive:
-            joining.look()
-        else:
-            raise RuntimeError(
-                f"the Ray cluster was lost{joining.last_line()}; finished rows are kept, and the same command goes on."
-            )
-
-
 @final
 class _Joining:
     """Watches a process that may wait for a cluster for ever, and for one that does not let it in."""
@@ -191,6 +149,44 @@ class _Joining:
             return self._log.read_text(errors="replace")
         except OSError:
             return ""
+
+
+def _drive(plan: ClusterPlan, emit: Emit, check: Check) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "ray.log"
+        driver = Process(drive, plan, str(log))
+        patience_s = 0.0
+        try:
+            _listen(driver, plan, _Joining(plan, log), emit, check)
+            patience_s = GOING_S
+        except KeyboardInterrupt:
+            _end_cleanly(driver, emit)
+            raise
+        finally:
+            driver.end(patience_s)
+
+
+def _listen(driver: Process, plan: ClusterPlan, joining: _Joining, emit: Emit, check: Check) -> None:
+    """Take rows until the last word."""
+    while True:
+        is_alive = driver.exit_code is None
+        kind, *said = driver.wait(check, _TURN_S) or (None,)
+        if kind == "row":
+            emit(*said)
+        elif kind == "starting":
+            joining.give(_STARTING_S)
+        elif kind == "connected":
+            joining.give(math.inf)
+        elif kind == "none":
+            raise _OtherWay(replace(plan, address="local", auth=None))
+        elif kind == "done":
+            return
+        elif is_alive:
+            joining.look()
+        else:
+            raise RuntimeError(
+                f"the Ray cluster was lost{joining.last_line()}; finished rows are kept, and the same command goes on."
+            )
 
 
 def _end_cleanly(driver: Process, emit: Emit) -> None:

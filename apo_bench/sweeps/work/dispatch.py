@@ -11,8 +11,7 @@ from apo_bench.errors import InputError
 from apo_bench.records.method import is_own
 from apo_bench.records.settings import TrialSettings
 from apo_bench.sweeps.work.environment_lock import EnvironmentLock
-from apo_bench.sweeps.work.messages import Message, Unit, checked
-from apo_bench.sweeps.work.stopping import Check
+from apo_bench.sweeps.work.messages import Check, Message, Unit, checked
 from apo_bench.sweeps.work.worker import Emit, timing
 from apo_bench.trial.row import lost
 

@@ -23,8 +23,7 @@ from apo_bench.sweeps.work.messages import Message, Unit
 from apo_bench.trial.fingerprint import content_hash
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations, demonstration_of
 from apo_bench.trial.row import result
-from apo_bench.trial.scene import scene_key, scene_of
-from apo_bench.trial.stages import SimulatedDemonstration
+from apo_bench.trial.stages import SimulatedDemonstration, scene_key, scene_of
 from apo_bench.trial.trial import trial_row
 
 Timing = dict[str, Any]
