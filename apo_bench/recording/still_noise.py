@@ -8,7 +8,7 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.residuals import Residuals
 from apo_bench.recording.log import Log, PoseTrack
-from apo_bench.recording.rests import rests_of
+from apo_bench.recording.rests import RestSpan, rests_of
 
 _MOST_GAP = 1.5
 """A time between two frames that is so many times the usual one has frames missing."""
