@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from manifold3d import Manifold
+from scipy.spatial import ConvexHull
 
 from apo_bench.cad.importing import _why_not, import_part, raw_solids
 from apo_bench.cad.pieces.corners import corners_of, without_near
@@ -17,7 +18,7 @@ from apo_bench.cad.step.open_cascade import BrepFace, BrepSolid
 from apo_bench.errors import InputError
 from apo_bench.geometry.solid import Face
 from apo_bench.parts import load_part
-from tests.cad.made import block, disc, rod, write_stl, write_triangles
+from tests.cad.made import block, disc, prism, rod, write_stl, write_triangles
 
 
 def triangles(mesh: Any) -> Any:
@@ -102,6 +103,16 @@ def test_a_wall_of_a_step_file_becomes_strips_that_look_out_of_the_part(hole: bo
     assert heights.tolist() == [0.0, 20.0]
     outward = raw.mesh.across[wall.triangles] * raw.mesh.corners[raw.mesh.triangles[wall.triangles]].mean(axis=1)
     assert (np.sign(outward[:, :2].sum(axis=1)) == (-1.0 if hole else 1.0)).all()
+
+
+def test_a_cut_through_the_wide_end_of_a_countersink_leaves_nothing_in_it(tmp_path: Path) -> None:
+    outline = [(-20, -20), (6, -20), (6, -15), (20, -15), (20, 15), (6, 15), (6, 20), (-20, 20)]
+    mesh = prism([(float(x), float(y)) for x, y in outline], 20) - rod(4, 20, top=8)
+    _, (raw,) = raw_solids(write_stl(mesh, tmp_path / "a.stl"), None)
+    part = import_part(raw, "a", tmp_path, "a.stl")
+    assert dict(part.refused) == {}
+    volume = sum(ConvexHull(1e3 * piece.corners).volume for piece in part.solid.pieces)
+    assert volume == pytest.approx(1e9 * part.solid.volume, rel=2e-3)
 
 
 def test_free_radius_of_a_blind_hole_and_volume_of_its_part(tmp_path: Path) -> None:
