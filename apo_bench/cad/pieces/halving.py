@@ -149,21 +149,21 @@ def _best_halves(part: CutPart) -> list[CutPart]:
 
 def at_shoulders(parts: Iterator[CutPart], shafts: Sequence[Region], size: float) -> Iterator[CutPart]:
     """Parts cut where one round wall goes over into another one: a cylinder and its chamfer are two pieces."""
-    hair = _HAIR * size
     for part in parts:
         corners = corners_of(part.body)
         mine = [shaft for shaft in shafts if _touches(corners, shaft)]
-        cut_parts = [part]
-        for shaft in mine if len(mine) > 1 else ():
-            for end in shaft.span:
-                d = float(shaft.point @ shaft.direction) + end
-                after: list[CutPart] = []
-                for each in cut_parts:
-                    height = corners_of(each.body) @ shaft.direction - d
-                    is_beside = height.min() > -10.0 * hair or height.max() < 10.0 * hair
-                    after += [each] if is_beside else each.halves(shaft.direction, d, hair)
-                cut_parts = after
-        yield from cut_parts
+        slices = [part]
+        if len(mine) > 1:
+            for n, d in ((s.direction, float(s.point @ s.direction) + end) for s in mine for end in s.span):
+                slices = [half for each in slices for half in _across(each, n, d, _HAIR * size)]
+        yield from slices
+
+
+def _across(part: CutPart, n: Array, d: float, hair: float) -> Sequence[CutPart]:
+    """Both halves of a part, or the part where a plane does not go through it."""
+    height = corners_of(part.body) @ n - d
+    is_beside = height.min() > -10.0 * hair or height.max() < 10.0 * hair
+    return (part,) if is_beside else part.halves(n, d, hair)
 
 
 def _touches(corners: Array, shaft: Region) -> bool:

@@ -156,7 +156,7 @@ def _xyz(each: Any) -> Array:
     return np.array([each.X(), each.Y(), each.Z()])
 
 
-def serve(path: str) -> None:
+def write_solids(path: str) -> None:
     """Read a file with little memory and time, and write what it holds to the standard output, pickled.
 
     What the reader prints goes elsewhere.

@@ -25,7 +25,10 @@ from apo_bench.errors import InputError
 STEP_SUFFIXES = (".step", ".stp")
 _MOST_SOLIDS = 200
 _WALL_S = 120
-_START = "import sys; path, *sys.path = sys.argv[1:]; from apo_bench.cad.step.open_cascade import serve; serve(path)"
+_START = (
+    "import sys; path, *sys.path = sys.argv[1:]; "
+    "from apo_bench.cad.step.open_cascade import write_solids; write_solids(path)"
+)
 _ENDS_CPU = -24
 _PREFIXES = {"": "m", "MILLI": "mm", "CENTI": "cm", "MICRO": "um"}
 _UNIT_NAMES = {
