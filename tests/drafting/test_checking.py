@@ -1,0 +1,70 @@
+"""What `scenario check` finds in a scenario: each fault is said, with the line of the file that can mend it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from apo_bench.drafting.checking import check_file
+from apo_bench.drafting.draft import draft
+from apo_bench.drafting.posed import on_the_table
+from apo_bench.drafting.writing import scenario_text
+from apo_bench.parts.making import bore, extrude, join, rectangle, shaft
+from tests.drafting.test_draft import at, covered, made
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Part files, and a scenario of a plate, two pins and a cover."""
+    folder = tmp_path_factory.mktemp("covered")
+    made_draft = draft(on_the_table(covered(folder, off_mm=0.0)))
+    (folder / "own.toml").write_text(scenario_text(made_draft, "own", "a test", folder), encoding="utf-8")
+    return folder
+
+
+def test_all_is_well_and_the_robot_that_knows_the_truth_succeeds(folder: Path) -> None:
+    findings = list(check_file(folder / "own.toml", seeds=1, fidelity="contact"))
+    assert [finding.what for finding in findings if finding.ok] == [
+        *("file", "parts", "starts", "ways", "play", "gripper", "reach", "oracle")
+    ]
+    assert findings[0].sentence.startswith("4 parts, 3 operations, 7 contacts")
+    assert str(findings[-1]) == "ok     oracle   1 of 1 trials in which the robot knows the truth are right"
+
+
+def test_a_screw_is_known_by_its_name(folder: Path) -> None:
+    path = folder / "renamed.toml"
+    path.write_text((folder / "own.toml").read_text(encoding="utf-8").replace("pin_1", "screw_m4"), encoding="utf-8")
+    (wrong,) = (finding for finding in check_file(path, seeds=0) if not finding.ok)
+    assert wrong.what == "parts"
+    assert wrong.sentence.startswith("parts, screw_m4: by its name, and screws and nuts are put in straight here")
+    assert wrong.line == 1 + path.read_text(encoding="utf-8").splitlines().index("[parts.screw_m4]")
+
+
+def test_a_part_that_does_not_stand_at_its_start_is_named_with_its_line(tmp_path: Path) -> None:
+    hole = extrude(rectangle(60, 60), 0, 20, bores=[bore((0, 0), 1.7, 0, 20, "bore")], bottom="bottom", top="top")
+    thin = shaft(1.5, 0, 90, "side", bottom="tip", top="head")
+    places = {"plate": ("plate", at(0, 0, 0)), "thin": ("thin", at(0, 0, 0))}
+    path = tmp_path / "own.toml"
+    tall = draft(on_the_table(made(tmp_path, {"plate": hole, "thin": thin}, places)))
+    path.write_text(scenario_text(tall, "own", "a test", tmp_path), encoding="utf-8")
+    (wrong,) = (finding for finding in check_file(path, seeds=0) if finding.what == "starts")
+    assert wrong.sentence.startswith("parts, thin, start: 'thin' does not stand like this and needs turning over")
+    assert wrong.line is not None
+    assert (
+        path.read_text(encoding="utf-8")
+        .splitlines()[wrong.line - 1]
+        .endswith("# NEEDS TURNING OVER: it does not stand like this")
+    )
+
+
+def test_a_wall_on_either_side_without_play_is_found(tmp_path: Path) -> None:
+    walls = [extrude(rectangle(10, 40, (x, 0)), 0, 40, bottom=f"b{k}") for k, x in enumerate((-15.0, 15.0))]
+    floor = extrude(rectangle(40, 40), -10, 0, bottom="bottom")
+    parts = made(
+        tmp_path,
+        {"slot": join(floor, *walls), "key": extrude(rectangle(20, 20), 0, 60, bottom="foot", top="head")},
+        {"slot": ("slot", at(0, 0, 10)), "key": ("key", at(0, 0, 10))},
+    )
+    notes = draft(on_the_table(parts)).notes
+    assert sum("leave no play between them" in note for note in notes) == 1
