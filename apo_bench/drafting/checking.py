@@ -24,8 +24,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.nominal import nominal_operations
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.simulation.execution.key_angles import key_angles
-from apo_bench.simulation.execution.prepare import moves
+from apo_bench.simulation.execution.prepare import key_angles, moves
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.trial import run_trial
 

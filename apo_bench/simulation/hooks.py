@@ -25,19 +25,24 @@ class Doing(NamedTuple):
     """Whether the operation is undone, to be done again later."""
 
 
+def _nothing(_: Any) -> None:
+    """What is called where nobody wants to know."""
+
+
 @final
 @dataclass(frozen=True, eq=False)
 class Hooks:
-    """Functions that are called while something is done; None: nothing is called then."""
+    """Functions that are called while something is done."""
 
-    before_replay: Callable[[Plan], None] | None = None
+    before_replay: Callable[[Plan], None] = _nothing
     """With the plan, also with one that is refused before anything moves; no human has one."""
-    before_step: Callable[[Step], None] | None = None
+    before_step: Callable[[Step], None] = _nothing
     """Before an operation is done or undone."""
-    after_step: Callable[[Step], None] | None = None
+    after_step: Callable[[Step], None] = _nothing
     """After it, when everything rests; not of one that fails."""
     after_tick: Callable[[Any, Doing], None] | None = None
-    """With the `MjData`, every tick of simulated time; of a demonstration also at its start."""
+    """With the `MjData`, every tick of simulated time; of a demonstration also at its start. None: states between steps
+    are not worked out for it."""
     tick_s: float = TICK_S
     """How long a tick of a demonstration is; a robot's is `TICK_S`."""
 

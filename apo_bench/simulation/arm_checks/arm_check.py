@@ -15,8 +15,7 @@ from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.home import tip_down
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.arms.strength import LEAST_FORCE_N
-from apo_bench.simulation.execution.key_angles import key_angles
-from apo_bench.simulation.execution.prepare import moves
+from apo_bench.simulation.execution.prepare import key_angles, moves
 from apo_bench.simulation.robot.paths import shifted, smooth, steady, turn_from
 from apo_bench.simulation.robot.robot import Halt, Robot
 from apo_bench.simulation.scene.scene import Scene, build_scene

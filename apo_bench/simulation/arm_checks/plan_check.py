@@ -14,8 +14,7 @@ from apo_bench.geometry.solid import Solid
 from apo_bench.prediction.arm import ArmMove
 from apo_bench.simulation.arm_checks.tip_error import motion_error
 from apo_bench.simulation.execution.fingers import OPEN_TO_PICK_M, OPEN_TO_RELEASE_M
-from apo_bench.simulation.execution.key_angles import key_angles
-from apo_bench.simulation.execution.prepare import Move, moves
+from apo_bench.simulation.execution.prepare import Move, key_angles, moves
 from apo_bench.simulation.execution.transfer import Grip, after_transfer
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.scene.scene import Scene

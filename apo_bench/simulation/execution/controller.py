@@ -11,8 +11,7 @@ from apo_bench.assembly.reached import Outcome, Reached, ReplayResult, Snapshot
 from apo_bench.prediction.stability import first_unstable
 from apo_bench.records.outcomes import sentence
 from apo_bench.simulation.execution.carry_out import bring, take
-from apo_bench.simulation.execution.key_angles import key_angles
-from apo_bench.simulation.execution.prepare import Move, moves
+from apo_bench.simulation.execution.prepare import Move, key_angles, moves
 from apo_bench.simulation.execution.replay_cache import Progress, ReplayCache, cache_keys
 from apo_bench.simulation.hooks import Hooks, hooks_of
 from apo_bench.simulation.robot.in_hand import HoldWatch
@@ -70,8 +69,7 @@ def replay(
     if same is not None:
         return same
     hooks = hooks_of(watch)
-    if hooks.before_replay is not None:
-        hooks.before_replay(plan)
+    hooks.before_replay(plan)
     robot = Robot(scene, start, hooks, fidelity, error)
     progress = Progress([None] * len(plan.assembly), [])
     with sleeping(scene.work, scene.grasp == "friction"):
@@ -130,8 +128,7 @@ def _carry_out(
         if robot.data.time > most_s:
             return _late(plan, "pick", step)
         robot.step = step
-        if robot.hooks.before_step is not None:
-            robot.hooks.before_step(step)
+        robot.hooks.before_step(step)
         try:
             if kept_states <= 2 * i:
                 grip = take(robot, transfer)
@@ -149,8 +146,7 @@ def _carry_out(
         progress.after[step.operation] = None if step.undo else snapshot(robot.scene.work, robot.data, plan.start)
         progress.timeline.append((step, float(robot.data.time)))
         cache.keep(keys[2 * i + 1], robot, 0, progress)
-        if robot.hooks.after_step is not None:
-            robot.hooks.after_step(step)
+        robot.hooks.after_step(step)
     return Outcome("done", "ok", None, sentence("ok"))
 
 

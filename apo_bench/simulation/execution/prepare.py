@@ -1,4 +1,6 @@
-"""From a plan to transfers: grasps, ways, guards. Uses what is known before the robot moves, and nothing else."""
+"""From a plan to transfers: grasps, ways, guards, and whether the arm reaches them. Uses what is known before the robot
+moves, and nothing else.
+"""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -13,7 +15,6 @@ from apo_bench.geometry.solid import extent
 from apo_bench.insertion.surroundings import OVER_M, ends_of, mouths, neighbours, slide_directions, slow_before
 from apo_bench.scenario.nominal import nominal_operations
 from apo_bench.simulation.execution.grips import centring_grips, transfer_grips
-from apo_bench.simulation.execution.key_angles import key_angles
 from apo_bench.simulation.execution.transfer import (
     PUT_DOWN,
     SAFE_M,
@@ -23,8 +24,11 @@ from apo_bench.simulation.execution.transfer import (
     after_transfer,
     arrival_line,
     departure_motions,
+    key_poses,
     motions,
 )
+from apo_bench.simulation.robot.paths import Trajectory
+from apo_bench.simulation.robot.reach import at_end
 from apo_bench.simulation.scene.scene import Scene
 
 _GRAVITY = 9.81
@@ -171,3 +175,36 @@ def _front(scene: Scene, part: str, moves: tuple[str, ...], poses: Poses, way: A
     middle = np.array([np.mean(ends(axis)) for axis in np.eye(3)])
     ahead = poses[part][:3, :3].T @ way
     return np.asarray(middle + (ends(ahead)[1] - middle @ ahead) * ahead)
+
+
+class KeyAngles(NamedTuple):
+    """Joint angles at the tip poses of a transfer that must be in reach, [rad]."""
+
+    code: str
+    """Of the first end at which a tip pose has no joint angles, empty where all have."""
+    reached: tuple[Array, ...]
+    """(joints,) each, at the poses before that."""
+    ended: Array
+    """Where the search for the last of them ended, (joints,)."""
+
+
+@remembered
+def key_angles(transfer: Transfer, scene: Scene) -> KeyAngles:
+    """Joint angles at the tip poses that must be in reach; remembered, since who predicts a transfer and who carries it
+    out ask for the same."""
+    q = np.array(scene.arm.home)
+    before = None
+    reached = list[Array]()
+    for code, poses in zip(("unreachable_start", "unreachable"), key_poses(transfer), strict=True):
+        for T in poses:
+            there = scene.kinematics.inverse(T, q)
+            if there is None and scene.arm.hand is not None:
+                # Step by step from where the tip was, since a leap may end at the limit of a joint.
+                start = scene.kinematics.forward(q) if before is None else before
+                there = at_end(scene.kinematics, Trajectory(start, T, 1.0, np.asarray), 0.0, 1.0, q)
+            if there is None:
+                return KeyAngles(code, tuple(reached), scene.kinematics.last)
+            q = there
+            before = T
+            reached.append(q)
+    return KeyAngles("", tuple(reached), q)

@@ -52,13 +52,11 @@ class Hands:
     def begin(self, operation: int) -> None:
         """Say which operation begins, counted from 0, to who wants to know."""
         self._operation = operation
-        if self._hooks.before_step is not None:
-            self._hooks.before_step(Step(operation))
+        self._hooks.before_step(Step(operation))
 
     def end(self, operation: int) -> None:
         """Say which operation has ended, counted from 0, to who wants to know."""
-        if self._hooks.after_step is not None:
-            self._hooks.after_step(Step(operation))
+        self._hooks.after_step(Step(operation))
 
     def pose(self, part: str) -> Array:
         """Where a movable part is, (4, 4)."""
