@@ -137,12 +137,12 @@ def _lines(path: str | Path) -> Iterator[tuple[int, str]]:
 
 
 def _check_header(text: str, place: str) -> None:
-    found = tuple(cell.strip() for cell in text.split(","))
-    if found == _COLUMNS:
+    columns = tuple(cell.strip() for cell in text.split(","))
+    if columns == _COLUMNS:
         return
-    check_separator(place, found)
+    check_separator(place, columns)
     for column in _COLUMNS:
-        if column not in found:
+        if column not in columns:
             raise InputError(f"{place}: the column '{column}' is missing; {_WANTED}.")
     raise InputError(f"{place}: the columns are {text[:80]}; {_WANTED}.")
 
@@ -167,11 +167,13 @@ def _id(text: str, place: str, name: str) -> int:
 
 def _numbers(text: str, count: int, place: str) -> list[float]:
     try:
-        found = [float(word) for word in text.split()]
+        values = [float(word) for word in text.split()]
     except ValueError:
-        found = []
-    if len(found) == count and all(-LARGEST_MM <= x <= LARGEST_MM for x in found) and "_" not in text:
-        return found
+        values = []
+    if len(values) == count and all(-LARGEST_MM <= x <= LARGEST_MM for x in values) and "_" not in text:
+        return values
     what = "a number" if count == 1 else f"{count} numbers with spaces between them"
-    given = f"{len(found)} numbers were given" if len(found) not in (0, count) else f"'{text.strip()[:40]}' was given"
-    raise InputError(f"{place}: {what} of at most {LARGEST_MM:g} is needed, {given}.")
+    stands = (
+        f"{len(values)} numbers were given" if len(values) not in (0, count) else f"'{text.strip()[:40]}' was given"
+    )
+    raise InputError(f"{place}: {what} of at most {LARGEST_MM:g} is needed, {stands}.")

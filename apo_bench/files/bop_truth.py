@@ -34,17 +34,17 @@ def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) 
     else:
         truth = read_results(path)
     estimated = np.unique(estimates.where[:, :2], axis=0)
-    asked = _among(truth.where[:, :2], estimated)
+    estimated_rows = _among(truth.where[:, :2], estimated)
     if scene is not None:
-        asked &= truth.where[:, 0] == scene
-    if not asked.any():
+        estimated_rows &= truth.where[:, 0] == scene
+    if not estimated_rows.any():
         s, i = truth.where[0, :2]
         raise InputError(
             f"{path}: no image of {'the truth' if scene is None else f'scene {scene}'} has an estimate in "
             f"{estimates.file}; the first of the truth is image {i} of scene {s}; give the truth of the "
             "images that were estimated."
         )
-    kept = asked if path.suffix.lower() == ".json" else np.ones(len(asked), dtype=np.bool_)
+    kept = estimated_rows if path.suffix.lower() == ".json" else np.ones(len(estimated_rows), dtype=np.bool_)
     if scene is not None:
         kept &= truth.where[:, 0] == scene
     truth = _only(truth, kept)

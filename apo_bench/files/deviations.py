@@ -23,15 +23,15 @@ def check_deviations(deviation_mm: float, deviation_deg: float) -> None:
     Raises:
         InputError: One is too small, too large, or no number.
     """
-    for name, given, size, limits in (
+    for name, deviation, size, limits in (
         ("deviation_mm", deviation_mm, 1e-3, SHIFT_M),
         ("deviation_deg", deviation_deg, pi / 180.0, TURN_RAD),
     ):
-        number = isinstance(given, int | float | np.floating | np.integer) and not isinstance(given, bool)
-        if not number or not is_within(given * size, limits):
-            shown = f"{given:g}" if number else repr(given)
+        number = isinstance(deviation, int | float | np.floating | np.integer) and not isinstance(deviation, bool)
+        if not number or not is_within(deviation * size, limits):
+            text = f"{deviation:g}" if number else repr(deviation)
             low, high = (x / size for x in limits)
-            raise InputError(f"{name} {shown} was given; a number from {low:g} to {high:g} is allowed.")
+            raise InputError(f"{name} {text} was given; a number from {low:g} to {high:g} is allowed.")
 
 
 def assumed_deviations(deviation_mm: float | None, deviation_deg: float | None) -> str:
@@ -48,5 +48,5 @@ def is_within(deviation: float, limits: tuple[float, float]) -> bool:
 
 def is_sensible(covariance: Array) -> bool:
     """Whether every variance of a body twist, on the diagonal of (6, 6) [m, rad], is that of such a deviation."""
-    found = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
-    return all(is_within(float(x), SHIFT_M if i < 3 else TURN_RAD) for i, x in enumerate(found))
+    deviations = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
+    return all(is_within(float(x), SHIFT_M if i < 3 else TURN_RAD) for i, x in enumerate(deviations))

@@ -46,7 +46,7 @@ def observation_form(observation: Observation, scenario: str) -> Form:
         "play_mm": observation.play_m * 1e3,
         "operations": _operations_form(observation.assembly, observation.goals, extra),
         **_outliers_form(observation.outliers),
-        "shared": [_shared_form(one) for one in observation.shared],
+        "shared": [_shared_form(error) for error in observation.shared],
         **({} if observation.tails is None else {"tails": _tails_form(observation.tails)}),
     }
 
@@ -98,14 +98,14 @@ def _outliers_form(outliers: OutlierModel | None) -> Form:
     return {"outliers": {key: getattr(outliers, name) for key, name in OUTLIER_KEYS.items()}}
 
 
-def _shared_form(one: SharedError) -> Form:
+def _shared_form(error: SharedError) -> Form:
     """A shared error; without a frame its twist is in the frame of each part."""
-    frame = {} if one.frame is None else {"frame": pose_form(one.frame), "local": one.local}
-    correlation = {} if one.correlation is None else {"correlation": one.correlation.tolist()}
+    frame = {} if error.frame is None else {"frame": pose_form(error.frame), "local": error.local}
+    correlation = {} if error.correlation is None else {"correlation": error.correlation.tolist()}
     return {
-        "name": one.name,
-        "operations": [k + 1 for k in one.operations],
-        "covariance_mm_deg": covariance_form(one.covariance),
+        "name": error.name,
+        "operations": [k + 1 for k in error.operations],
+        "covariance_mm_deg": covariance_form(error.covariance),
         **frame,
         **correlation,
     }

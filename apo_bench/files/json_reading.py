@@ -52,21 +52,21 @@ def read_json_observed(
     """
     optional = ("start", "gap_mm", "play_mm", "outliers", "shared", "tails")
     root = read_json(path).fields_of(OBSERVATION, ("scenario", "operations"), optional)
-    found = _scenario(root["scenario"], scenario, Path(path).parent)
+    loaded = _scenario(root["scenario"], scenario, Path(path).parent)
     stated = ("covariance_mm_deg", "deviation_mm", "deviation_deg", "seen")
-    entries = _operations(root["operations"], found.assembly, (), stated)
+    entries = _operations(root["operations"], loaded.assembly, (), stated)
     shared = root["shared"].items("shared error") if "shared" in root else ()
     observation = Observation(
-        assembly=found.assembly,
-        start=_poses(root["start"], found) if "start" in root else _own_start(found),
+        assembly=loaded.assembly,
+        start=_poses(root["start"], loaded) if "start" in root else _own_start(loaded),
         goals=np.array([_pose(entry) for entry in entries]).reshape(-1, 4, 4),
         covariance=np.array([_stated(entry, assumed) for entry in entries]).reshape(-1, 6, 6),
         seen=np.array([entry["seen"].flag() if "seen" in entry else True for entry in entries]),
-        gap_m=root["gap_mm"].number(0.0, above=True) * 1e-3 if "gap_mm" in root else found.gap_mm * 1e-3,
-        play_m=root["play_mm"].number(0.0) * 1e-3 if "play_mm" in root else found.clearance_mm * 1e-3,
+        gap_m=root["gap_mm"].number(0.0, above=True) * 1e-3 if "gap_mm" in root else loaded.gap_mm * 1e-3,
+        play_m=root["play_mm"].number(0.0) * 1e-3 if "play_mm" in root else loaded.clearance_mm * 1e-3,
         outliers=_outliers(root["outliers"]) if "outliers" in root else None,
-        shared=tuple(_shared(node, len(found.assembly)) for node in shared),
-        tails=_tails(root["tails"], len(found.assembly)) if "tails" in root else None,
+        shared=tuple(_shared(node, len(loaded.assembly)) for node in shared),
+        tails=_tails(root["tails"], len(loaded.assembly)) if "tails" in root else None,
     )
     complete = all("covariance_mm_deg" in entry or {*_DEVIATIONS} <= entry.keys() for entry in entries)
     return observation, not complete
@@ -75,21 +75,21 @@ def read_json_observed(
 def read_plan(path: str | Path, scenario: Scenario | None = None) -> Plan:
     """A plan from its file; see `read_json_observation` for `scenario` and errors."""
     root = read_json(path).fields_of(PLAN, ("scenario", "start", "operations", "schedule"))
-    found = _scenario(root["scenario"], scenario, Path(path).parent)
-    goals = np.array([_pose(entry) for entry in _operations(root["operations"], found.assembly, (), ())])
+    loaded = _scenario(root["scenario"], scenario, Path(path).parent)
+    goals = np.array([_pose(entry) for entry in _operations(root["operations"], loaded.assembly, (), ())])
     steps = [_step(node, goals) for node in root["schedule"].items("schedule entry")]
     schedule = tuple(step for step, _ in steps)
     if steps and (wrong := schedule_fault(schedule, len(goals))):
         raise InputError(f"{path}, schedule: it {wrong}; {SCHEDULE_REMEDY}.")
     targets = np.array([T for _, T in steps] or goals)
-    return Plan(found.assembly, _poses(root["start"], found), goals, schedule, targets)
+    return Plan(loaded.assembly, _poses(root["start"], loaded), goals, schedule, targets)
 
 
 def _outliers(node: JsonNode) -> OutlierModel:
     """How often observations are worse than they state; what is not said is as usual."""
-    given = node.fields((), tuple(OUTLIER_KEYS))
+    rates = node.fields((), tuple(OUTLIER_KEYS))
     try:
-        return OutlierModel(**{OUTLIER_KEYS[key]: value.number(0.0) for key, value in given.items()})
+        return OutlierModel(**{OUTLIER_KEYS[key]: value.number(0.0) for key, value in rates.items()})
     except InputError as error:
         raise InputError(f"{node.file}, {node.key}: {error}") from error
 
@@ -101,24 +101,24 @@ def _own_start(scenario: Scenario) -> Poses:
 
 def _shared(node: JsonNode, n: int) -> SharedError:
     """An error that operations share."""
-    given = node.fields(("name", "operations", "covariance_mm_deg"), ("frame", "local", "correlation"))
-    operations = tuple(entry.integer() - 1 for entry in given["operations"].items("operation"))
+    fields = node.fields(("name", "operations", "covariance_mm_deg"), ("frame", "local", "correlation"))
+    operations = tuple(entry.integer() - 1 for entry in fields["operations"].items("operation"))
     if not operations or len(set(operations)) != len(operations) or not all(0 <= k < n for k in operations):
-        given["operations"].fail(f"operations from 1 to {n}, each once, are needed")
-    if "local" in given and "frame" not in given:
-        given["local"].fail("a frame is needed with it", "state the frame, or leave this out")
+        fields["operations"].fail(f"operations from 1 to {n}, each once, are needed")
+    if "local" in fields and "frame" not in fields:
+        fields["local"].fail("a frame is needed with it", "state the frame, or leave this out")
     m = len(operations)
     correlation = None
-    if "correlation" in given:
-        correlation = given["correlation"].numbers(m, m)
+    if "correlation" in fields:
+        correlation = fields["correlation"].numbers(m, m)
         if np.abs(correlation - correlation.T).max() > 1e-9 or np.abs(np.diag(correlation) - 1.0).max() > 1e-9:
-            given["correlation"].fail("a symmetric matrix with 1 on its diagonal is needed")
+            fields["correlation"].fail("a symmetric matrix with 1 on its diagonal is needed")
     return SharedError(
-        name=given["name"].text(),
+        name=fields["name"].text(),
         operations=operations,
-        covariance=_covariance(given["covariance_mm_deg"], definite=False),
-        frame=_pose(given["frame"].fields(_POSE)) if "frame" in given else None,
-        local=given["local"].flag() if "local" in given else False,
+        covariance=_covariance(fields["covariance_mm_deg"], definite=False),
+        frame=_pose(fields["frame"].fields(_POSE)) if "frame" in fields else None,
+        local=fields["local"].flag() if "local" in fields else False,
         correlation=correlation,
     )
 
@@ -126,35 +126,35 @@ def _shared(node: JsonNode, n: int) -> SharedError:
 def _tails(node: JsonNode, n: int) -> Tails:
     """How errors are distributed."""
     keys = ("axes", "scales_mm_deg", "degrees_of_freedom", "deviations_mm_deg", "limits_mm_deg", "joined")
-    given = node.fields(keys)
+    fields = node.fields(keys)
     units = _TO_MM_DEG[[0, 0, 3, 3]]
-    axes = given["axes"].numbers(n, 3, 3)
+    axes = fields["axes"].numbers(n, 3, 3)
     if np.abs(axes @ np.swapaxes(axes, 1, 2) - np.eye(3)).max(initial=0.0) > 1e-6:
-        given["axes"].fail("a rotation matrix for each operation is needed")
-    found = {key: given[key].numbers(2 if key == "limits_mm_deg" else 4) for key in keys[1:-1]}
-    for key, numbers in found.items():
+        fields["axes"].fail("a rotation matrix for each operation is needed")
+    matrices = {key: fields[key].numbers(2 if key == "limits_mm_deg" else 4) for key in keys[1:-1]}
+    for key, numbers in matrices.items():
         if not (numbers > 0.0).all() or (key == "degrees_of_freedom" and numbers.min() < _LEAST_FREEDOM):
-            given[key].fail(f"numbers above {_LEAST_FREEDOM if key == 'degrees_of_freedom' else 0.0:g} are needed")
+            fields[key].fail(f"numbers above {_LEAST_FREEDOM if key == 'degrees_of_freedom' else 0.0:g} are needed")
     return Tails(
         frames=axes,
-        scales=found["scales_mm_deg"] / units,
-        freedom=found["degrees_of_freedom"],
-        variances=(found["deviations_mm_deg"] / units) ** 2,
-        limits=found["limits_mm_deg"] / units[[0, 2]],
-        joined=given["joined"].flag(),
+        scales=matrices["scales_mm_deg"] / units,
+        freedom=matrices["degrees_of_freedom"],
+        variances=(matrices["deviations_mm_deg"] / units) ** 2,
+        limits=matrices["limits_mm_deg"] / units[[0, 2]],
+        joined=fields["joined"].flag(),
     )
 
 
-def _scenario(node: JsonNode, given: Scenario | None, folder: Path) -> Scenario:
+def _scenario(node: JsonNode, wanted: Scenario | None, folder: Path) -> Scenario:
     from apo_bench.scenario.file import load_scenario
 
     name = node.text()
-    if given is not None:
-        if Path(name).stem != given.name:
+    if wanted is not None:
+        if Path(name).stem != wanted.name:
             node.fail(
-                f'the scenario "{given.name}" was asked for', "give the file of that scenario, or ask for its own"
+                f'the scenario "{wanted.name}" was asked for', "give the file of that scenario, or ask for its own"
             )
-        return given
+        return wanted
     return load_scenario(folder / name if name.endswith(".toml") or "/" in name else name)
 
 
@@ -232,8 +232,8 @@ def _deviation(node: JsonNode, limits: tuple[float, float], unit: float) -> floa
 
 
 def _named(entry: Mapping[str, JsonNode], by_deviation: list[str]) -> str:
-    given = [key for key in ("covariance_mm_deg", *by_deviation) if key in entry]
-    return " with ".join(f"'{key}'" for key in given) or "neither"
+    keys = [key for key in ("covariance_mm_deg", *by_deviation) if key in entry]
+    return " with ".join(f"'{key}'" for key in keys) or "neither"
 
 
 def _step(node: JsonNode, goals: Array) -> tuple[Step, Array]:

@@ -168,8 +168,8 @@ def read_toml(path: str | Path, kind: str) -> JsonNode:
 def parse_toml(raw: bytes, file: str) -> JsonNode:
     """The document in a text; `file` is its name in messages."""
     text = decoded(raw, file, "TOML file")
-    if found := _LONG_KEY.search(text):
-        line = text.count("\n", 0, found.start()) + 1
+    if match := _LONG_KEY.search(text):
+        line = text.count("\n", 0, match.start()) + 1
         raise InputError(f"{file}, line {line}: at most {DEEPEST_NESTING} names with dots between them are allowed.")
     try:
         document = tomllib.loads(text)

@@ -13,7 +13,7 @@ _LONGEST = 1500
 
 def clean(text: str) -> str:
     """One line in which control characters stand as `\\x1b`."""
-    return UNSHOWN.sub(lambda found: found[0].encode("unicode_escape").decode(), text)
+    return UNSHOWN.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
 def brief(text: str) -> str:

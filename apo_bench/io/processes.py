@@ -31,26 +31,26 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
 
 def descendants(pid: int) -> list[int]:
     """Children, their children and so on, those that have ended and are not waited for too; empty without /proc."""
-    found = []
+    below_all = []
     todo = [pid]
     while todo:
         below = _children(todo.pop())
-        found += below
+        below_all += below
         todo += below
-    return found
+    return below_all
 
 
 def end_descendants(pid: int, spared: Collection[int] = ()) -> None:
     """Kill them all, but for the spared; whoever lost its parent and was not taken in by `pid` is not found."""
     ended = {*spared}
     for _ in range(_ROUNDS):
-        found = [one for one in descendants(pid) if one not in ended]
-        if not found:
+        alive = [process for process in descendants(pid) if process not in ended]
+        if not alive:
             return
-        for one in found:
+        for process in alive:
             with suppress(OSError):
-                os.kill(one, signal.SIGKILL)
-        ended.update(found)
+                os.kill(process, signal.SIGKILL)
+        ended.update(alive)
 
 
 def flush() -> None:
@@ -65,8 +65,8 @@ def flush() -> None:
 
 def _children(pid: int) -> list[int]:
     """The processes that a process has started, from what Linux lists for each of its threads."""
-    found: list[int] = []
+    children: list[int] = []
     with suppress(OSError):
         for thread in Path(f"/proc/{pid}/task").iterdir():
-            found += map(int, (thread / "children").read_text().split())
-    return found
+            children += map(int, (thread / "children").read_text().split())
+    return children

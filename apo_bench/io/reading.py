@@ -52,10 +52,10 @@ def read_bytes(path: str | Path, kind: str, limit: int = _LARGEST_BYTES, *, own:
     with opened(path, kind) as file:
         if own and hasattr(os, "geteuid") and os.fstat(file.fileno()).st_uid != os.geteuid():
             raise InputError(f"{path}: the {kind} belongs to another user.")
-        found = file.read(limit + 1)
-    if len(found) > limit:
+        content = file.read(limit + 1)
+    if len(content) > limit:
         raise InputError(f"{path}: the file is larger than {limit / 1e6:g} MB; give a {kind}.")
-    return found
+    return content
 
 
 def read_text(path: str | Path, kind: str, limit: int = _LARGEST_BYTES, *, own: bool = False) -> str:
@@ -100,8 +100,8 @@ def decoded(raw: bytes, file: str, kind: str) -> str:
 
 def _check_ordinary(path: str | Path, kind: str, mode: int) -> None:
     if not stat.S_ISREG(mode):
-        found = next((name for is_one, name in _KINDS if is_one(mode)), "a device")
-        raise InputError(f"{path}: {found} was given; give a {kind}.")
+        what = next((name for is_one, name in _KINDS if is_one(mode)), "a device")
+        raise InputError(f"{path}: {what} was given; give a {kind}.")
 
 
 def _is_no_path(path: str | Path) -> bool:

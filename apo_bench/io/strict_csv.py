@@ -28,8 +28,8 @@ class CsvRow:
 
     def fail(self, meaning: str, wanted: str) -> NoReturn:
         column, text, _ = self.cells[meaning]
-        given = f"'{text[:40]}' was given" if text else "nothing was given"
-        raise InputError(f"{self.file}, line {self.line}, column {column}: {wanted}, {given}.")
+        stands = f"'{text[:40]}' was given" if text else "nothing was given"
+        raise InputError(f"{self.file}, line {self.line}, column {column}: {wanted}, {stands}.")
 
     def text(self, meaning: str) -> str:
         return self.cells[meaning][1] if meaning in self.cells else ""
@@ -82,9 +82,9 @@ def read_csv(path: str | Path, columns: Columns, required: Sequence[str]) -> Ite
 
 def _header(place: str, names: Sequence[str], columns: Columns, required: Sequence[str]) -> list[str]:
     """The columns, each known, none twice and none missing."""
-    found = [name.lower() for name in names]
+    lowered = [name.lower() for name in names]
     taken = dict[str, str]()
-    for column in found:
+    for column in lowered:
         if column not in columns:
             check_separator(place, names)
             longer = [name for name in columns if column and name.startswith(f"{column}_")]
@@ -99,7 +99,7 @@ def _header(place: str, names: Sequence[str], columns: Columns, required: Sequen
         if meaning not in taken:
             column = next(name for name, (m, _) in columns.items() if m == meaning)
             raise InputError(f"{place}: the column '{column}' is missing; needed are {_shown(columns, required)}.")
-    return found
+    return lowered
 
 
 def check_separator(place: str, names: Sequence[str]) -> None:

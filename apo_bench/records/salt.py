@@ -104,19 +104,19 @@ def one_salt(rows: Iterable[Mapping[str, Any]]) -> str | None:
     return hashes[0] or None if hashes else None
 
 
-def check_same_salt(holder: str, given: str | None, drawn: str | None) -> None:
+def check_same_salt(holder: str, at_hand: str | None, drawn: str | None) -> None:
     """Raise an `InputError` unless a salt, or none, is the one that trials were drawn with.
 
     Args:
         holder: What holds the trials, in words.
-        given: The hash of the salt at hand; None if there is none.
+        at_hand: The hash of the salt at hand; None if there is none.
         drawn: The hash in their rows.
     """
-    if given == drawn:
+    if at_hand == drawn:
         return
     if drawn is None:
         raise InputError(f"{holder} holds trials drawn without a salt; leave --salt-file out.")
-    what = "no salt file was given" if given is None else f"the salt file given is that of {given}"
+    what = "no salt file was given" if at_hand is None else f"the salt file given is that of {at_hand}"
     raise InputError(f"{holder} holds trials drawn with the salt {drawn}, and {what}; give theirs with --salt-file.")
 
 

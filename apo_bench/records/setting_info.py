@@ -88,6 +88,6 @@ def check_value(info: SettingInfo, value: object, called: str = "", meaning: str
         if info.is_whole and not (isinstance(value, Integral) and low <= number <= high):
             raise InputError(f"a {name} of {value} was given; whole numbers from {low} to {high} are allowed.")
         if not low <= number <= high:
-            given = f"{number:g}" if isinstance(value, Real) else repr(value)
+            text = f"{number:g}" if isinstance(value, Real) else repr(value)
             why = meaning or info.meaning
-            raise InputError(f"a {name} of {given} was given; a number from {low:g} to {high:g} is allowed, {why}.")
+            raise InputError(f"a {name} of {text} was given; a number from {low:g} to {high:g} is allowed, {why}.")

@@ -126,7 +126,7 @@ def load_all(grids: Sequence[SweepSettings]) -> Mapping[str, Scenario]:
     Raises:
         InputError: A scenario cannot be loaded, or two have the same name.
     """
-    loaded = {given: load_scenario(given) for grid in grids for given in grid.scenarios}
+    loaded = {source: load_scenario(source) for grid in grids for source in grid.scenarios}
     names = [scenario.name for scenario in loaded.values()]
     for name in names:
         if UNSHOWN.search(name):
@@ -146,8 +146,8 @@ def units(grids: Sequence[SweepSettings], loaded: Mapping[str, Scenario], salt: 
     """
     for seed in sorted({seed for grid in grids for seed in range(grid.seed, grid.seed + grid.trials)}):
         those = [grid for grid in grids if grid.seed <= seed < grid.seed + grid.trials]
-        for given, scenario in loaded.items():
-            yield from _units(those, given, scenario, seed, salt)
+        for source, scenario in loaded.items():
+            yield from _units(those, source, scenario, seed, salt)
 
 
 def described(grids: Sequence[SweepSettings], loaded: Mapping[str, Scenario]) -> list[dict[str, Any]]:
@@ -169,22 +169,22 @@ def _per_seed(grid: SweepSettings) -> int:
 
 
 def _units(
-    grids: Sequence[SweepSettings], given: str, scenario: Scenario, seed: int, salt: Salt | None
+    grids: Sequence[SweepSettings], source: str, scenario: Scenario, seed: int, salt: Salt | None
 ) -> Iterator[Unit]:
     """The trials of a scenario and a seed, by what they share."""
     together: dict[tuple[float, float, str], dict[TrialSettings, None]] = {}
     for grid in grids:
-        for clearance in (grid.clearances_mm or (scenario.clearance_mm,)) if given in grid.scenarios else ():
-            for trial in _trials(grid, given, clearance, seed, salt):
+        for clearance in (grid.clearances_mm or (scenario.clearance_mm,)) if source in grid.scenarios else ():
+            for trial in _trials(grid, source, clearance, seed, salt):
                 together.setdefault((clearance, trial.careless, trial.eye), {})[trial] = None
     return (Unit(tuple(trials)) for trials in together.values())
 
 
 def _trials(
-    grid: SweepSettings, given: str, clearance_mm: float, seed: int, salt: Salt | None
+    grid: SweepSettings, source: str, clearance_mm: float, seed: int, salt: Salt | None
 ) -> Iterator[TrialSettings]:
     same: dict[str, Any] = {name: getattr(grid, name) for name in SHARED}
-    same |= {"scenario": given, "clearance_mm": clearance_mm, "seed": seed, "salt": salt}
+    same |= {"scenario": source, "clearance_mm": clearance_mm, "seed": seed, "salt": salt}
     names = [info.name for info in _PLAIN]
     values = product(*(getattr(grid, info.axis) for info in _PLAIN))
     plain: list[dict[str, Any]] = [dict(zip(names, each, strict=True)) for each in values]
@@ -218,7 +218,7 @@ def _ways(grid: SweepSettings) -> list[dict[str, Any]]:
 
 def _described(grid: SweepSettings, loaded: Mapping[str, Scenario]) -> dict[str, Any]:
     values = {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(grid).items()}
-    own = {loaded[given].name: loaded[given].clearance_mm for given in grid.scenarios}
+    own = {loaded[source].name: loaded[source].clearance_mm for source in grid.scenarios}
     clearances = {name: list(grid.clearances_mm or (clearance,)) for name, clearance in own.items()}
     return {**values, "scenarios": list(own), "clearances_mm": clearances}
 

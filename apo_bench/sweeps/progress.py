@@ -72,15 +72,15 @@ def progress(total: int) -> Iterator[Count]:
 
 def _lines(total: int) -> Count:
     """Says every minute how many trials have ended, and when the rest will have at this pace."""
-    began = said = time.monotonic()
+    began = printed = time.monotonic()
     ended = 0
 
     def count(row: Row) -> None:
-        nonlocal said, ended
+        nonlocal printed, ended
         ended += 1
         now = time.monotonic()
-        if now - said >= EVERY_S:
-            said = now
+        if now - printed >= EVERY_S:
+            printed = now
             gone_min = (now - began) / 60
             left_min = gone_min * (total - ended) / ended
             sys.stderr.write(f"{ended} of {total} trials in {gone_min:.0f} min, about {left_min:.0f} min to go\n")

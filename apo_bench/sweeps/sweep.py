@@ -81,7 +81,7 @@ def run_sweep(
     names = names_of(grids)
     loaded, arm = _checked(names, grids, corrector_limit_s)
     lock = replace(environment_lock(names, loaded, arm.files, corrector_limit_s), cache=_kept_in(cache))
-    files = {loaded[given].name: given for given in loaded if given not in scenario_names()}
+    files = {loaded[source].name: source for source in loaded if source not in scenario_names()}
     salt = None if salt_file is None else salt_of_sweep(salt_file, out)
     limits = Limits(None if here else limit_s, corrector_limit_s)
     made_of = _content(lock, loaded, arm)
@@ -182,7 +182,7 @@ def _checked(
 def _content(lock: EnvironmentLock, loaded: Mapping[str, Scenario], arm: Arm) -> dict[str, str]:
     """What the trials are made of besides the package, piece by piece, so that a change can be named."""
     pieces: dict[str, str] = {}
-    for given, scenario in loaded.items():
-        made_of = content_pieces(scenario, given, arm.files)
+    for source, scenario in loaded.items():
+        made_of = content_pieces(scenario, source, arm.files)
         pieces |= {f"{scenario.name}, {piece}": hashed for piece, hashed in made_of.items()}
     return {**pieces, **lock.hashes}

@@ -32,15 +32,15 @@ _MOST_ENTRIES = 1000
 SWEEP_KEYS = (*_SEVERAL, *_COUNTS)
 
 
-def is_sweep_file(given: str) -> bool:
+def is_sweep_file(text: str) -> bool:
     """Whether what was given in place of scenarios is a sweep file: TOML that is no scenario file.
 
     Raises:
         InputError: It is TOML that cannot be read.
     """
-    if not given.lower().endswith(".toml"):
+    if not text.lower().endswith(".toml"):
         return False
-    keys = read_toml(given, "sweep or scenario file").value
+    keys = read_toml(text, "sweep or scenario file").value
     return "scenarios" in keys or not {"parts", "operations"} & set(keys)
 
 

@@ -34,20 +34,20 @@ ROOMS_WITHOUT_TRIALS = ("cli", "drafting", "envs", "report", "show", "statistics
 """Commands, how work is spread, and all that is made of rows afterwards."""
 
 
-def content_hash(scenario: Scenario, given: str | Path | Scenario, arm_files: Path | tuple[Path, ...]) -> str:
+def content_hash(scenario: Scenario, source: str | Path | Scenario, arm_files: Path | tuple[Path, ...]) -> str:
     """16 hexadecimal digits over all that shapes a trial besides its specification.
 
     The pieces of `content_pieces`, the code of the package, its version and that of every schema.
 
     Args:
-        given: What `load_scenario` was given.
+        source: What `load_scenario` was given.
     """
-    content = [content_pieces(scenario, given, arm_files), dict(code_files()), __version__, _SCHEMAS]
+    content = [content_pieces(scenario, source, arm_files), dict(code_files()), __version__, _SCHEMAS]
     return _hash(json.dumps(content, sort_keys=True).encode())
 
 
 def content_pieces(
-    scenario: Scenario, given: str | Path | Scenario, arm_files: Path | tuple[Path, ...]
+    scenario: Scenario, source: str | Path | Scenario, arm_files: Path | tuple[Path, ...]
 ) -> dict[str, str]:
     """What a trial of a scenario is made of -> 16 hexadecimal digits.
 
@@ -56,7 +56,7 @@ def content_pieces(
     """
     arm = arm_files if isinstance(arm_files, tuple) else (arm_files,)
     pieces = {
-        "scenario": _scenario_bytes(scenario, given),
+        "scenario": _scenario_bytes(scenario, source),
         **{f"part {part}": read_bytes(path, "part file") for part, path in sorted(scenario.part_files.items())},
         "room": (folder("assets") / "room.xml").read_bytes(),
         "arm": b"".join(Path(each).read_bytes() for each in arm),
@@ -153,10 +153,10 @@ def _hash(text: bytes) -> str:
     return hashlib.sha256(text).hexdigest()[:16]
 
 
-def _scenario_bytes(scenario: Scenario, given: str | Path | Scenario) -> bytes:
-    if isinstance(given, Scenario):
+def _scenario_bytes(scenario: Scenario, source: str | Path | Scenario) -> bytes:
+    if isinstance(source, Scenario):
         return json.dumps(_plain(scenario), sort_keys=True).encode()
-    path = folder("scenarios") / f"{given}.toml" if given in scenario_names() else Path(given)
+    path = folder("scenarios") / f"{source}.toml" if source in scenario_names() else Path(source)
     return read_bytes(path, "scenario file")
 
 

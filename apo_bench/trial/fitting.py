@@ -84,35 +84,40 @@ class _Surroundings(NamedTuple):
     def fault(self, plan: Plan) -> str | None:
         """What is foretold to fail, or out of reach; empty where contacts are off, None if nothing is wrong."""
         scenario = self.scene.scenario
-        found = predict(plan, self.scene.clearance_mm, scenario.thresholds, scenario.attach)
-        if found.fails:
-            return found.sentence if found.mendable else ""
+        prediction = predict(plan, self.scene.clearance_mm, scenario.thresholds, scenario.attach)
+        if prediction.fails:
+            return prediction.sentence if prediction.mendable else ""
         return None if in_reach(plan, self.scene) else "the arm would not reach all of it"
 
 
 def fitting_plan(
-    correction: Correction, observation: Observation, where: Scene | Scenario, told: Observation | None = None
+    correction: Correction,
+    observation: Observation,
+    where: Scene | Scenario,
+    corrector_input: Observation | None = None,
 ) -> FittingPlan:
     """What the robot is to do after a correction, with free directions chosen so that it fits.
 
     Args:
         where: The scene that the plan is to be carried out in. Of a scenario, which is compiled if need be, a plan that
             is foretold to fit counts as in reach.
-        told: What the corrector was given in place of the observation, where its relations are wrong.
+        corrector_input: What the corrector was given in place of the observation, where its relations are wrong.
 
     Raises:
         InputError: The correction did not converge.
     """
     plan = correction.plan(observation)
-    told = observation if told is None else told
-    asked = plan if told.assembly is plan.assembly else replace(plan, assembly=told.assembly)
+    corrector_input = observation if corrector_input is None else corrector_input
+    believed_plan = (
+        plan if corrector_input.assembly is plan.assembly else replace(plan, assembly=corrector_input.assembly)
+    )
     if isinstance(where, Scenario):
-        if not predict(asked, where.clearance_mm, where.thresholds, where.attach).fails:
+        if not predict(believed_plan, where.clearance_mm, where.thresholds, where.attach).fails:
             return FittingPlan(plan)
         where = build_scene(where)
     around = _Surroundings(where)
-    why = around.fault(asked)
-    goals = _goals_that_fit(asked, correction.believed or told, around) if why else None
+    why = around.fault(believed_plan)
+    goals = _goals_that_fit(believed_plan, correction.believed or corrector_input, around) if why else None
     if why is None or goals is None:
         return FittingPlan(plan)
     return FittingPlan(_moved(plan, goals), _moves(plan.goals, goals), why)
@@ -138,9 +143,9 @@ def _goals_that_fit(plan: Plan, believed: Observation, around: _Surroundings) ->
 
     for room_mm in ROOMS_MM:
         limits = _limits(before, tuple(around.measured(plan, room_mm)), room_mm)
-        found = nearest_fitting(space, fits, _Excess(plan, around, room_mm, limits))
-        if found is not None:
-            return found
+        fitting_goals = nearest_fitting(space, fits, _Excess(plan, around, room_mm, limits))
+        if fitting_goals is not None:
+            return fitting_goals
     return None
 
 
@@ -155,8 +160,8 @@ class _Excess:
     limits: Array
 
     def __call__(self, goals: Array) -> Array:
-        found = self.around.measured(_moved(self.plan, goals), self.room_mm)
-        return np.array([measure.size for measure in found]) - self.limits
+        sizes = self.around.measured(_moved(self.plan, goals), self.room_mm)
+        return np.array([measure.size for measure in sizes]) - self.limits
 
 
 def _limits(before: tuple[Measure, ...], with_room: tuple[Measure, ...], room_mm: float) -> Array:
@@ -172,6 +177,7 @@ def _limits(before: tuple[Measure, ...], with_room: tuple[Measure, ...], room_mm
 def _moved(plan: Plan, goals: Array) -> Plan:
     """A plan with other goals, (n, 4, 4), and with them where the schedule brings parts to the old ones."""
     done = [step.operation for step in plan.schedule]
+    # targets that are not goals are states in between, which stay where they are
     final = (plan.targets == plan.goals[done]).all(axis=(1, 2))
     return replace(plan, goals=goals, targets=np.where(final[:, None, None], goals[done], plan.targets))
 

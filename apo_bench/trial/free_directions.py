@@ -59,9 +59,9 @@ class _Held(NamedTuple):
 
     def put_back(self, goals: Array) -> Array | None:
         """The nearest goals at which every contact holds as well as before; None if none were found."""
-        found = nearest_goals(self.compact.among(self.kept & self.exact), goals, self.L)
-        off = violations(self.system, self.exact, self.inequalities, found.goals)
-        return found.goals if found.finite and (off <= self.limits)[self.kept].all() else None
+        nearest = nearest_goals(self.compact.among(self.kept & self.exact), goals, self.L)
+        off = violations(self.system, self.exact, self.inequalities, nearest.goals)
+        return nearest.goals if nearest.finite and (off <= self.limits)[self.kept].all() else None
 
 
 @final
@@ -97,11 +97,12 @@ def free_space(observation: Observation, goals: Array) -> FreeSpace | None:
         InputError: A covariance is not positive definite.
     """
     held = _held(observation, goals)
-    found = nearest_goals(held.compact.among(held.kept & held.exact), goals, held.L)
-    known = freedom(found.Jt)
+    nearest = nearest_goals(held.compact.among(held.kept & held.exact), goals, held.L)
+    # B Z: twists of one standard deviation along the null space Z of the whitened equations
+    known = freedom(nearest.Jt)
     if known is None or not known.free.shape[1]:
         return None
-    return FreeSpace(goals, spread(found.B, known.free), held)
+    return FreeSpace(goals, spread(nearest.B, known.free), held)
 
 
 def nearest_fitting(space: FreeSpace, fits: Fits, excess: Excess) -> Array | None:
@@ -122,6 +123,7 @@ def even_points(dimensions: int) -> Iterator[Array]:
     """Points (f,) spread evenly as a normal distribution is, the nearest first (Roberts' sequence)."""
     from scipy.stats import norm
 
+    # the real root of x^(d+1) = x + 1, by fixed point iteration: Roberts takes its negative powers as steps
     root = 2.0
     for _ in range(30):
         root = (1.0 + root) ** (1.0 / (dimensions + 1))
@@ -147,10 +149,10 @@ class _Search(NamedTuple):
             G, h = self._linearised(s)
             rows = np.concatenate([rows, G])
             least = np.concatenate([least, h])
-            found = shortest(rows, least) if len(G) else None
-            if found is None:
+            nearest = shortest(rows, least) if len(G) else None
+            if nearest is None:
                 return None
-            s = found
+            s = nearest
             if self.fits_at(s):
                 return s
         return None
@@ -158,8 +160,8 @@ class _Search(NamedTuple):
     def elsewhere(self) -> Array | None:
         """A point that fits, begun with at those of an even spread at which least is in excess."""
         points = sorted(even_points(len(self.space)), key=self._much)
-        found = (point if self.fits_at(point) else self.mended(point) for point in points[:_BEGUN])
-        return next((s for s in found if s is not None), None)
+        fitting_points = (point if self.fits_at(point) else self.mended(point) for point in points[:_BEGUN])
+        return next((s for s in fitting_points if s is not None), None)
 
     def _much(self, s: Array) -> float:
         return float(np.maximum(self.excess(self.space.tangent(s)), 0.0).sum())
@@ -168,6 +170,7 @@ class _Search(NamedTuple):
         """From a point that fits back towards zero as far as it fits, and from there to the nearest that is found."""
         inside = 1.0
         outside = 0.0
+        # bisection between a point that fits and zero, which does not
         for _ in range(_HALVINGS):
             middle = (inside + outside) / 2
             inside, outside = (middle, outside) if self.fits_at(middle * far) else (inside, middle)
@@ -177,9 +180,10 @@ class _Search(NamedTuple):
 
     def _linearised(self, s: Array) -> tuple[Array, Array]:
         """Of each measure that is in excess at s: G s' >= h mends it."""
+        # forward differences, G_ki = -(e_k(s + d u_i) - e_k(s)) / d: e_k falls to zero where G s' >= G s + e(s)
         now = self.excess(self.space.tangent(s))
         over = now > 0.0
-        ends = [self.excess(self.space.tangent(s + _STEP * one))[over] for one in np.eye(len(s))]
+        ends = [self.excess(self.space.tangent(s + _STEP * axis))[over] for axis in np.eye(len(s))]
         G = -(np.array(ends).T - now[over][:, None]) / _STEP
         return G, G @ s + now[over] + _BEYOND
 
@@ -188,6 +192,7 @@ def shortest(G: Array, h: Array) -> Array | None:
     """The shortest x with G x >= h, (f,); None if there is none (Lawson and Hanson, LDP)."""
     from scipy.optimize import nnls
 
+    # u >= 0 that minimises |E u - f| with E = [G^t; h^t] and f = (0, .., 0, 1); then x = -r_1..n / r_n+1 of r = E u - f
     f = np.append(np.zeros(G.shape[1]), 1.0)
     E = np.vstack([G.T, h])
     residual = E @ nnls(E, f)[0] - f

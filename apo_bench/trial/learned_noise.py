@@ -22,7 +22,7 @@ from apo_bench.observation.models.fitted import ConstantError, MeasuredNoise, Vi
 from apo_bench.observation.models.residuals import INLIER_MM, TURNED_DEG
 from apo_bench.observation.models.tails import Split, Tail
 
-FEWEST = 5
+FEWEST_OBSERVATIONS = 5
 """Observations below which nothing is learned."""
 _GROSS = 8.0
 """An operation is taken for grossly wrong at first if its error is so many times the median."""
@@ -55,51 +55,57 @@ def learn(observations: Sequence[Observation], camera: Camera, source: str, *, c
     Raises:
         InputError: Too few observations, or too few that can be corrected.
     """
-    made = [(one, correct(one, "contact-robust")) for one in observations]
-    usable = [(one, correction) for one, correction in made if correction.ok]
-    if len(usable) < FEWEST:
+    corrections = [(observation, correct(observation, "contact-robust")) for observation in observations]
+    usable = [(observation, correction) for observation, correction in corrections if correction.ok]
+    if len(usable) < FEWEST_OBSERVATIONS:
         raise InputError(
-            f"{len(observations)} observations were given, of which {len(usable)} can be corrected; at least {FEWEST} "
-            "are needed to learn a camera's noise."
+            f"{len(observations)} observations were given, of which {len(usable)} can be corrected; at least "
+            f"{FEWEST_OBSERVATIONS} are needed to learn a camera's noise."
         )
     P = view_frame(camera, [correction.goals for _, correction in usable])
-    errors = [pose.log(pose.inverse(c.goals) @ one.goals) / UNITS for one, c in usable]
-    size = [np.sqrt(np.square(xi.reshape(-1, 2, 3)).mean(axis=2)) for xi in errors]
-    seen = np.concatenate([s[one.seen] for s, (one, _) in zip(size, usable, strict=True)])
-    typical = np.maximum(np.median(seen, axis=0), 1e-3)
-    shown = []
-    for (one, correction), s in zip(usable, size, strict=True):
-        gross = frozenset(np.flatnonzero((s > _GROSS * typical).any(axis=1) | ~one.seen).tolist())
-        n = len(one.goals)
-        unseen = frozenset(np.flatnonzero(~one.seen).tolist())
+    # errors that the correction took away, log(T_corrected^-1 T_seen); of each the size in mm and in degrees, (n, 2)
+    errors = [pose.log(pose.inverse(c.goals) @ observation.goals) / UNITS for observation, c in usable]
+    sizes = [np.sqrt(np.square(xi.reshape(-1, 2, 3)).mean(axis=2)) for xi in errors]
+    of_seen = np.concatenate([size[observation.seen] for size, (observation, _) in zip(sizes, usable, strict=True)])
+    typical = np.maximum(np.median(of_seen, axis=0), 1e-3)
+    evidence = []
+    for (observation, correction), size in zip(usable, sizes, strict=True):
+        # which operations are grossly wrong is not known: a first guess, and each that differs from it in one
+        gross = frozenset(np.flatnonzero((size > _GROSS * typical).any(axis=1) | ~observation.seen).tolist())
+        n = len(observation.goals)
+        unseen = frozenset(np.flatnonzero(~observation.seen).tolist())
         others = [gross ^ {k} for k in range(n) if k not in unseen]
         F = component_factors(camera, correction.goals, P)
         ways = view_ways(correction.goals, P)
-        shown.append(Shown(readings(one, correction.goals, [gross, *others]), F, ways, n, unseen))
+        evidence.append(Shown(readings(observation, correction.goals, [gross, *others]), F, ways, n, unseen))
+    # the likelihood is climbed from what is typical; errors of a whole view are taken for smaller at first
     start = [typical[0 if component.unit == "mm" else 1] for component in COMPONENTS]
     start[4:] = [0.3 * x for x in start[4:]]
-    found = learn_noise(shown, start, constant)
-    far = np.concatenate([s[list(one.readings[0].gross - one.unseen), 0] for s, one in zip(size, shown, strict=True)])
-    operations = sum(one.n for one in shown)
-    missing = sum(len(one.unseen) for one in shown)
-    measured = _measured(found, far * np.sqrt(3.0), source, missing / operations, P)
-    return Learned(found, measured, camera, operations, missing, len(usable))
+    learned = learn_noise(evidence, start, constant)
+    gross_of = [list(each.readings[0].gross - each.unseen) for each in evidence]
+    far = np.concatenate([size[gross, 0] for size, gross in zip(sizes, gross_of, strict=True)])
+    operations = sum(each.n for each in evidence)
+    missing = sum(len(each.unseen) for each in evidence)
+    # a size is a mean per axis: sqrt(3) of it is the length of the shift
+    measured = _measured(learned, far * np.sqrt(3.0), source, missing / operations, P)
+    return Learned(learned, measured, camera, operations, missing, len(usable))
 
 
-def _measured(found: LearnedNoise, far_mm: Array, source: str, missed: float, P: Array) -> MeasuredNoise:
-    across, along, tilt, about, shift, turn = (estimate.value for estimate in found.deviations)
+def _measured(learned: LearnedNoise, far_mm: Array, source: str, missed: float, P: Array) -> MeasuredNoise:
+    across, along, tilt, about, shift, turn = (estimate.value for estimate in learned.deviations)
     limit_mm = max(INLIER_MM, _LIMIT * max(across, along))
     limit_deg = max(TURNED_DEG, _LIMIT * max(tilt, about))
     far_mm = far_mm[far_mm > limit_mm]
+    # the distances of outliers are taken for log-uniform from the limit on: the mean logarithm is half of the farthest
     farthest = limit_mm * float(np.exp(2.0 * np.log(far_mm / limit_mm).mean())) if len(far_mm) else 2.0 * limit_mm
-    there = any(estimate.low > 0.0 for estimate in found.deviations[4:])
+    there = any(estimate.low > 0.0 for estimate in learned.deviations[4:])
     return MeasuredNoise(
         source=source,
         shift_mm=Split(Tail(across), Tail(along), limit_mm),
         turn_deg=Split(Tail(tilt), Tail(about), min(limit_deg, 180.0)),
         missed=missed,
-        outliers=found.gross.value,
+        outliers=learned.gross.value,
         farthest_mm=farthest,
         view=ViewNoise(shift, turn) if there else None,
-        constant=ConstantError(found.constant * UNITS, P) if found.constant.any() else None,
+        constant=ConstantError(learned.constant * UNITS, P) if learned.constant.any() else None,
     )

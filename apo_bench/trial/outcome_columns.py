@@ -27,8 +27,8 @@ def confidence_columns(
         truth: (n, 4, 4), world frame, [m]; None if it is not known.
     """
     right = observation.assembly
-    told = corrector_input.assembly
-    wrong: Row = {"wrong_relation": None if told is right else culprit(right, told)}
+    given_assembly = corrector_input.assembly
+    wrong: Row = {"wrong_relation": None if given_assembly is right else culprit(right, given_assembly)}
     return wrong | _test(result.correction) | _truth(result, corrector_input, truth)
 
 

@@ -65,15 +65,15 @@ def apply_method(
         return _uncorrected(observation, observation.goals, observation_failure(observation))
     if isinstance(method, str) and method == "by-heart" and where is not None:
         return _by_heart(observation, where)
-    given = observation if corrector_input is None else corrector_input
-    correction = correct_named(given, with_simulated(method), look)
+    believed = observation if corrector_input is None else corrector_input
+    correction = correct_named(believed, with_simulated(method), look)
     if not correction.ok:
         failure = Outcome("correct", correction.status, None, correction.sentence)
         return MethodResult(None, failure, correction.gap_before_m, math.nan, correction)
     plan = correction.plan(observation)
-    found = FittingPlan(plan) if where is None else fitting_plan(correction, observation, where, given)
-    after_m = largest_gap(plan.assembly, plan.start, found.plan.goals) if found.moves else correction.gap_after_m
-    return MethodResult(found.plan, None, correction.gap_before_m, after_m, correction, found)
+    fitting = FittingPlan(plan) if where is None else fitting_plan(correction, observation, where, believed)
+    after_m = largest_gap(plan.assembly, plan.start, fitting.plan.goals) if fitting.moves else correction.gap_after_m
+    return MethodResult(fitting.plan, None, correction.gap_before_m, after_m, correction, fitting)
 
 
 def _by_heart(observation: Observation, where: Scene | Scenario) -> MethodResult:
@@ -126,7 +126,7 @@ def arm_sentence(scenario: Scenario, plan: Plan | None, arm: str) -> str:
         at = layout_at(scenario, x, y, yaw, clearance_mm=scene.clearance_mm)
         plan = Plan(scenario.assembly, at.start, at.goals)
     moves = arm_moves(plan, scene)
-    found = predict(plan, scene.clearance_mm, scenario.thresholds, scenario.attach, moves)
+    prediction = predict(plan, scene.clearance_mm, scenario.thresholds, scenario.attach, moves)
     margins = [move.margin_deg for move in moves if move.margin_deg is not None]
-    room = f"; its joints stay {min(margins):.0f} deg from their limits" if margins and not found.fails else ""
-    return f"{arm}: {found.sentence}{room}"
+    room = f"; its joints stay {min(margins):.0f} deg from their limits" if margins and not prediction.fails else ""
+    return f"{arm}: {prediction.sentence}{room}"

@@ -45,10 +45,12 @@ def goal_errors(assembly: Assembly, start: Poses, truth_goals: Array, goals: Arr
     Returns:
         (fixed, free).
     """
+    # rotations count as ways of a point at LENGTH_M, so that all coordinates are lengths
     unit = np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], len(assembly))
     goals = _turned_back(assembly, truth_goals, goals)
     error = pose.log(pose.inverse(truth_goals) @ goals).ravel() * unit
     _, J = equations(assembly, start, truth_goals).linearised(truth_goals)
+    # de = (J / unit) (unit dxi): the rows of J / unit span what contacts see, and B^t B projects onto that span
     basis = _row_space(J / unit)
     fixed = basis.T @ (basis @ error)
     return _rms_mm(fixed, len(assembly)), _rms_mm(error - fixed, len(assembly))
@@ -58,7 +60,9 @@ def _turned_back(assembly: Assembly, truth_goals: Array, goals: Array) -> Array:
     """Goals whose parts of revolution are turned about their axes as near to the truth as can be."""
     alone = [None if operation.carries else assembly.solids[operation.main] for operation in assembly.operations]
     pairs = zip(alone, goals, truth_goals, strict=True)
-    return np.array([T if one is None else turned_alike(one, T, true) for one, T, true in pairs]).reshape(-1, 4, 4)
+    return np.array([T if solid is None else turned_alike(solid, T, true) for solid, T, true in pairs]).reshape(
+        -1, 4, 4
+    )
 
 
 def _rms_mm(error: Array, operations: int) -> float:

@@ -36,10 +36,10 @@ def with_recognised_contacts(observation: Observation, kind: str) -> Observation
     return replace(observation, assembly=recognise_by(observation, kind).assembly)
 
 
-def count_contacts(right: Assembly, given: Assembly) -> dict[str, int]:
+def count_contacts(right: Assembly, told: Assembly) -> dict[str, int]:
     """How many of the contacts that were given are right, how many were missed, how many are false."""
     true = _contacts(right)
-    named = _contacts(given)
+    named = _contacts(told)
     return {
         "contacts_right": len(true & named),
         "contacts_missed": len(true - named),

@@ -149,31 +149,32 @@ def predicted_outcome(plan: Plan, scene: Scene, searches: bool = False) -> Predi
     scenario = scene.scenario
     prediction = predict(plan, scene.clearance_mm, scenario.thresholds, scenario.attach, arm)
     operation = None if prediction.operation is None else prediction.operation + 1
-    said: Predicted = {
+    predicted: Predicted = {
         "fails": prediction.fails,
         "operation": operation,
         "code": prediction.code,
         "size_mm": prediction.size_mm,
     }
-    return said if prediction.code not in ARM_CODES else {**said, "sentence": prediction.sentence}
+    return predicted if prediction.code not in ARM_CODES else {**predicted, "sentence": prediction.sentence}
 
 
-def draw_robot_error(given: str, scene: Scene, seed: int, salt: Salt | None = None) -> RobotError | None:
+def draw_robot_error(name: str, scene: Scene, seed: int, salt: Salt | None = None) -> RobotError | None:
     """What is wrong with the robot in a trial, in proportion to the standard deviations; None of a right one.
 
     The base is turned about the middle of the nominal goals. A part slips along the pads, the second and third axis of
     the tip, and turns about their normal, the first.
 
     Args:
-        given: As in a row.
+        name: As in a row.
     """
-    if given == NO_ROBOT_ERROR:
+    if name == NO_ROBOT_ERROR:
         return None
-    sigmas = robot_sigmas(given)
+    sigmas = robot_sigmas(name)
     drawn = stream(seed, HAND_EYE, salt).standard_normal(6)
     hand_eye = pose.at(1e-3 * sigmas.hand_eye[0] * drawn[:3], sigmas.hand_eye[1] * drawn[3:])
     middle = np.eye(4)
     middle[:3, 3] = scene.scenario.goals[:, :3, 3].mean(axis=0)
+    # turned about the middle of the goals: E becomes T_m E T_m^-1
     if sigmas.hand_eye != (0.0, 0.0):
         hand_eye = middle @ hand_eye @ pose.inverse(middle)
     joints = np.radians(sigmas.joints_deg) * stream(seed, JOINTS, salt).standard_normal(len(scene.arm.joints))
@@ -217,9 +218,9 @@ def trial_outcome(attempt: Attempt) -> Outcome:
         return Outcome("done", "ok", None, sentence("ok"))
     if outcome.failed:
         return outcome
-    found = verdict.rests_on
-    why = f": {found.why}" if found.why else ""
-    return Outcome("judge", found.code, None, sentence(found.code) + why)
+    conditions = verdict.rests_on
+    why = f": {conditions.why}" if conditions.why else ""
+    return Outcome("judge", conditions.code, None, sentence(conditions.code) + why)
 
 
 _SHAPING = tuple(name for name, info in SETTINGS.items() if info.scene)
@@ -234,8 +235,8 @@ def scene_of(settings: TrialSettings, scenario: Scenario | None = None) -> Scene
     Raises:
         InputError: There is no such scenario or arm, or a part cannot have the clearance.
     """
-    found = load_scenario(settings.scenario) if scenario is None else scenario
-    return build_scene(found, **{name: getattr(settings, name) for name in _SHAPING})
+    loaded = load_scenario(settings.scenario) if scenario is None else scenario
+    return build_scene(loaded, **{name: getattr(settings, name) for name in _SHAPING})
 
 
 def scene_key(settings: TrialSettings) -> tuple[Any, ...]:

@@ -56,9 +56,9 @@ def _kept(row: Row, predictions: dict[Any, Predicted]) -> Row:
     for name, value in kept.items():
         if type(value) is str:
             kept[name] = sys.intern(value)
-    said = row["predicted"]
-    if said is not None:
-        what = (said["fails"], said["operation"], said["code"])
-        known: Predicted = {"fails": said["fails"], "operation": said["operation"], "code": said["code"]}
+    predicted = row["predicted"]
+    if predicted is not None:
+        what = (predicted["fails"], predicted["operation"], predicted["code"])
+        known: Predicted = {"fails": predicted["fails"], "operation": predicted["operation"], "code": predicted["code"]}
         kept["predicted"] = predictions.setdefault(what, known)
     return cast(Row, kept)

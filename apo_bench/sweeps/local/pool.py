@@ -69,9 +69,9 @@ def _run_here(work: Sequence[Unit], lock: EnvironmentLock, emit: Emit, check: Ch
     worker = Worker(0, lock)
     try:
         for unit in work:
-            for kind, *said in worker.run(unit):
+            for kind, *content in worker.run(unit):
                 if kind == "row":
-                    emit(*said)
+                    emit(*content)
                 else:
                     check()
     finally:

@@ -42,7 +42,7 @@ class _Place(NamedTuple):
 class Process:
     """A process that works for this one, as this one sees it."""
 
-    def __init__(self, work: Callable[..., None], *given: Any) -> None:
+    def __init__(self, work: Callable[..., None], *arguments: Any) -> None:
         """Start it.
 
         Args:
@@ -52,7 +52,7 @@ class Process:
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
         place = _Place(folder_of_own_modules(), os.environ.get(SAFE_PATH))
-        self._process = context.Process(target=_live, args=(work, given, theirs, place))
+        self._process = context.Process(target=_live, args=(work, arguments, theirs, place))
         self._is_open = True
         with environment(dict.fromkeys((*THREADS, SAFE_PATH), "1")):
             resource_tracker.ensure_running()
@@ -117,15 +117,15 @@ class Process:
         self._pipe.close()
 
 
-def _live(work: Callable[..., None], given: tuple[Any, ...], pipe: Any, place: _Place) -> None:
+def _live(work: Callable[..., None], arguments: tuple[Any, ...], pipe: Any, place: _Place) -> None:
     """The life of the process: its work, and why that ends if it does too early."""
     del os.environ[SAFE_PATH]
     if place.safe is not None:
         os.environ[SAFE_PATH] = place.safe
     if hasattr(os, "setsid"):
         os.setsid()
-    for one in SIGNALS:
-        signal.signal(one, signal.SIG_IGN)
+    for number in SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
     if hasattr(signal, "pthread_sigmask"):
         signal.pthread_sigmask(signal.SIG_UNBLOCK, SIGNALS)
     threading.Thread(target=_end_with_parent, daemon=True).start()
@@ -138,7 +138,7 @@ def _live(work: Callable[..., None], given: tuple[Any, ...], pipe: Any, place: _
 
     with suppress(OSError), own_modules_in(place.folder):
         try:
-            work(*given, say, pipe)
+            work(*arguments, say, pipe)
         except Exception as error:
             say(*last_message(error))
         except KeyboardInterrupt:

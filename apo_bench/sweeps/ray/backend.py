@@ -44,17 +44,17 @@ def check_ray(address: str | None) -> None:
     named = (os.environ.get("RAY_ADDRESS") or "auto") if address in (None, "auto") else str(address)
     if named in ("auto", "local"):
         return
-    found = re.fullmatch(r"\[?([^\[\]/]+)\]?:(\d{1,5})", named)
-    if found is None or not 0 < int(found[2]) < 2**16:
+    match = re.fullmatch(r"\[?([^\[\]/]+)\]?:(\d{1,5})", named)
+    if match is None or not 0 < int(match[2]) < 2**16:
         raise InputError(
             f"the address '{named}' of a Ray cluster was given; HOST:PORT of its head is allowed, such as "
             "10.0.0.5:6379, or auto, or local."
         )
     try:
-        socket.create_connection((found[1], int(found[2])), timeout=_TOUCH_S).close()
+        socket.create_connection((match[1], int(match[2])), timeout=_TOUCH_S).close()
     except (OSError, UnicodeError) as error:
         raise InputError(
-            f"no Ray cluster answers at {named} ({error}); start one there with: ray start --head --port={found[2]}"
+            f"no Ray cluster answers at {named} ({error}); start one there with: ray start --head --port={match[2]}"
         ) from error
 
 
@@ -141,8 +141,8 @@ class _Joining:
     def last_line(self) -> str:
         """What Ray said last, if anything."""
         lines = [line.strip() for line in self._text().splitlines() if line.strip()]
-        said = re.sub(r"^\[[^\]]*\] \S+: ", "", lines[-1]).rstrip(".") if lines else ""
-        return f" ({said[:200]})" if said else ""
+        text = re.sub(r"^\[[^\]]*\] \S+: ", "", lines[-1]).rstrip(".") if lines else ""
+        return f" ({text[:200]})" if text else ""
 
     def _text(self) -> str:
         try:
@@ -170,9 +170,9 @@ def _listen(driver: Process, plan: ClusterPlan, joining: _Joining, emit: Emit, c
     """Take rows until the last word."""
     while True:
         is_alive = driver.exit_code is None
-        kind, *said = driver.wait(check, _TURN_S) or (None,)
+        kind, *content = driver.wait(check, _TURN_S) or (None,)
         if kind == "row":
-            emit(*said)
+            emit(*content)
         elif kind == "starting":
             joining.give(_STARTING_S)
         elif kind == "connected":

@@ -164,12 +164,12 @@ def runtime_files(names: Names) -> dict[str, Path]:
     files += [path for name in brought if (path := Path(name)).is_file()]
     here = Path.cwd()
     own = [Path(path) for path in _installed()]
-    found = {}
+    own_files = {}
     for path in files:
         whole = Path(os.path.normpath(here / path))
         if whole.is_relative_to(here) and not any(map(whole.is_relative_to, own)):
-            found[whole.relative_to(here).as_posix()] = whole
-    return dict(sorted(found.items()))
+            own_files[whole.relative_to(here).as_posix()] = whole
+    return dict(sorted(own_files.items()))
 
 
 def _installed() -> set[str]:

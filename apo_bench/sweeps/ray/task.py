@@ -47,8 +47,8 @@ def messages(packed: bytes, unit: Unit, node: str) -> Iterator[Message]:
         node: The id of the node that it is on.
     """
     try:
-        for kind, *said in _worker(packed).run(unit):
-            yield (kind, said[0], said[1] | {"node": node}) if kind == "row" else (kind, *said)
+        for kind, *content in _worker(packed).run(unit):
+            yield (kind, content[0], content[1] | {"node": node}) if kind == "row" else (kind, *content)
     except Exception as error:
         yield last_message(error)
     except (KeyboardInterrupt, SystemExit):

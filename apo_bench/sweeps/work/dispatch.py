@@ -126,7 +126,7 @@ class Dispatch:
             InputError: The request cannot be honoured.
             RuntimeError: A trial could not be run.
         """
-        kind, *said = checked(message)
+        kind, *content = checked(message)
         job.heard = self._now
         if kind == "began":
             job.since = self._now
@@ -137,7 +137,7 @@ class Dispatch:
             job.since = None
             job.deaths = 0
             job.false_starts = 0
-            self._emit(*said)
+            self._emit(*content)
 
     def is_late(self, job: Job) -> bool:
         """Whether the time of its trial is up, or that in which one should have begun."""

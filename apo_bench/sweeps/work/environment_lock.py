@@ -94,14 +94,14 @@ class EnvironmentLock:
             if here.get(name) != content:
                 raise InputError(f"the file behind the {name} is another one there; use the same everywhere.")
         arm = find_arm(self.names.arm)
-        for given in self.names.scenarios:
-            self.check_content(given, content_hash(load_scenario(given), given, arm.files))
+        for source in self.names.scenarios:
+            self.check_content(source, content_hash(load_scenario(source), source, arm.files))
 
-    def check_content(self, given: str, content: str) -> None:
+    def check_content(self, source: str, content: str) -> None:
         """Raise an `InputError` unless a scenario, and the code that runs it, are the same here."""
-        if content != self.content[given]:
+        if content != self.content[source]:
             raise InputError(
-                f"a worker on '{platform.node()}' has other code or other files for '{given}' than the process that "
+                f"a worker on '{platform.node()}' has other code or other files for '{source}' than the process that "
                 "started the sweep; install the same everywhere, or start the same command again if a file was changed."
             )
 
@@ -127,7 +127,7 @@ def environment_lock(
     Args:
         loaded: Every scenario by what was given for it.
     """
-    content = {given: content_hash(scenario, given, arm_files) for given, scenario in loaded.items()}
+    content = {source: content_hash(scenario, source, arm_files) for source, scenario in loaded.items()}
     return EnvironmentLock(content, versions(), corrector_limit_s, names, names.hashes())
 
 
