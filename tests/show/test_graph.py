@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from itertools import combinations, pairwise
 from pathlib import Path
 
@@ -107,3 +108,17 @@ def test_words_are_in_the_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     for words in ("Fig. 7", "cube3", "R9", "2.00 mm", "not seen", "dashed: disappeared; red: above 0.1 mm"):
         assert words in text
     assert text.count("#c8102e") >= 16
+
+
+def test_what_no_longer_stands_is_dashed(tmp_path: Path) -> None:
+    """Fig. 7: placements that parts have left, and contacts that are gone, have dashed outlines; nothing else has."""
+    graph = graph_of("pockets", 6)
+    draw_graph(graph, tmp_path / "a.svg", title="Fig. 7")
+    styles = re.findall(
+        r'style="(fill: #[0-9a-f]{6};[^"]*stroke: #[0-9a-f]{6}[^"]*)"', (tmp_path / "a.svg").read_text()
+    )
+    boxes = [style for style in styles if "stroke-linejoin: miter" in style]
+    left = [style for style in boxes if "stroke: #8a8a8a" in style]
+    assert len(boxes) == len(graph.nodes)
+    assert len(left) == sum(not graph.stands(node) for node in graph.nodes) == 3
+    assert all(("stroke-dasharray" in style) == (style in left) for style in boxes)

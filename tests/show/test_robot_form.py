@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Plan
+from apo_bench.assembly.goals import Plan, Step
 from apo_bench.files.robot_frames import RobotFrames
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -98,3 +98,21 @@ def test_the_tip_looks_down_and_closes_along_the_grasp() -> None:
         assert np.allclose(tip[:3, 2], [0.0, 0.0, -1.0])
         assert np.allclose(tip[:3, 0], T[:3, :3] @ grasp.across)
         assert np.isclose(np.linalg.det(tip[:3, :3]), 1.0)
+
+
+def test_a_part_that_is_taken_out_again_leaves_its_contacts_one_after_the_other() -> None:
+    """The wedge under the roof comes out in two motions: the second begins where the first one ended."""
+    scenario = load_scenario("wedge_under_roof")
+    layout = layout_at(scenario, 0.1, 0.0, 0.3)
+    schedule = (Step(0), Step(1), Step(1, undo=True), Step(1))
+    plan = Plan(scenario.assembly, layout.start, layout.goals, schedule)
+    lines = plan_lines(plan, scenario)
+    undone = robot_form(lines, plan, scenario, RobotFrames())["steps"][2]
+    departs = len(lines[2].leaves.departs)
+    first, second = undone["motions"][:departs]
+    assert undone["undo"]
+    assert np.allclose(matrix(first["to"]), matrix(second["from"]), atol=1e-9)
+    assert first["direction"] != second["direction"]
+    grip = matrix(undone["grasp"]["tip_in_part"])
+    assert np.allclose(matrix(first["from"]), layout.goals[1] @ grip, atol=1e-9)
+    assert np.allclose(matrix(undone["part_at_goal"]), layout.start[undone["part"]], atol=1e-9)

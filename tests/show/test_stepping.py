@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
+from unittest.mock import MagicMock
 
 import mujoco
 import numpy as np
@@ -192,3 +193,52 @@ def test_a_browser_is_served_what_the_cursor_is_at(tower: Scene) -> None:
     said: list[str] = []
     serve_story(with_goals(tower), 18417, said.append, ends=lambda: bool(said))
     assert said[0].startswith("Open http://127.0.0.1:18")
+
+
+def test_clicks_in_a_browser_move_the_cursor(tower: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Buttons, sliders and boxes do what stands on them; viser itself is played by a stand-in that keeps callbacks."""
+    from apo_bench.show import browser
+
+    server = MagicMock()
+    sliders: list[Any] = []
+
+    def slider(*_: Any, **__: Any) -> Any:
+        sliders.append(MagicMock())
+        return sliders[-1]
+
+    server.gui.add_slider.side_effect = slider
+    monkeypatch.setattr(browser, "_server", lambda _: server)
+    page = browser.Page(with_goals(tower), 8080)
+    cursor = page.cursor
+
+    def click(label: str) -> None:
+        event = SimpleNamespace(target=SimpleNamespace(value=label))
+        for group, on_click in zip(server.gui.add_button_group.call_args_list, clicked, strict=True):
+            if label in group.args[1]:
+                on_click.args[0](event)
+
+    clicked = server.gui.add_button_group.return_value.on_click.call_args_list
+    assert cursor.moment == 0
+    click("moment on")
+    click("moment on")
+    assert cursor.moment == 2
+    click("moment back")
+    assert cursor.moment == 1
+    click("operation on")
+    assert cursor.at.doing.operation == 1
+    click("play / stop")
+    assert cursor.playing
+    click("play / stop")
+    slid = sliders[0].on_update.call_args.args[0]
+    slid(SimpleNamespace(target=SimpleNamespace(value=1)))
+    assert cursor.moment == 1
+    (seen, true) = (call.args[0] for call in server.gui.add_checkbox.return_value.on_update.call_args_list)
+    seen(SimpleNamespace(target=SimpleNamespace(value=True)))
+    assert cursor.goals == {AS_SEEN}
+    true(SimpleNamespace(target=SimpleNamespace(value=True)))
+    seen(SimpleNamespace(target=SimpleNamespace(value=False)))
+    assert cursor.goals == {AS_TRUE}
+    page.draw()
+    assert sliders[0].value == 1
+    page.close()
+    server.stop.assert_called_once()
