@@ -39,7 +39,7 @@ def noise_list() -> None:
 
 
 @noise.command("card")
-def noise_card(
+def print_noise_card(
     name: Annotated[str, typer.Argument(help=_NAME)],
     level: Annotated[
         float, typer.Option(help="Of the histogram: mm and degrees, standard deviation; of measured noise, a factor.")
@@ -49,13 +49,12 @@ def noise_card(
     """Print the card of a noise model: formula, frame, parameters, and a histogram of its errors."""
     from apo_bench.observation.noise import Level
     from apo_bench.records.settings import check
-    from apo_bench.show import noise_card as cards
-    from apo_bench.show.noise_card import draw_histogram
+    from apo_bench.show.noise_card import draw_errors, draw_histogram, noise_card
 
     check("level_mm", level, called="level")
     check_outputs([(out, "--out", (".png",))])
-    drawn = cards.draw_errors(name, Level(level, level))
-    typer.echo(cards.noise_card(name, Level(level, level), drawn), nl=False)
+    drawn = draw_errors(name, Level(level, level))
+    typer.echo(noise_card(name, Level(level, level), drawn), nl=False)
     if out is None:
         return
     if not len(drawn.errors):

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 @takes(trial_options())
-def replay_command(
+def run_replay(
     scenario: ScenarioArgument,
     *,
     observation: Annotated[Path | None, typer.Option(help="Replay this observation file instead.")] = None,

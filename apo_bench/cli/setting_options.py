@@ -16,7 +16,7 @@ from apo_bench.records.relations import RECOGNISED
 from apo_bench.records.run.replay_command import milli, number
 from apo_bench.records.setting_info import SettingInfo
 from apo_bench.records.settings import LEVEL, SETTINGS
-from apo_bench.records.short_names import FOREIGN_ARMS, METHODS, RELATIONS
+from apo_bench.records.short_names import FOREIGN_ARMS, METHODS, WRONG_RELATIONS
 from apo_bench.resources import folder
 
 Completion = Callable[[str], list[str]]
@@ -24,7 +24,7 @@ Completion = Callable[[str], list[str]]
 Command = TypeVar("Command", bound=Callable[..., None])
 
 
-def names_of(what: str) -> list[str]:
+def offered_names(what: str) -> list[str]:
     """Names that a shell is offered for a setting, or `scenario`: what comes with the package, and how others begin."""
     if what == "scenario":
         return _stems("scenarios", "*.toml")
@@ -35,7 +35,7 @@ def names_of(what: str) -> list[str]:
     if what == "arm":
         return [SETTINGS["arm"].default, *_stems("assets", "arms/*.toml"), *FOREIGN_ARMS]
     if what == "relations":
-        return [SETTINGS["relations"].default, *RECOGNISED, *RELATIONS]
+        return [SETTINGS["relations"].default, *RECOGNISED, *WRONG_RELATIONS]
     return [*METHODS, "search"] if what == "method" else [*SETTINGS[what].choices]
 
 
@@ -44,8 +44,8 @@ def completion(what: str) -> Completion:
 
     def complete(incomplete: str) -> list[str]:
         before, comma, last = incomplete.rpartition(",")
-        chosen = before.split(",")
-        return [f"{before}{comma}{name}" for name in names_of(what) if name.startswith(last) and name not in chosen]
+        names = [name for name in offered_names(what) if name.startswith(last) and name not in before.split(",")]
+        return [f"{before}{comma}{name}" for name in names]
 
     return complete
 

@@ -21,8 +21,8 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
-OBSERVATION = "apo-bench/observation/2"
-PLAN = "apo-bench/plan/2"
+OBSERVATION_SCHEMA = "apo-bench/observation/2"
+PLAN_SCHEMA = "apo-bench/plan/2"
 
 _TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
 
@@ -41,7 +41,7 @@ def observation_form(observation: Observation, scenario: str) -> Form:
         for C, s in zip(observation.covariance, observation.seen, strict=True)
     ]
     return {
-        **_head(OBSERVATION, scenario, observation.start),
+        **_head(OBSERVATION_SCHEMA, scenario, observation.start),
         "gap_mm": observation.gap_m * 1e3,
         "play_mm": observation.play_m * 1e3,
         "operations": _operations_form(observation.assembly, observation.goals, extra),
@@ -54,7 +54,7 @@ def observation_form(observation: Observation, scenario: str) -> Form:
 def plan_form(plan: Plan, scenario: str) -> Form:
     """The JSON form of a plan; a step has a pose of its own where that is not the goal of its operation."""
     return {
-        **_head(PLAN, scenario, plan.start),
+        **_head(PLAN_SCHEMA, scenario, plan.start),
         "operations": _operations_form(plan.assembly, plan.goals, [{}] * len(plan.assembly)),
         "schedule": [_step_form(plan, step, T) for step, T in zip(plan.schedule, plan.targets, strict=True)],
     }

@@ -12,7 +12,7 @@ from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError, unknown
 from apo_bench.files.deviations import ALLOWED_DEVIATIONS, SHIFT_M, TURN_RAD, is_sensible, is_within
-from apo_bench.files.json_forms import OBSERVATION, OUTLIER_KEYS, PLAN
+from apo_bench.files.json_forms import OBSERVATION_SCHEMA, OUTLIER_KEYS, PLAN_SCHEMA
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.io.documents import JsonNode, read_json
@@ -51,7 +51,7 @@ def read_json_observed(
         assumed: The deviations, mm and degrees, of operations that state none; None allows no such operation.
     """
     optional = ("start", "gap_mm", "play_mm", "outliers", "shared", "tails")
-    root = read_json(path).fields_of(OBSERVATION, ("scenario", "operations"), optional)
+    root = read_json(path).fields_of(OBSERVATION_SCHEMA, ("scenario", "operations"), optional)
     loaded = _scenario(root["scenario"], scenario, Path(path).parent)
     stated = ("covariance_mm_deg", "deviation_mm", "deviation_deg", "seen")
     entries = _operations(root["operations"], loaded.assembly, (), stated)
@@ -74,7 +74,7 @@ def read_json_observed(
 
 def read_plan(path: str | Path, scenario: Scenario | None = None) -> Plan:
     """A plan from its file; see `read_json_observation` for `scenario` and errors."""
-    root = read_json(path).fields_of(PLAN, ("scenario", "start", "operations", "schedule"))
+    root = read_json(path).fields_of(PLAN_SCHEMA, ("scenario", "start", "operations", "schedule"))
     loaded = _scenario(root["scenario"], scenario, Path(path).parent)
     goals = np.array([_pose(entry) for entry in _operations(root["operations"], loaded.assembly, (), ())])
     steps = [_step(node, goals) for node in root["schedule"].items("schedule entry")]

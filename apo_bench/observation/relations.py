@@ -27,7 +27,7 @@ from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, Solid
 from apo_bench.names import resolve
 from apo_bench.records.relations import GIVEN, SHIFT_MM, relations_name
-from apo_bench.records.short_names import RELATIONS
+from apo_bench.records.short_names import WRONG_RELATIONS
 
 Relations = Callable[[Assembly, Poses, Array, np.random.Generator], Assembly]
 """Any function `(assembly, start, goals, rng) -> Assembly`: right relations and poses in, wrong relations out."""
@@ -59,7 +59,7 @@ def make_relations(given: Any) -> Relations | None:
         return None
     if name.startswith("shifted:"):
         return Shifted(float(name.partition(":")[2]) * 1e-3)
-    return _callable(resolve(name, RELATIONS, "kind of relations"), name)
+    return _callable(resolve(name, WRONG_RELATIONS, "kind of relations"), name)
 
 
 def with_relations(

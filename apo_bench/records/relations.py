@@ -10,11 +10,11 @@
 import math
 
 from apo_bench.errors import InputError, unknown
-from apo_bench.records.short_names import RELATIONS
+from apo_bench.records.short_names import WRONG_RELATIONS
 
 GIVEN = "given"
 """The contacts come with the demonstration, and are right."""
-WRONG = tuple(RELATIONS)
+WRONG = tuple(WRONG_RELATIONS)
 RECOGNISED = ("recognised", "recognised-fixed", "recognised-twice", "recognised-jointly")
 _KINDS = (GIVEN, *WRONG, *RECOGNISED)
 SHIFT_MM = 2.0

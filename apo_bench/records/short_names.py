@@ -34,7 +34,7 @@ UNCORRECTED = ("oracle", "none", "by-heart")
 """Plans without a corrector: the truth, what was seen, the scenario's own goals where they fit best what was seen."""
 METHODS = (*UNCORRECTED, *CORRECTORS, *SIMULATED)
 """What a robot can be told to do: a plan without a corrector, or by one."""
-RELATIONS = MappingProxyType(
+WRONG_RELATIONS = MappingProxyType(
     {
         "missed": "apo_bench.observation.relations:missed",
         "false": "apo_bench.observation.relations:false",

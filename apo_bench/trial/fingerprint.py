@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench import __version__
-from apo_bench.files.json_forms import OBSERVATION, PLAN
+from apo_bench.files.json_forms import OBSERVATION_SCHEMA, PLAN_SCHEMA
 from apo_bench.io.reading import read_bytes
 from apo_bench.names import admit
 from apo_bench.observation.presets import noise_path
@@ -29,7 +29,7 @@ from apo_bench.resources import folder
 from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.scenario import Scenario
 
-_SCHEMAS = (ROW, OBSERVATION, PLAN)
+_SCHEMAS = (ROW, OBSERVATION_SCHEMA, PLAN_SCHEMA)
 ROOMS_WITHOUT_TRIALS = ("cli", "drafting", "envs", "report", "show", "statistics", "sweeps/local", "sweeps/ray")
 """Commands, how work is spread, and all that is made of rows afterwards."""
 

@@ -25,7 +25,7 @@ from apo_bench.correction.solvers.whitened import noise_factor, spread
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
-TRIED = 32
+_TRIED = 32
 _BEGUN = 4
 """Places that are looked at where linearising leads nowhere, and how many of them are begun with."""
 _TURNS = 5
@@ -128,7 +128,7 @@ def even_points(dimensions: int) -> Iterator[Array]:
     for _ in range(30):
         root = (1.0 + root) ** (1.0 / (dimensions + 1))
     steps = root ** -np.arange(1.0, dimensions + 1.0)
-    points = norm.ppf((0.5 + np.arange(1, TRIED + 1)[:, None] * steps) % 1.0)
+    points = norm.ppf((0.5 + np.arange(1, _TRIED + 1)[:, None] * steps) % 1.0)
     yield from points[np.argsort((points * points).sum(axis=1), kind="stable")]
 
 
@@ -149,7 +149,7 @@ class _Search(NamedTuple):
             G, h = self._linearised(s)
             rows = np.concatenate([rows, G])
             least = np.concatenate([least, h])
-            nearest = shortest(rows, least) if len(G) else None
+            nearest = shortest_above(rows, least) if len(G) else None
             if nearest is None:
                 return None
             s = nearest
@@ -188,7 +188,7 @@ class _Search(NamedTuple):
         return G, G @ s + now[over] + _BEYOND
 
 
-def shortest(G: Array, h: Array) -> Array | None:
+def shortest_above(G: Array, h: Array) -> Array | None:
     """The shortest x with G x >= h, (f,); None if there is none (Lawson and Hanson, LDP)."""
     from scipy.optimize import nnls
 

@@ -12,7 +12,7 @@ import typer
 
 from apo_bench.cli.app import app, main
 from apo_bench.cli.help_groups import GROUPS, OPTIONS, OTHERS
-from apo_bench.cli.setting_options import axis_flag, completion, names_of
+from apo_bench.cli.setting_options import axis_flag, completion, offered_names
 from apo_bench.observation.noise import NOISES, Level, make_noise
 from apo_bench.records.method import checked_method
 from apo_bench.records.relations import checked_relations
@@ -88,12 +88,12 @@ def test_the_arms_of_other_collections_are_named(capsys: pytest.CaptureFixture[s
 
 
 def test_names_that_are_offered_are_the_names_there_are() -> None:
-    assert tuple(names_of("scenario")) == scenario_names()
-    assert {name for name in names_of("arm") if not name.endswith(":")} == set(arm_names())
-    assert [checked_method(name) for name in names_of("method")] == names_of("method")
-    assert [checked_relations(name) for name in names_of("relations") if name != "shifted"]
-    assert set(NOISES) < set(names_of("noise"))
-    for name in names_of("noise"):
+    assert tuple(offered_names("scenario")) == scenario_names()
+    assert {name for name in offered_names("arm") if not name.endswith(":")} == set(arm_names())
+    assert [checked_method(name) for name in offered_names("method")] == offered_names("method")
+    assert [checked_relations(name) for name in offered_names("relations") if name != "shifted"]
+    assert set(NOISES) < set(offered_names("noise"))
+    for name in offered_names("noise"):
         assert make_noise(name, Level(1.0, 1.0))
 
 
@@ -120,7 +120,7 @@ def test_a_shell_is_offered_names_and_commands(shell: str, typed: str, words: st
 
 
 def test_completion_loads_no_simulator() -> None:
-    names = "[names_of(what) for what in ('scenario', 'noise', 'arm')]"
-    program = f"import sys, apo_bench.cli.app; from apo_bench.cli.setting_options import names_of; {names}"
+    names = "[offered_names(what) for what in ('scenario', 'noise', 'arm')]"
+    program = f"import sys, apo_bench.cli.app; from apo_bench.cli.setting_options import offered_names; {names}"
     check = f"{program}; sys.exit(any(name in sys.modules for name in ('mujoco', 'scipy', 'matplotlib', 'mink')))"
     assert subprocess.run([sys.executable, "-c", check], check=False).returncode == 0

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.goals import Observation
 from apo_bench.geometry.arrays import Array
-from apo_bench.trial.free_directions import FreeSpace, even_points, free_space, nearest_fitting, shortest
+from apo_bench.trial.free_directions import FreeSpace, even_points, free_space, nearest_fitting, shortest_above
 from tests import scenes
 
 
@@ -34,7 +34,7 @@ def test_the_shortest_point_satisfies_all_and_is_shortest(seed: int, rows: int) 
     rng = np.random.default_rng(seed)
     G = rng.normal(size=(rows, 5))
     h = rng.normal(size=rows)
-    x = shortest(G, h)
+    x = shortest_above(G, h)
     assert x is not None
     assert (G @ x >= h - 1e-8).all()
     met = np.abs(G @ x - h) < 1e-8
@@ -44,8 +44,8 @@ def test_the_shortest_point_satisfies_all_and_is_shortest(seed: int, rows: int) 
 
 
 def test_what_cannot_be_has_no_shortest_point() -> None:
-    assert shortest(np.array([[1.0, 0.0], [-1.0, 0.0]]), np.array([1.0, 1.0])) is None
-    assert shortest(np.zeros((1, 3)), np.ones(1)) is None
+    assert shortest_above(np.array([[1.0, 0.0], [-1.0, 0.0]]), np.array([1.0, 1.0])) is None
+    assert shortest_above(np.zeros((1, 3)), np.ones(1)) is None
 
 
 @pytest.mark.parametrize("dimensions", [1, 4, 12])

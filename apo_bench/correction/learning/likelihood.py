@@ -22,7 +22,7 @@ import numpy as np
 from apo_bench.correction.learning.evidence import Reading
 from apo_bench.geometry.arrays import Array
 
-RANGE = 300.0
+_RANGE = 300.0
 """R: how far a gross error may lead in one direction, [mm] and [deg]."""
 SMALLEST = 1e-3
 """The least deviation of a component, [mm] or [deg]: none."""
@@ -89,7 +89,7 @@ def learn_noise(shown: Sequence[Shown], start: Sequence[float], constant: bool) 
     C = np.zeros((6, 6))
     x = np.array([*(2.0 * np.log(np.maximum(start, SMALLEST))), _logit(0.05)])
     low = [2.0 * np.log(SMALLEST)] * k + [_logit(_LEAST_RATE)]
-    bounds = list(zip(low, [2.0 * np.log(RANGE)] * k + [_logit(_MOST_RATE)], strict=True))
+    bounds = list(zip(low, [2.0 * np.log(_RANGE)] * k + [_logit(_MOST_RATE)], strict=True))
     prepared = [_prepared(one) for one in shown]
     for _ in range(4 if constant else 1):
         best = minimize(_surprise, x, args=(prepared, c), jac=True, bounds=bounds, method="L-BFGS-B")
@@ -162,7 +162,7 @@ def _by_set(x: Array, one: _Prepared, c: Array) -> tuple[Array, Array]:
     slopes = np.zeros((len(one.readings), len(x) - 1))
     for j, ready in enumerate(one.readings):
         logs[j] = (
-            ready.gross * np.log(rate) + (one.n - ready.gross) * np.log1p(-rate) - ready.fixed_less * np.log(RANGE)
+            ready.gross * np.log(rate) + (one.n - ready.gross) * np.log1p(-rate) - ready.fixed_less * np.log(_RANGE)
         )
         r = len(ready.known)
         if not r:
@@ -178,7 +178,7 @@ def _by_set(x: Array, one: _Prepared, c: Array) -> tuple[Array, Array]:
 
 def _constant(prepared: Sequence[_Prepared], x: Array) -> tuple[Array, Array]:
     """The most likely constant error given the rest, (6,), and its covariance, (6, 6), each set by its weight."""
-    H = np.eye(6) / RANGE**2
+    H = np.eye(6) / _RANGE**2
     g = np.zeros(6)
     variance = np.exp(x[:-1])
     for one in prepared:
