@@ -1,7 +1,7 @@
 """What an arm makes of a plan before it moves: reach, room to the limits of joints, room of the gripper, tip error."""
 
 from collections.abc import Iterable, Sequence
-from typing import Any, Literal, NamedTuple, cast
+from typing import Any, Literal, cast
 
 import mujoco
 import numpy as np
@@ -21,13 +21,6 @@ from apo_bench.simulation.scene.scene import Scene
 
 _AT_LIMIT_RAD = np.radians(0.5)
 _Refused = Literal["unreachable_start", "unreachable"]
-
-
-class _Struck(NamedTuple):
-    """The part that the gripper is deepest in, [m]."""
-
-    depth: float = 0.0
-    part: str = ""
 
 
 def arm_moves(plan: Plan, scene: Scene, searches: bool = False) -> tuple[ArmMove, ...]:
@@ -66,7 +59,7 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], bel
     if scene.arm.hand is None:
         return ArmMove(step.operation, step.undo)
     tip = scene.kinematics.forward(path[-1])[:3, 3]
-    struck = max(
+    depth, struck = max(
         _struck(scene, t.part, t.grips[0], OPEN_TO_PICK_M, believed),
         _struck(scene, t.part, t.grips[-1], OPEN_TO_RELEASE_M, after),
     )
@@ -74,8 +67,8 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], bel
     return ArmMove(
         operation=step.operation,
         undo=step.undo,
-        struck=struck.part,
-        struck_mm=1e3 * struck.depth,
+        struck=struck,
+        struck_mm=1e3 * depth,
         sag=_sag(scene, path[-1], _centroid(held), t.weight_n),
         beside_mm=_beside_mm(scene, tip, held),
         margin_deg=float(np.degrees(np.min([np.minimum(q - low, high - q) for q in path]))),
@@ -90,17 +83,18 @@ def _at_limit(scene: Scene, q: Array) -> str:
     return scene.arm.joints[k] if room[k] < _AT_LIMIT_RAD else ""
 
 
-def _struck(scene: Scene, part: str, grip: Grip, beyond: float, poses: Poses) -> _Struck:
-    """What the open fingers are in where a part stands that they take, or have let go."""
+def _struck(scene: Scene, part: str, grip: Grip, beyond: float, poses: Poses) -> tuple[float, str]:
+    """How deep the open fingers are in another part, [m], and in which, where a part stands that they take or have let
+    go; zero and nothing where they have room."""
     opening = min(grip.half_width + beyond, scene.arm.opening_m)
     boxes = gripper_boxes(scene.kinematics, scene.arm, opening)
     T = poses[part] @ grip.T_part_tip
-    deepest = _Struck()
-    for other, pieces in scene.pieces.items():
-        if other != part:
-            depth = float(intrusion_depths(boxes, T[:3, :3], T[None, :3, 3], pieces, poses[other])[0])
-            deepest = max(deepest, _Struck(depth, other))
-    return deepest
+    depths = [
+        (float(intrusion_depths(boxes, T[:3, :3], T[None, :3, 3], pieces, poses[other])[0]), other)
+        for other, pieces in scene.pieces.items()
+        if other != part
+    ]
+    return max([(0.0, ""), *depths])
 
 
 def _centroid(parts: Iterable[tuple[Solid, Array]]) -> Array:

@@ -60,9 +60,12 @@ def replay(
         error: What is wrong with the robot; it goes by the plan as if nothing were.
     """
     start = plan.start if parts_at is None else parts_at
-    too_long = len(plan.schedule) * _SHORTEST_STEP_S > most_s
-    todo = () if too_long else _todo(plan, scene, searches, error)
-    refused = _late(plan, "plan", plan.schedule[0]) if too_long else _refusal(plan, scene, todo)
+    if len(plan.schedule) * _SHORTEST_STEP_S > most_s:
+        todo: tuple[Move, ...] = ()
+        refused: Outcome | None = _outcome(plan, "plan", "time_limit", plan.schedule[0].operation)
+    else:
+        todo = _todo(plan, scene, searches, error)
+        refused = _refusal(plan, scene, todo)
     cache = ReplayCache() if cache is None or watch is not None else cache
     keys = cache_keys(scene, start, fidelity, todo, error)
     same = None if refused or not keys or most_s < math.inf else cache.ended(keys[-1])
@@ -126,7 +129,7 @@ def _carry_out(
             return _outcome(plan, "pick", halt.code, plan.schedule[0].operation, halt.part)
     for i, (step, transfer) in list(enumerate(todo))[kept_states // 2 :]:
         if robot.data.time > most_s:
-            return _late(plan, "pick", step)
+            return _outcome(plan, "pick", "time_limit", step.operation)
         robot.step = step
         robot.hooks.before_step(step)
         try:
@@ -185,10 +188,6 @@ def _settled(robot: Robot, plan: Plan) -> Snapshot | None:
         if halt.code == "unstable_simulation":
             return None
     return snapshot(robot.scene.work, robot.data, plan.start)
-
-
-def _late(plan: Plan, stage: str, step: Step) -> Outcome:
-    return _outcome(plan, stage, "time_limit", step.operation)
 
 
 def _outcome(plan: Plan, stage: str, code: str, k: int, part: str = "") -> Outcome:

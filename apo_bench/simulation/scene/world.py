@@ -41,7 +41,7 @@ def world(model: Any, free: tuple[str, ...], fixed: tuple[str, ...]) -> World:
     parts = free + fixed
     body = {part: model.body(f"{part}/").id for part in parts}
     root = {body_id: i for i, body_id in enumerate(body.values())}
-    geom_part = np.array([_owner(model, int(b), root) for b in model.geom_bodyid])
+    geom_part = np.array([root.get(int(b), -1) for b in model.body_rootid[model.geom_bodyid]])
     joints = {part: int(model.body(f"{part}/").jntadr[0]) for part in free}
     return World(
         model=model,
@@ -125,28 +125,17 @@ def snapshot(world: World, data: Any, start: Poses) -> Snapshot:
     awaken(world, data)
     poses = {part: part_pose(world, data, part) for part in world.free}
     poses.update({part: start[part] for part in world.fixed})
-    speeds = [data.qvel[v : v + 3] for v in world.dof.values()]
-    spins = [data.qvel[v + 3 : v + 6] for v in world.dof.values()]
-    return Snapshot(
-        poses=poses,
-        penetration_m=_penetration(world, data),
-        speed_m_s=float(max(np.linalg.norm(v) for v in speeds)),
-        spin_rad_s=float(max(np.linalg.norm(w) for w in spins)),
-        released=_released(world, data),
-    )
-
-
-def _penetration(world: World, data: Any) -> float:
     a, b = _contact_parts(world, data)
     between = (a >= 0) & (b >= 0) & (a != b)
-    return float(max(0.0, -np.min(data.contact.dist[between], initial=0.0)))
-
-
-def _released(world: World, data: Any) -> bool:
-    """No weld is on and nothing but parts touches a part."""
-    a, b = _contact_parts(world, data)
     welds = world.model.eq_type == int(mujoco.mjtEq.mjEQ_WELD)
-    return not bool(data.eq_active[welds].any() or ((a >= 0) != (b >= 0)).any())
+    return Snapshot(
+        poses=poses,
+        penetration_m=float(max(0.0, -np.min(data.contact.dist[between], initial=0.0))),
+        speed_m_s=float(max(np.linalg.norm(data.qvel[v : v + 3]) for v in world.dof.values())),
+        spin_rad_s=float(max(np.linalg.norm(data.qvel[v + 3 : v + 6]) for v in world.dof.values())),
+        # no weld is on, and nothing but parts touches a part
+        released=not bool(data.eq_active[welds].any() or ((a >= 0) != (b >= 0)).any()),
+    )
 
 
 def touch_others(world: World, data: Any, parts: tuple[str, ...]) -> bool:
@@ -163,11 +152,3 @@ def _contact_parts(world: World, data: Any) -> tuple[Ints, Ints]:
         return np.zeros(0, dtype=np.int64), np.zeros(0, dtype=np.int64)
     geoms = data.contact.geom
     return world.geom_part[geoms[:, 0]], world.geom_part[geoms[:, 1]]
-
-
-def _owner(model: Any, body: int, root: dict[int, int]) -> int:
-    while body > 0:
-        if body in root:
-            return root[body]
-        body = int(model.body_parentid[body])
-    return -1
