@@ -100,16 +100,13 @@ class Equations:
         p = points[side][..., :3].reshape(-1, 3)
         rows = np.concatenate([a, cross_rows(p, a)], axis=1).reshape(w, m, 6) * np.where(inverse, -1.0, 1.0)[..., None]
         J = np.zeros((m, n + 1, 6))
-        columns = self._columns(n)[self.contact]
+        k = self.letters - len(self.start)
+        # Constants, the starts and the padding, have a column of their own, n, which is thrown away.
+        columns = np.where((k >= 0) & (k < n), k, n)[self.contact]
         # One letter after the other, since an operation that occurs twice in a word gets both of its rows.
         for j in range(w):
             J[np.arange(m), columns[:, j]] += rows[j]
         return np.einsum("mi,mi->m", self.plane, points[0]), J[:, :n].reshape(m, 6 * n)
-
-    def _columns(self, n: int) -> NDArray[np.intp]:
-        """The operation of each letter, (c, w); n for letters that are constants."""
-        k = self.letters - len(self.start)
-        return np.where((k >= 0) & (k < n), k, n)
 
     def _matrices(self, goals: Array) -> Array:
         """F_1 .. F_w of the word of each equation, (m, w, 4, 4)."""

@@ -86,6 +86,7 @@ def _shaft_on_plane(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: A
     touch = mate(shaft, T_shaft, flat, T_flat)
     middle = touch.points.mean(axis=0)
     height = float(touch.off.mean(axis=0) @ n)
+    # Of an axis through p along u over a plane n: d(n . p) = n . v + (p x n) . w, and d(n . u) = (u x n) . w.
     slope = np.array([[*n, *np.cross(middle, n)], [0.0, 0.0, 0.0, *np.cross(u, n)]])
     whole = min(shaft.length, float(np.ptp(flat.outline @ (T_flat[:3, :3].T @ u))))
     return Facing(

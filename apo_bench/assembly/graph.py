@@ -99,12 +99,20 @@ def relation_graph(assembly: Assembly, step: int | None = None) -> Graph:
     Raises:
         InputError: There is no such step.
     """
-    done = _known(assembly, len(assembly) if step is None else step)
+    count = len(assembly) if step is None else step
+    if not 1 <= count <= len(assembly):
+        raise InputError(
+            f"step {count} was given, the demonstration has {len(assembly)} operations; give a step "
+            f"from 1 to {len(assembly)}."
+        )
+    done = assembly.first(count)
     history = _history(done)
     arcs = _arcs(done, history)
     present = [node for node in history[-1].values() if node.placed is not None or node.part in done.fixed]
     joined = [node for arc in arcs for node in (arc.manipulated, arc.environment)]
-    return Graph(len(done), tuple(sorted(dict.fromkeys([*present, *joined]), key=_order)), arcs)
+    # When a part was placed; the main part of an operation, whose ODL is a single T, before what it carried.
+    nodes = sorted(dict.fromkeys([*present, *joined]), key=lambda node: (_time(node), len(node.odl)))
+    return Graph(len(done), tuple(nodes), arcs)
 
 
 def arc_residuals(assembly: Assembly, start: Poses, goals: Array, graph: Graph) -> tuple[float, ...]:
@@ -122,15 +130,6 @@ def observed_residuals(observation: Observation, graph: Graph) -> tuple[float | 
     residuals = arc_residuals(observation.assembly, observation.start, observation.goals, graph)
     known = [all(observation.seen[k] for k in arc.operations) for arc in graph.arcs]
     return tuple(r if whole else None for r, whole in zip(residuals, known, strict=True))
-
-
-def _known(assembly: Assembly, step: int) -> Assembly:
-    if not 1 <= step <= len(assembly):
-        raise InputError(
-            f"step {step} was given, the demonstration has {len(assembly)} operations; give a step "
-            f"from 1 to {len(assembly)}."
-        )
-    return assembly.first(step)
 
 
 def _history(assembly: Assembly) -> list[dict[str, Node]]:
@@ -159,11 +158,6 @@ def _arcs(assembly: Assembly, history: list[dict[str, Node]]) -> tuple[Arc, ...]
             Arc(f"R{i}", nodes[a], nodes[b], contacts, made, lost, asked, any(map(assembly.is_round, contacts)))
         )
     return tuple(arcs)
-
-
-def _order(node: Node) -> tuple[int, int]:
-    """When it was placed; the main part of an operation, whose ODL is a single T, before what it carried."""
-    return _time(node), len(node.odl)
 
 
 def _time(node: Node) -> int:

@@ -76,6 +76,7 @@ def joint_covariance(goals: Array, covariance: Array, shared: Sequence[SharedErr
     for error in shared:
         k = np.array(error.operations, dtype=np.intp)
         A = error.ways(goals)
+        # The twists of operations k and l are A_k c and A_l c, so their covariance is A_k C A_l^t.
         between = np.einsum("kab,bc,ldc->kald", A, error.covariance, A)
         if error.correlation is not None:
             between *= error.correlation[:, None, :, None]

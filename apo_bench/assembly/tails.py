@@ -55,6 +55,7 @@ class Tails:
         unit, plain = _unit_draws(n, count, *numbers, self.joined)
         Q = np.zeros((n, 6, 6))
         Q[:, :3, :3] = Q[:, 3:, 3:] = self.frames
+        # What the stated covariance has beyond these tails is drawn as a Gaussian, by its square root V sqrt(w).
         rest = np.array(joint).reshape(n, 6, n, 6)
         own = Q @ np.diag(self.variances[[0, 0, 1, 2, 2, 3]]) @ np.swapaxes(Q, 1, 2)
         rest[np.arange(n), :, np.arange(n)] -= own
@@ -72,6 +73,7 @@ def _unit_draws(
 
     def error(shape: tuple[int, ...]) -> Array:
         drawn = rng.standard_normal((*shape, 6))
+        # Student t with nu degrees of freedom: a normal number over the root of chi^2_nu / nu.
         common = rng.chisquare(freedom[0], shape) / freedom[0] if joined else None
         for columns, scale, nu in zip(_COLUMNS, scales, freedom, strict=True):
             mixed = rng.chisquare(nu, shape) / nu if common is None else common

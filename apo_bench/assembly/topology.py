@@ -1,4 +1,7 @@
-"""The topology of a demonstration, in the paper's words: contacts, operations, ODLs. Symbols, no poses."""
+"""The topology of a demonstration, in the paper's words: contacts, operations, ODLs. Symbols, no poses.
+
+One file of more than 250 lines: `Assembly` is what is known for certain, and each of its questions is a few lines.
+"""
 
 from __future__ import annotations
 
@@ -177,13 +180,11 @@ class Assembly:
         """
         gap = self.gaps.get(contact, Gap())
         low, high = gap.interval(self.play(contact, play_m))
-        if gap.kind == "clearance" and contact in self.origin and self._in_hole(self.origin[contact]):
+        whole = self.given(contact)
+        if gap.kind == "clearance" and whole != contact and contact_kind(*map(self.face_of, whole)) == "shaft in hole":
             inside = math.cos(math.pi / (2 * WALLS))
             return low * inside, high * inside
         return low, high
-
-    def _in_hole(self, contact: Contact) -> bool:
-        return contact_kind(*map(self.face_of, contact)) == "shaft in hole"
 
     @remembered
     def intervals(self, play_m: float) -> Array:

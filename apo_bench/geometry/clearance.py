@@ -49,7 +49,7 @@ def physical_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
         return solid.pieces
     if not all_boxes(solid.pieces):
         return _receded_hulls(solid, clearance_m)
-    sides = [_Side(face.name, face.fit, *_plane(face), _flat(face)) for face in solid.faces.values()]
+    sides = list(map(_side, solid.faces.values()))
     return tuple(_receded(solid, box, sides, clearance_m) for box in solid.pieces if isinstance(box, Box))
 
 
@@ -71,20 +71,17 @@ class _Side(NamedTuple):
     shape: Any
 
 
-def _plane(face: Face) -> tuple[int, int, float]:
-    """Axis along which the face looks, sign, coordinate [m]."""
+def _side(face: Face) -> _Side:
+    """A face, along the axis that it looks along; its shape in the two coordinates that follow cyclically."""
     n = face.normal
     axis = int(np.abs(n).argmax())
-    return axis, int(np.sign(n[axis])), float(face.outline[0, axis])
-
-
-def _flat(face: Face) -> Any:
-    """The face in the two coordinates that follow its axis cyclically."""
-    axis = _plane(face)[0]
-    return flat_area(face.outline, face.holes, np.eye(3)[:, [(axis + 1) % 3, (axis + 2) % 3]])
+    shape = flat_area(face.outline, face.holes, np.eye(3)[:, [(axis + 1) % 3, (axis + 2) % 3]])
+    return _Side(face.name, face.fit, axis, int(np.sign(n[axis])), float(face.outline[0, axis]), shape)
 
 
 def _receded(solid: Solid, box: Box, sides: Sequence[_Side], clearance_m: float) -> Box:
+    # Each side that carries a fit face moves inwards: a half size loses half of what both sides lose, the centre goes
+    # away from the side that loses more.
     carries = [[_carries_fit(solid, box, sides, axis, sign) for sign in (-1, 1)] for axis in range(3)]
     recede = clearance_m * np.array(carries, dtype=np.float64)
     half = box.half - recede.sum(axis=1) / 2
@@ -193,6 +190,8 @@ def _on_round(face: RoundFace, hull: Hull, side: Array) -> bool:
     """Whether a side touches the wall of a hole from outside, somewhere along its span."""
     if not face.hole or face.kind == "rim":
         return False
+    # A side is tangent to the cone r(s) = r0 + slope s about the axis if its normal makes sine slope * w with the axis
+    # and it passes it at the distance r0 * w.
     w = 1.0 / np.sqrt(1.0 + face.slope**2)
     r = face.radii[0] - face.slope * face.span[0]
     n = side[:3]
@@ -225,6 +224,7 @@ def _middle(planes: Array) -> tuple[Array, float]:
     """The middle of the largest ball inside of all planes, (3,), and its radius, [m]."""
     from scipy.optimize import linprog
 
+    # maximise r so that n . x + r <= d for every plane: the largest ball, by its middle x and radius r.
     A = np.column_stack([planes[:, :3], np.ones(len(planes))])
     optimum = linprog([0.0, 0.0, 0.0, -1.0], A, planes[:, 3], bounds=[(None, None)] * 3 + [(0.0, None)])
     return (optimum.x[:3], float(optimum.x[3])) if optimum.success else (np.zeros(3), 0.0)

@@ -134,6 +134,7 @@ def _middle(face: Face) -> Array:
     moment = np.zeros(3)
     origin = face.outline[0]
     for loop in (face.outline, *face.holes):
+        # Triangles from the origin to each edge: twice their signed area, and their centres (a + b) / 3.
         a = loop - origin
         b = np.concatenate([a[1:], a[:1]])
         twice = np.cross(a, b) @ face.normal
@@ -168,6 +169,7 @@ def _candidates(marks: _Marks) -> list[Array]:
         return []
     q = marks.points[second]
     turns = list[Array]()
+    # R = F(a, b) F(p, q)^t takes the frame of two marks to that of two others that are as far from each other.
     base = _frame(p, q)
     for a in marks.points[_like(marks, far, first)]:
         for b in marks.points[_like(marks, far, second)]:

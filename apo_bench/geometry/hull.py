@@ -75,6 +75,7 @@ class Hull:
         """Directions of its edges, (e, 3), each once up to its sign."""
         n = self.planes[:, :3]
         d = self.planes[:, 3]
+        # Two sides meet in an edge if they share two corners; the edge lies along the cross product of their normals.
         on = np.abs(n @ self.corners.T - d[:, None]) < 1e-7 * (1.0 + np.abs(d[:, None]))
         both = on.astype(np.int64) @ on.T.astype(np.int64)
         pairs = np.argwhere(np.triu(both >= 2, k=1))
@@ -88,6 +89,7 @@ def cylinder_hull(name: str, cylinder: Cylinder) -> Hull:
     n = sides_of(cylinder.radius)
     z = cylinder.axis
     x = across_axis(z)
+    # The corners of both ends: a ring of n points about the axis.
     angle = 2.0 * np.pi * np.arange(n) / n
     ring = cylinder.radius * (np.outer(np.cos(angle), x) + np.outer(np.sin(angle), np.cross(z, x)))
     ends = [cylinder.center + sign * cylinder.half_length * z + ring for sign in (-1.0, 1.0)]

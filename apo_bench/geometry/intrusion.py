@@ -64,6 +64,8 @@ def intrusion_depths(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece
     centers_a, halves_a = boxes_around(a)
     centers_b, halves_b = boxes_around(b)
     axes = box_axes(R_a, T_b[:3, :3])
+    # The shadow of a box of half sizes h on a unit vector u of its frame is |u| . h long to each side. Two boxes are as
+    # deep in each other as their shadows on the axis on which that is least; pieces as their deepest pair.
     reach = (halves_a @ np.abs(axes @ R_a).T)[:, None] + (halves_b @ np.abs(axes @ T_b[:3, :3]).T)[None]
     between = (centers_a @ R_a.T)[:, None] - (centers_b @ T_b[:3, :3].T + T_b[:3, 3])[None]
     apart = np.abs((between @ axes.T)[None] + (at @ axes.T)[:, None, None])
@@ -112,6 +114,8 @@ def _piece_by_piece(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece,
     not be looked at.
     """
     R_b = T_b[:3, :3]
+    # Pairs that are surely apart count by their room; the others are measured, nearest first, and only at places where
+    # they may be deeper than what was found there before: first across sides, which bounds the depth from above.
     rooms = _rooms(a, R_a, at, b, T_b)
     deepest = np.where(rooms > 0.0, -rooms, -np.inf).max(axis=(1, 2))
     closest = rooms.min(axis=0)

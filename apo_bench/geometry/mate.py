@@ -76,12 +76,14 @@ def _coaxial(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Mate:
     u = T_a[:3, :3] @ a.wider
     v = T_b[:3, :3] @ b.wider
     along = T_b[:3, :3] @ b.axis
+    # Where the ends of one face are along the axis of the other, and what both spans have in common.
     at = (ends - origin) @ along
     low = max(at.min(), b.span[0])
     high = min(at.max(), b.span[1])
     common = NO_OVERLAP
     points = ends
     if high > low and abs(at[1] - at[0]) > _EDGE_ON * a.length:
+        # The ends of the common length, taken back to the axis of the first face.
         points = ends[0] + np.outer((np.array([low, high]) - at[0]) / (at[1] - at[0]), ends[1] - ends[0])
         common = _unrolled([(low, high)], b.radius * min(a.extent_rad, b.extent_rad), points)
     rise, sine = _rise(b, T_b, a, T_a) if b.kind == "cone" else (0.0, 0.0)
@@ -134,6 +136,7 @@ def _on_plane(shaft: RoundFace, T_shaft: Array, flat: Face, T_flat: Array, *, of
 def _rise(cone: RoundFace, T_cone: Array, other: RoundFace, T_other: Array) -> tuple[float, float]:
     """How far the shaft of a cone and another cone, or a rim, is from its seat, and the sine of the cone."""
     seat = cone.where_wide(other.radius)
+    # The cone sits where it is as wide as the other face; how far apart the two are along its axis is the rise.
     between = pose.apply(T_cone, seat[None])[0] - pose.apply(T_other, other.middle[None])[0]
     sign = -1.0 if cone.hole else 1.0
     return float(sign * between @ (T_cone[:3, :3] @ cone.wider)), abs(cone.slope) / float(np.hypot(1.0, cone.slope))
@@ -168,6 +171,7 @@ def _lines(ends: Array, flat: Face) -> list[tuple[float, float]]:
     from shapely import LineString
 
     way = ends[1] - ends[0]
+    # A line that stands on the face covers nothing of it.
     if way @ way < _EDGE_ON**2 * 1e-6:
         return []
     covered = LineString(ends).intersection(_flat_shape(flat))

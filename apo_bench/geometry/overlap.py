@@ -87,6 +87,7 @@ def face_area(face: Face) -> float:
 
 def _common(face: Face, T_face: Array, on: Face, T_on: Array) -> tuple[Any, list[Any]]:
     """What two faces cover of each other, in the plane of `on`, and its pieces without slivers."""
+    # Everything in the plane of `on`, z along its normal: there dropping heights projects along the normal.
     T_on_face = pose.inverse(T_on) @ T_face
     if abs(on.normal @ T_on_face[:3, :3] @ face.normal) < _EDGE_ON:
         return None, []

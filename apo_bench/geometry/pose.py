@@ -22,6 +22,7 @@ def exp(twist: ArrayLike) -> Array:
     """The displacement a body twist makes, (*, 6) -> (*, 4, 4). A zero twist gives exactly the identity."""
     twist = np.asarray(twist, dtype=np.float64)
     K = hat(twist[..., 3:])
+    # Rodrigues: R = 1 + A K + B K^2, and the shift is V v with V = 1 + B K + C K^2, A = sin a / a and so on.
     A, B, C = _series(np.linalg.norm(twist[..., 3:], axis=-1)[..., None, None])
     T = np.zeros((*twist.shape[:-1], 4, 4))
     K2 = K @ K
@@ -38,6 +39,7 @@ def log(T: ArrayLike) -> Array:
     T = np.asarray(T, dtype=np.float64)
     w = Rotation.from_matrix(T[..., :3, :3].reshape(-1, 3, 3)).as_rotvec().reshape(*T.shape[:-2], 3)
     angle = np.linalg.norm(w, axis=-1)[..., None, None]
+    # V^-1 = 1 - K / 2 + D K^2 with D = (1 - a sin a / (2 (1 - cos a))) / a^2; near zero the series of D.
     near = angle < 1e-4
     a = np.where(near, 1.0, angle)
     D = np.where(near, 1 / 12 + angle**2 / 720, (1 - a * np.sin(a) / (2 * (1 - np.cos(a)))) / a**2)
@@ -98,6 +100,7 @@ def pack(T: ArrayLike) -> Array:
 
     T = np.asarray(T, dtype=np.float64)
     q = Rotation.from_matrix(T[..., :3, :3].reshape(-1, 3, 3)).as_quat(scalar_first=True)
+    # q and -q are one turn: the first component that is not zero up to rounding decides the sign; + 0.0 makes -0 a 0.
     first = np.argmax(np.abs(q) > _ROUNDING, axis=1)
     q = q * np.where(q[np.arange(len(q)), first] < 0.0, -1.0, 1.0)[:, None] + 0.0
     return np.concatenate([T[..., :3, 3], q.reshape(*T.shape[:-2], 4)], axis=-1)
@@ -149,6 +152,7 @@ def apply(T: ArrayLike, points: ArrayLike) -> Array:
 
 def _series(angle: Array) -> tuple[Array, Array, Array]:
     """sin(a)/a, (1-cos a)/a^2 and (a-sin a)/a^3, also at zero."""
+    # Below 1e-4 two terms of each series are exact to rounding, where the quotients lose digits.
     near = angle < 1e-4
     a = np.where(near, 1.0, angle)
     A = np.where(near, 1.0 - angle**2 / 6, np.sin(a) / a)

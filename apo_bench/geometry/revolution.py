@@ -78,6 +78,8 @@ def turned_alike(solid: Solid, T: Array, true: Array) -> Array:
     about = revolution(solid)
     if about is None:
         return T
+    # What is left between the two, M, is to turn the least: of both ways round, the turn about the axis with the
+    # greatest trace. The centre of volume stays where it is seen.
     M = true[:3, :3].T @ T[:3, :3]
     a = about.axis
     across = across_axis(a)
@@ -92,6 +94,7 @@ def turned_alike(solid: Solid, T: Array, true: Array) -> Array:
 
 def _least_turn(M: Array, axis: Array) -> Array:
     """The rotation about an axis, (3, 3), for which M times it turns the least: the greatest trace."""
+    # trace(M R(t)) = c + (trace(M) - a . M a) cos t + trace(M K) sin t, which is greatest at this t.
     K = pose.hat(axis)
     angle = np.arctan2(np.trace(M @ K), np.trace(M) - axis @ M @ axis)
     return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K

@@ -40,6 +40,7 @@ class Face:
         """The outward unit normal, (3,) (Newell's formula: right for concave outlines too)."""
         if self.stated_normal is not None:
             return frozen(self.stated_normal, 3)
+        # n ~ sum_i c_i x c_i+1: its components are differences of entries of M = sum_i c_i c_i+1^t.
         corners = self.outline - self.outline[0]
         M = corners.T @ np.concatenate([corners[1:], corners[:1]])
         n = np.array([M[1, 2] - M[2, 1], M[2, 0] - M[0, 2], M[0, 1] - M[1, 0]])

@@ -107,6 +107,7 @@ def exit_distance(moving: Sequence[Posed], way: Array, resting: Sequence[Posed])
         spans += list(intervals)
         exact += [all_boxes(m.pieces) and all_boxes(r.pieces)] * len(intervals)
         owners += [(m, r, int(k)) for k in pairs]
+    # Follow the intervals that overlap from 0 on: each one that begins before the end so far moves that end outwards.
     at = 0.0
     last = np.array([span[1] for span in spans])
     order = np.argsort(-last, kind="stable")
@@ -134,6 +135,8 @@ def _near(moving: Posed, way: Array, length_m: float, resting: Posed) -> bool:
 def _intervals(at: Array, speed: Array, reach: Array) -> tuple[NDArray[np.intp], Array]:
     """Where |at + s speed| < reach holds along all axes at once: (k, axes) -> which rows, (l,), and from and until,
     (l, 2); rows where it holds nowhere are left out."""
+    # It holds between s = (-reach - at) / speed and s = (reach - at) / speed, in either order; where the speed is zero
+    # always or never.
     still = np.abs(speed) < 1e-9
     apart = (np.abs(at) >= reach) & still
     rate = np.where(still, 1.0, speed)

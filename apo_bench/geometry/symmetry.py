@@ -52,6 +52,7 @@ def symmetries(solid: Solid) -> Array:
     c = solid.centroid
     centred = [(box.center - c, box.half) for box in solid.pieces]
     turned = [R for R in quarter_turns() if _same(centred, [(R @ at, np.abs(R) @ half) for at, half in centred])]
+    # x -> R x + (c - R c): the turn about the centre of volume.
     g = np.tile(np.eye(4), (len(turned), 1, 1))
     g[:, :3, :3] = turned
     g[:, :3, 3] = c - np.array(turned) @ c
@@ -92,6 +93,7 @@ def nearest_symmetry(symmetric: Array, off: Array) -> Array:
 
     Of several that are as good the first is taken, which is the identity wherever that is one of them.
     """
+    # trace(R) = 1 + 2 cos(angle): the least turn has the greatest trace.
     traces = np.einsum("nij,mji->nm", off[:, :3, :3], symmetric[:, :3, :3])
     close = traces >= traces.max(axis=1, keepdims=True) - 1e-12
     return np.asarray(symmetric[np.argmax(close, axis=1)])

@@ -75,6 +75,7 @@ def exp_and_jacobian(twist: ArrayLike) -> tuple[Array, Array]:
     """
     xi = np.asarray(twist, dtype=np.float64)
     lead = xi.shape[:-1]
+    # The coefficients of the powers of ad are power series in the squared angle q.
     q = (xi[..., 3:] * xi[..., 3:]) @ _SUM
     series = SERIES[: _SHORT if (q < 1.0).all() else _TERMS]
     f = ((q[..., None] ** _POWERS[: len(series)]) @ series[:, 2:])[..., None, None]
@@ -82,8 +83,10 @@ def exp_and_jacobian(twist: ArrayLike) -> tuple[Array, Array]:
     X = (xi @ _TO_MATRIX).reshape(*lead, 3, 4)
     ad = (xi @ _TO_ADJOINT).reshape(*lead, 6, 6)
     ad2 = ad @ ad
+    # J_r = 1 + a ad + b ad^2 + c ad^3 + d ad^4, by two products of 6 x 6 matrices.
     J = a * ad + (b * _ONE6 + c * ad + d * ad2) @ ad2
     J += _ONE6
+    # exp(X) = 1 + A^t X, A the upper left block of J_r.
     T = np.zeros((*lead, 4, 4))
     np.matmul(np.swapaxes(J[..., :3, :3], -1, -2), X, out=T[..., :3, :])
     T += _ONE4

@@ -106,7 +106,9 @@ def arrive(
         return is_way_free(moving, way, length_m, others) and is_way_free(begin, UP, _CLEAR_M, others)
 
     def reach(exit_m: float) -> float:
-        return _length(exit_m) if stated.travel_m is None else stated.travel_m
+        # For a part that is free after a way the line is as long as that and some room, in whole millimetres.
+        millimetres = 1e-3 * float(np.ceil(1e3 * (exit_m + _ROOM_M) - 1e-3))
+        return max(_TRAVEL_M, millimetres) if stated.travel_m is None else stated.travel_m
 
     def out(along: Array, walls: tuple[int, ...]) -> Way:
         around = [resting[part] for part in dict.fromkeys(touched[i].rests for i in walls)]
@@ -195,11 +197,6 @@ def _directions(along: Array, floors: Sequence[Array], T: Array) -> Iterator[Arr
         size = float(np.linalg.norm(within))
         if size > 0.5:
             yield np.round(within / size, 12) + 0.0
-
-
-def _length(exit_m: float) -> float:
-    """How long the line of attach is for a part that is free after a way, in whole millimetres, [m]."""
-    return max(_TRAVEL_M, 1e-3 * float(np.ceil(1e3 * (exit_m + _ROOM_M) - 1e-3)))
 
 
 def _normals(touched: Sequence[TouchedContact], angle_rad: float = ANGLE_RAD) -> Array:

@@ -84,6 +84,7 @@ def classify(rows: Array) -> Cone:
     n = rows.shape[1]
     if not len(rows):
         return Cone(rows, np.zeros(0, dtype=np.bool_), np.zeros(n), ContactState(n, 0, 0))
+    # Equal rows open together, so the programme is solved for one of each.
     different, which = np.unique(np.round(rows, 12) + 0.0, axis=0, return_inverse=True)
     opens, x = _opened(different.tobytes(), *different.shape)
     detachable = opens[which.ravel()]
@@ -98,6 +99,7 @@ def _opened(rows: bytes, k: int, n: int) -> tuple[NDArray[np.bool_], Array]:
     from scipy.optimize import linprog
 
     N = np.frombuffer(rows).reshape(k, n)
+    # Unknowns (x, s): minimise -sum s with s - N x <= 0.
     optimum = linprog(
         np.concatenate([np.zeros(n), -np.ones(k)]),
         A_ub=np.hstack([-N, np.eye(k)]),
@@ -116,6 +118,7 @@ def evenly_open(rows: Array) -> Array:
     from scipy.optimize import linprog
 
     k, n = rows.shape
+    # Unknowns (x, t): maximise t with t <= row . x for every row.
     optimum = linprog(
         np.append(np.zeros(n), -1.0),
         A_ub=np.hstack([-rows, np.ones((k, 1))]),
@@ -175,14 +178,10 @@ def screw_state(points: Array, normals: Array) -> Screw:
         points: Corners of the contacts, (k, 3), [m], any frame.
         normals: From what rests into the free side of what moves, (k, 3), one for each point.
     """
-    everything = classify(_screw_rows(points, normals)).state
+    # One row (p x n / L, n) per point, (k, 6): how fast a twist (L w, v) about the middle opens it.
+    arms = points - points.mean(axis=0) if len(points) else points
+    everything = classify(np.hstack([np.cross(arms, normals) / _LENGTH_M, normals])).state
     translation = classify(np.unique(normals, axis=0)).state
     m = everything.maintaining - translation.maintaining
     c = everything.constraining - translation.constraining
     return Screw(everything, translation, ContactState(m, 3 - m - c, c))
-
-
-def _screw_rows(points: Array, normals: Array) -> Array:
-    """One row (p x n / L, n) per point, (k, 6): how fast a twist (L w, v) about the middle opens it."""
-    arms = points - points.mean(axis=0) if len(points) else points
-    return np.hstack([np.cross(arms, normals) / _LENGTH_M, normals])

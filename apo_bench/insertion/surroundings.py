@@ -7,7 +7,7 @@ from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.assembly.touching import mouth, outline_points, touched_contacts
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import overlap
-from apo_bench.geometry.solid import Face, Solid, extent
+from apo_bench.geometry.solid import Face, extent
 from apo_bench.insertion.arrival import Arrival
 
 _SLOW_M = 0.003
@@ -93,12 +93,9 @@ def neighbours(contacts: tuple[Contact, ...], moved: tuple[str, ...]) -> set[str
 
 def ends_of(assembly: Assembly, moved: tuple[str, ...], poses: Poses) -> tuple[float, float]:
     """The top of what stands, and the bottom of what moves, [m]."""
-    ends = {part: _heights(solid, poses[part]) for part, solid in assembly.solids.items()}
+    ends = {
+        part: np.add(extent(solid.pieces, poses[part][2, :3]), poses[part][2, 3]).tolist()
+        for part, solid in assembly.solids.items()
+    }
     top = max((high for part, (_, high) in ends.items() if part not in moved), default=0.0)
     return top, min(ends[part][0] for part in moved)
-
-
-def _heights(solid: Solid, T: Array) -> tuple[float, float]:
-    """The lowest and the highest point of a part, [m]."""
-    low, high = extent(solid.pieces, T[2, :3])
-    return float(T[2, 3] + low), float(T[2, 3] + high)

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses, placements
+from apo_bench.assembly.goals import placements
 from apo_bench.assembly.reached import Reached, Snapshot
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
@@ -52,7 +52,11 @@ def _contacts(
 
     Moments of which there is no snapshot are left out.
     """
-    true = _true_poses(judge.assembly, (*after, final), reference)
+    first = next((snapshot for snapshot in (*after, final) if snapshot is not None), None)
+    if first is None:
+        return ()
+    # A part that was not moved yet, fixed ones above all, counts as true where it stands in the first snapshot.
+    true = placements(judge.assembly, first.poses, reference)
     out = []
     for contact, made, lost in judge.assembly.relations():
         moments: Mapping[ContactMoment, Snapshot | None] = {"made": after[made], "end": final if lost is None else None}
@@ -60,15 +64,6 @@ def _contacts(
             if snapshot is not None:
                 out.append(judge.verdict(contact, made, moment, snapshot.poses, true[made], Overlap.share))
     return tuple(out)
-
-
-def _true_poses(assembly: Assembly, moments: Sequence[Snapshot | None], reference: Array) -> Sequence[Poses]:
-    """Where every part stands after each operation at the true goals; nothing without any snapshot.
-
-    A part that was not moved yet, fixed ones above all, counts as true where it stands in the first snapshot.
-    """
-    first = next((snapshot for snapshot in moments if snapshot is not None), None)
-    return () if first is None else placements(assembly, first.poses, reference)
 
 
 def _pushes(
@@ -81,7 +76,8 @@ def _pushes(
         for part in moved:
             put.pop(part, None)
         if snapshot is not None:
-            at = {part: _centroid(assembly, part, snapshot) for part in (*put, *moved)}
+            centroids = {part: assembly.solids[part].centroid[None] for part in (*put, *moved)}
+            at = {part: pose.apply(snapshot.poses[part], c)[0] for part, c in centroids.items()}
             yield from ((part, float(np.linalg.norm(at[part] - where))) for part, where in put.items())
             put.update({part: at[part] for part in moved})
 
@@ -90,7 +86,3 @@ def _corners_at_end(assembly: Assembly, reached: Reached) -> Iterator[tuple[str,
     """How far a corner of each part that is no fixture lies at most from where its last operation had put it, [m]."""
     if reached.final is not None:
         yield from displacements(assembly, reached.after, reached.final, fixtures(assembly))
-
-
-def _centroid(assembly: Assembly, part: str, snapshot: Snapshot) -> Array:
-    return pose.apply(snapshot.poses[part], assembly.solids[part].centroid[None])[0]

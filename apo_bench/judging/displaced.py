@@ -101,6 +101,7 @@ def _slid(assembly: Assembly, parts: tuple[str, str], put: Poses, final: Poses, 
     """
     a, b = (assembly.solids[part] for part in parts)
     before, now = (pose.inverse(poses[parts[0]]) @ poses[parts[1]] for poses in (put, final))
+    # The motion of b in the frame of a, as a twist of that frame: now = exp(twist) before.
     twist = pose.log(_turned_back(a, b, now, before) @ pose.inverse(before))
     at = np.concatenate([_corners(a), pose.apply(before, _corners(b))])
     return _farthest(pose.apply(pose.exp(_free(twist, held, at)), at) - at)
@@ -131,9 +132,11 @@ def _free(twist: Array, held: Array, at: Array) -> Array:
 
     With K the motion of the points by a twist and K^T K = L L^T, distances are those of L^T twist.
     """
+    # The points move by K xi; |K xi|^2 = xi^t L L^t xi, so in y = L^t xi the least motion is the shortest y.
     K = np.concatenate([np.concatenate([np.eye(3), -pose.hat(p)], axis=1) for p in at])
     L = np.linalg.cholesky(K.T @ K / len(at))
     rows = np.linalg.solve(L, held.T).T
+    # Rows of which a unit motion opens contacts span what is held; the twist is projected onto what is left.
     _, sizes, ways = np.linalg.svd(rows, full_matrices=True)
     loose = ways[int((sizes > _HELD).sum()) :]
     return np.asarray(np.linalg.solve(L.T, loose.T @ (loose @ (L.T @ twist))))

@@ -36,7 +36,10 @@ def judge_finished(
         return judgement((), (), (), thresholds, all_made=False)
     away = fixtures(assembly)
     true = placements(assembly, final.poses, reference)[-1]
-    seen = {part: _nearest_alike(assembly, part, T, true[part]) for part, T in final.poses.items()}
+    seen = {
+        part: T if part in assembly.fixed else nearest_alike(assembly.solids[part], T, true[part])
+        for part, T in final.poses.items()
+    }
     return judgement(
         tuple(_contacts(ContactJudge(assembly, thresholds, clearance_mm), seen, true, away)),
         [final],
@@ -76,13 +79,6 @@ def _contacts(judge: ContactJudge, seen: Poses, true: Poses, away: frozenset[str
         if lost is None and not away & {end.part for end in contact}:
             share = _share_of_area if _on_fixed(assembly, contact) else Overlap.share
             yield judge.verdict(contact, made, "end", seen, true, share)
-
-
-def _nearest_alike(assembly: Assembly, part: str, T: Array, true: Array) -> Array:
-    """The pose at which the part looks as it does, turned from the true one the least."""
-    if part in assembly.fixed:
-        return T
-    return nearest_alike(assembly.solids[part], T, true)
 
 
 def _share_of_area(reached: Overlap, true: Overlap) -> float:

@@ -1,4 +1,7 @@
-"""Faces that are stated, held against the pieces: flat ones against their sides, round ones by rays from their axes."""
+"""Faces that are stated, held against the pieces: flat ones against their sides, round ones by rays from their axes.
+
+One file of more than 250 lines, since both kinds of faces are held against the same sides.
+"""
 
 from dataclasses import replace
 from itertools import combinations
@@ -55,41 +58,30 @@ def check_faces(solid: Solid, path: Path) -> float:
     Returns:
         By how much round walls that are cut into flat ones may change the volume, [m^3].
     """
-    sides = _sides(solid.pieces)
     for name, flat in solid.faces.items():
-        _check_flat(flat, sides, f"{path}, faces, {name}")
+        _check_flat(flat, solid.pieces, f"{path}, faces, {name}")
     _check_once(solid, path)
-    return sum(_check_round(wall, sides, f"{path}, faces, {name}") for name, wall in solid.rounds.items())
+    return sum(_check_round(wall, solid.pieces, f"{path}, faces, {name}") for name, wall in solid.rounds.items())
 
 
 def _sides(pieces: tuple[Piece, ...]) -> _Sides:
     planes = [piece.planes for piece in pieces]
-    return _Sides(np.concatenate(planes), np.cumsum([0, *map(len, planes[:-1])]), pieces)
+    return _Sides(np.concatenate([np.zeros((0, 4)), *planes]), np.cumsum([0, *map(len, planes[:-1])]), pieces)
 
 
-def _near(sides: _Sides, low: Array, high: Array) -> _Sides:
+def _near(pieces: tuple[Piece, ...], low: Array, high: Array) -> _Sides:
     """Those of the pieces that reach into a box."""
-    ends = np.append(sides.first[1:], len(sides.planes))
-    kept = [
-        k
-        for k, piece in enumerate(sides.pieces)
-        if (piece.center - piece.half <= high).all() and (piece.center + piece.half >= low).all()
-    ]
-    if not kept:
-        return _Sides(np.zeros((0, 4)), np.zeros(0, dtype=np.intp), ())
-    first = np.cumsum([0, *(ends[k] - sides.first[k] for k in kept[:-1])])
-    planes = np.concatenate([sides.planes[sides.first[k] : ends[k]] for k in kept])
-    return _Sides(planes, first, tuple(sides.pieces[k] for k in kept))
+    return _sides(tuple(p for p in pieces if (p.center - p.half <= high).all() and (p.center + p.half >= low).all()))
 
 
-def _check_flat(face: Face, sides: _Sides, place: str) -> None:
+def _check_flat(face: Face, pieces: tuple[Piece, ...], place: str) -> None:
     """A face is made of sides of pieces that look its way, and lies bare."""
     import shapely
 
     n = face.normal
     to_plane = plane_across(face.normal)
     margin = np.full(3, _ABOVE_M)
-    sides = _near(sides, face.outline.min(axis=0) - margin, face.outline.max(axis=0) + margin)
+    sides = _near(pieces, face.outline.min(axis=0) - margin, face.outline.max(axis=0) + margin)
     stated = flat_area(face.outline, face.holes, to_plane)
     below = _below(face, sides, to_plane)
     bare = stated.difference(shapely.unary_union(below, grid_size=_SNAP_M).buffer(_BESIDE_M))
@@ -181,7 +173,7 @@ def _same_wall(a: RoundFace, b: RoundFace) -> bool:
     )
 
 
-def _check_round(wall: RoundFace, sides: _Sides, place: str) -> float:
+def _check_round(wall: RoundFace, pieces: tuple[Piece, ...], place: str) -> float:
     """A wall is as far from its axis as it says; returns what of the volume lies between it and the sides, [m^3]."""
     heights, radii = _samples(wall)
     middle = wall.toward is None
@@ -190,9 +182,7 @@ def _check_round(wall: RoundFace, sides: _Sides, place: str) -> float:
     y = wall.frame[:3, 1]
     out = np.outer(np.cos(angle), x) + np.outer(np.sin(angle), y)
     reach = max(wall.radii) * (1.0 + _COARSE) + _ABOVE_M
-    low = wall.ends.min(axis=0) - reach
-    high = wall.ends.max(axis=0) + reach
-    sides = _near(sides, low, high)
+    sides = _near(pieces, wall.ends.min(axis=0) - reach, wall.ends.max(axis=0) + reach)
     if not sides.pieces:
         _fail(place, "no piece is near the face")
     near_wall = 0
@@ -233,7 +223,7 @@ def check_receding(solid: Solid, path: Path) -> None:
     for wall in walls:
         wider = replace(wall, radii=(wall.radius + _TRIED_M, wall.radius + _TRIED_M))
         try:
-            _check_round(wider, _sides(physical_pieces(solid, _TRIED_M)), "")
+            _check_round(wider, physical_pieces(solid, _TRIED_M), "")
         except InputError as error:
             raise InputError(
                 f"{path}, faces, {wall.name}: the wall is fit, and pieces that touch it in a corner only keep it from "
@@ -251,6 +241,8 @@ def _samples(wall: RoundFace) -> tuple[Array, Array]:
 
 def _crossed(sides: _Sides, origin: Array, out: Array) -> tuple[Array, Array]:
     """How far rays (r, 3) go until they enter and leave each piece, (pieces, r); inf and -inf if they do not."""
+    # A ray o + t u crosses the plane n . x = d at t = (d - n . o) / (n . u), inwards where n . u is negative. It is in
+    # the piece from the last crossing inwards to the first one outwards; along a plane it stays on one side.
     rate = sides.planes[:, :3] @ out.T
     room = (sides.planes[:, 3] - sides.planes[:, :3] @ origin)[:, None]
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -33,6 +33,7 @@ def check_solid(solid: Solid, file: str) -> None:
         )
     room = _APART_M * float(mesh.area)
     reach = float(np.linalg.norm(np.diff(solid.bounds, axis=0)))
+    # Divergence theorem: the volume inside of flat faces is a third of the sum of area times height over the origin.
     enclosed = sum(face_area(face) * float(face.normal @ face.outline[0]) for face in solid.faces.values()) / 3.0
     for name, volume in (("of its cells", solid.volume), ("that its faces enclose", enclosed)):
         if abs(volume - mesh.volume) > room:

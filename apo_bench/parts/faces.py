@@ -125,6 +125,7 @@ def _rectangles(bare: NDArray[np.bool_]) -> NDArray[np.int64]:
 
     Cells in a row are one run, and runs from row to row that are the same are one rectangle.
     """
+    # Runs of cells along j begin where the padded row steps up and end where it steps down.
     ends = np.diff(np.pad(bare, ((0, 0), (1, 1))).astype(np.int8), axis=1)
     row, low = np.nonzero(ends == 1)
     high = np.nonzero(ends == -1)[1]
@@ -132,6 +133,7 @@ def _rectangles(bare: NDArray[np.bool_]) -> NDArray[np.int64]:
     row = row[order]
     low = low[order]
     high = high[order]
+    # Runs of one extent in rows that follow each other make one rectangle.
     same = (np.diff(row) == 1) & (np.diff(low) == 0) & (np.diff(high) == 0)
     first = np.flatnonzero(np.concatenate([[True], ~same])[: len(row)])
     last = np.append(first[1:], len(row))[: len(first)] - 1

@@ -134,7 +134,8 @@ def measures(
         deep_mm = thresholds.fit_margin_mm if operation.carries else thresholds.pushed_mm
         yield _fit(act, how, clearance_mm, thresholds)
         yield Measure(k, "side", _side_mm(act), thresholds.support_mm)
-        if _stays(plan.assembly, k) and clearance_mm > thresholds.fit_margin_mm:
+        stays = not any(operation.main in later.moves for later in plan.assembly.operations[k + 1 :])
+        if stays and clearance_mm > thresholds.fit_margin_mm:
             leans = imbalance(act.alone, operation, planned, 1e-3 * room_mm, ceilings=False)
             yield Measure(k, "leans", leans, BALANCED)
         for depth_m in depths_on_way(operation, planned, how, physical):
@@ -144,12 +145,6 @@ def measures(
         for move in (move for move in arm if move.operation == k and not move.undo):
             yield Measure(k, "gripper", move.struck_mm, thresholds.pushed_mm, move.struck)
             yield from _tip(act, move, how, clearance_mm, thresholds)
-
-
-def _stays(assembly: Assembly, k: int) -> bool:
-    """Whether the part that an operation moves stays there to the end."""
-    main = assembly.operations[k].main
-    return not any(main in later.moves for later in assembly.operations[k + 1 :])
 
 
 def _acts(plan: Plan) -> Iterator[_Act]:

@@ -92,6 +92,7 @@ def _flat(assembly: Assembly, contact: Contact, poses: Poses) -> Array:
     m, e = contact
     if assembly.is_round(contact):
         return _laid(assembly, contact, poses)
+    # S = shift to the plane * least turn that makes the normals opposite * shift of the middle to the origin.
     middle = pose.apply(poses[m.part], assembly.face(m).outline).mean(axis=0)
     up = poses[e.part][:3, :3] @ assembly.face(e).normal
     height = (middle - pose.apply(poses[e.part], assembly.face(e).outline[:1])[0]) @ up

@@ -95,6 +95,7 @@ def _of_normals(assembly: Assembly, operation: Operation, poses: Poses, at: Arra
         return 1.0
     points = points[carrying]
     forces = forces[carrying]
+    # Six equations, sum f n = up and sum f (p - c) x n = 0 over 10 mm, with f >= 0.
     wrenches = [np.concatenate([forces, np.cross((points - c) / _ARM_M, forces)], axis=1).T for c in at]
     return max(float(nnls(wrench, np.array([*_UP, 0.0, 0.0, 0.0]))[1]) for wrench in wrenches)
 
@@ -131,6 +132,7 @@ def _unbalanced(points: Array, signs: Array, centroid: Array) -> float:
     if not len(points):
         return 1.0
     arms = (points - centroid)[:, :2] / 0.01
+    # Vertical forces f >= 0 at arms (x, y): sum f s = 1, sum f s x = 0, sum f s y = 0.
     balance = np.vstack([signs, signs * arms[:, 0], signs * arms[:, 1]])
     return float(nnls(balance, np.array([1.0, 0.0, 0.0]))[1])
 
@@ -151,6 +153,7 @@ def with_friction(pushing: Iterable[Pushes]) -> tuple[Array, Array]:
     carrying = np.abs(n[:, 2]) >= _WALL
     held = points[carrying]
     m = n[carrying]
+    # The cone of friction by four edges m + mu t: t level, across the normal, and across both.
     level = np.column_stack([-m[:, 1], m[:, 0], np.zeros(len(m))])
     size = np.linalg.norm(level, axis=1)[:, None]
     level = np.where(size > 1e-9, level / np.maximum(size, 1e-9), np.array([1.0, 0.0, 0.0]))

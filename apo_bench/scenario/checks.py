@@ -122,14 +122,10 @@ def _check_turns(scenario: Scenario, file: str, case: _Case, stages: tuple[Poses
 def _check_contacts(scenario: Scenario, file: str, case: _Case, stages: tuple[Poses, ...]) -> None:
     for k, operation in enumerate(scenario.assembly.operations):
         for number, contact in enumerate(operation.contacts, start=1):
-            if not case.site_only or _stays(scenario, contact):
+            # When only the site moves, a contact is another one if the face below stays where it is.
+            if not case.site_only or contact.environment.part in scenario.assembly.fixed - scenario.follows_site:
                 key = f"operation {k + 1}, contacts, contact {number}"
                 _check_contact(scenario, file, case, key, contact, stages[k + 1])
-
-
-def _stays(scenario: Scenario, contact: Contact) -> bool:
-    """Whether the face below stays where it is when the site moves."""
-    return contact.environment.part in scenario.assembly.fixed - scenario.follows_site
 
 
 def _check_contact(scenario: Scenario, file: str, case: _Case, key: str, contact: Contact, poses: Poses) -> None:

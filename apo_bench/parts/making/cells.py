@@ -41,8 +41,8 @@ def _cut(polygon: Any) -> list[Array]:
     points = np.concatenate(rings)
     cells = {i: [int(k) for k in triangle] for i, triangle in enumerate(np.asarray(triangulate(rings)))}
     owner = {(a, b): i for i, cell in cells.items() for a, b in zip(cell, [*cell[1:], cell[0]], strict=True)}
-    diagonals = sorted({(a, b) for a, b in owner if a < b and (b, a) in owner}, key=lambda d: -_length(points, d))
-    for a, b in diagonals:
+    diagonals = {(a, b) for a, b in owner if a < b and (b, a) in owner}
+    for a, b in sorted(diagonals, key=lambda side: -float(np.linalg.norm(points[side[0]] - points[side[1]]))):
         i = owner[a, b]
         k = owner[b, a]
         joined = _joined(cells[i], cells[k], a, b)
@@ -59,10 +59,6 @@ def _is_wide(ring: Array) -> bool:
     x, y = (ring - ring[0]).T
     around = float(np.linalg.norm(ring - np.roll(ring, 1, axis=0), axis=1).sum())
     return bool(abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) > _SAME_MM * around)
-
-
-def _length(points: Array, side: tuple[int, int]) -> float:
-    return float(np.linalg.norm(points[side[0]] - points[side[1]]))
 
 
 def _joined(first: list[int], second: list[int], a: int, b: int) -> list[int]:

@@ -47,6 +47,7 @@ def polygon_moments(ring: Array) -> Moments:
     """Of the area inside a ring (k, 2), counter-clockwise."""
     x, y = ring.T
     u, v = np.roll(ring, -1, axis=0).T
+    # Green's theorem over the edges from (x, y) to (u, v), with c twice the area of the triangle to the origin.
     c = x * v - u * y
     first = np.array([(x + u) @ c, (y + v) @ c]) / 6.0
     xx = (x * x + x * u + u * u) @ c / 12.0
@@ -89,6 +90,7 @@ def extruded(flat: Moments, low: float, high: float) -> Moments:
 
 def frustum_moments(low: float, high: float, r_low: float, r_high: float) -> Moments:
     """Of a cylinder or a cone about the z axis, from one height and radius to another one."""
+    # The radius is linear in z, so the integrands are polynomials: up to degree 7 four Gauss points are exact.
     nodes, weights = np.polynomial.legendre.leggauss(4)
     z = low + (high - low) * (nodes + 1.0) / 2.0
     r = r_low + (r_high - r_low) * (nodes + 1.0) / 2.0
