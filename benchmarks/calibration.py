@@ -33,11 +33,10 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.symmetry import symmetries
 from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.fitted import MeasuredNoise
+from apo_bench.observation.models.fitted import MeasuredNoise, restated
 from apo_bench.observation.noise import NOISES, Level, make_noise
 from apo_bench.observation.noise_file import read_noise
 from apo_bench.observation.presets import presets
-from apo_bench.observation.restated import restated
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
 

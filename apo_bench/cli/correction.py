@@ -107,8 +107,8 @@ def correct_command(
         observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg
     )
     if camera_noise is not None:
+        from apo_bench.observation.models.fitted import restated
         from apo_bench.observation.noise_file import read_noise
-        from apo_bench.observation.restated import restated
 
         seen = restated(seen, *read_noise(camera_noise))
         assumed = False

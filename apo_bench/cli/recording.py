@@ -56,8 +56,7 @@ def _import(
 ) -> None:
     from apo_bench.io.tables import write_csv
     from apo_bench.recording.importing import import_recording
-    from apo_bench.recording.show.drawing import draw_recording
-    from apo_bench.recording.show.drawing_content import drawing_of, unfit_drawing
+    from apo_bench.recording.show.drawing import draw_recording, drawing_of, unfit_drawing
     from apo_bench.recording.show.text import (
         PATH_HEAD,
         camera_lines,
@@ -104,8 +103,7 @@ def _import(
 
 
 def _import_unplanned(log: Any, objects: Any, camera: Any, tracks: Any, out: Path, picture: Path | None) -> None:
-    from apo_bench.recording.show.drawing import draw_recording
-    from apo_bench.recording.show.drawing_content import unplanned_drawing
+    from apo_bench.recording.show.drawing import draw_recording, unplanned_drawing
     from apo_bench.recording.show.text import camera_lines, observation_table, put_lines, rest_lines
     from apo_bench.recording.without_scenario import deviations, goals_of, unplanned_recording
 

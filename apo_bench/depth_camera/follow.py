@@ -89,21 +89,21 @@ def follow_demonstration(
             finder.views, images[last], [r.appeared for r in compared], level_m, finder.bias * level_m
         )
         group = None if which is None else _moved(assembly, shapes, believed, which)
-        shares, found = _recognised(expected, shapes, group, which, appearance)
-        if which is not None and found is not None:
+        shares, located = _recognised(expected, shapes, group, which, appearance)
+        if which is not None and located is not None:
             operation = assembly.operations[which]
             solid = assembly.solids[operation.main]
             turn = frame @ expected.turns[which]
-            T = nearest_symmetric_pose(found.T, symmetries(solid), turn)
+            T = nearest_symmetric_pose(located.T, symmetries(solid), turn)
             T = turned_alike(solid, T, turn)
-            C = _turned(found, T)
+            C = _turned(located, T)
             if not any(event.found for event in events):
                 frame = T[:3, :3] @ expected.turns[which].T
-            found = LocatedModel(T, C, found.explained)
+            located = LocatedModel(T, C, located.explained)
             step = T @ pose.inverse(believed[operation.main])
             believed |= {part: step @ believed[part] for part in operation.moves}
         k = k + 1 if which is None else which + 1
-        events.append(Event(first, last, compared, moved, shares, found, group and group.shape, which))
+        events.append(Event(first, last, compared, moved, shares, located, group and group.shape, which))
         first = last
     return tuple(events)
 
@@ -122,7 +122,7 @@ def _spell(
     Operation k is looked for first; one that moves something else may come instead, if k was not seen. Of operations in
     a row that move the same parts it is the last, since the spell ends when something else moves.
     """
-    found = None
+    spell = None
     for last in range(first + 1, len(images)):
         compared = tuple(regions(a, b, noise_m) for a, b in zip(images[first], images[last], strict=True))
         moved = _gone(owners, parts, compared) - assembly.fixed
@@ -131,11 +131,11 @@ def _spell(
         which = next((j for j in range(k, len(assembly)) if moved == set(assembly.operations[j].moves)), None)
         while which is not None and which + 1 < len(assembly) and moved == set(assembly.operations[which + 1].moves):
             which += 1
-        if found is None or (found[1] is None and moved >= found[3]) or which == found[1]:
-            found = last, which, compared, moved
-        elif found[1] is not None and not moved <= found[3]:
+        if spell is None or (spell[1] is None and moved >= spell[3]) or which == spell[1]:
+            spell = last, which, compared, moved
+        elif spell[1] is not None and not moved <= spell[3]:
             break
-    return found
+    return spell
 
 
 def _gone(owners: Sequence[NDArray[np.int64]], parts: tuple[str, ...], compared: Sequence[Regions]) -> frozenset[str]:
@@ -168,10 +168,10 @@ def _recognised(
     assembly = expected.assembly
     points = appearance.points()
     shares: dict[str, float] = {}
-    found = None
+    located = None
     if which is not None and group is not None:
-        found = locate(group, appearance, points)
-        shares["+".join(assembly.operations[which].moves)] = found.explained if found else 0.0
+        located = locate(group, appearance, points)
+        shares["+".join(assembly.operations[which].moves)] = located.explained if located else 0.0
     models: dict[str, Model] = {}
     known = [] if group is None else [group.shape]
     for part, solid in assembly.solids.items():
@@ -179,9 +179,9 @@ def _recognised(
             models[part] = Model(shapes[part], symmetries(solid))
             known.append(shapes[part])
     shares |= model_shares(models, appearance, points)
-    if found is not None and found.explained < max(shares.values()) - ALIKE:
-        found = None
-    return shares, found
+    if located is not None and located.explained < max(shares.values()) - ALIKE:
+        located = None
+    return shares, located
 
 
 def _moved(assembly: Assembly, shapes: Mapping[str, Shape], believed: Poses, which: int) -> Model:
@@ -200,7 +200,7 @@ def _alike(a: Shape, b: Shape) -> bool:
     return same and len(a.inside) == len(b.inside) and all(map(alike, a.inside, b.inside))
 
 
-def _turned(found: LocatedModel, T: Array) -> Array:
+def _turned(located: LocatedModel, T: Array) -> Array:
     """The covariance of a pose that looks the same: body twists turn along, S^-1 xi S."""
-    A = pose.adjoint(pose.inverse(T) @ found.T)
-    return np.asarray(A @ found.covariance @ A.T)
+    A = pose.adjoint(pose.inverse(T) @ located.T)
+    return np.asarray(A @ located.covariance @ A.T)

@@ -49,14 +49,14 @@ class Looks:
 
     def __call__(self, operations: Collection[int]) -> Observation:
         n = len(self._assembly)
-        asked = {*operations}
+        chosen = {*operations}
         if self.left < 1:
             raise InputError("one more look was asked for, and none is left; ask `look.left` before.")
-        if not asked or not all(isinstance(k, int | np.integer) and 0 <= k < n for k in asked):
+        if not chosen or not all(isinstance(k, int | np.integer) and 0 <= k < n for k in chosen):
             raise InputError(
-                f"a look at the operations {[*asked]} was asked for; give one or more whole numbers from 0 to {n - 1}."
+                f"a look at the operations {[*chosen]} was asked for; give one or more whole numbers from 0 to {n - 1}."
             )
-        made = observe(self._demonstration, self._noise, self._rng)
+        look = observe(self._demonstration, self._noise, self._rng)
         self.left -= 1
-        self.seen_again += len(asked)
-        return replace(made, assembly=self._assembly, seen=made.seen & np.isin(np.arange(n), [*asked]))
+        self.seen_again += len(chosen)
+        return replace(look, assembly=self._assembly, seen=look.seen & np.isin(np.arange(n), [*chosen]))

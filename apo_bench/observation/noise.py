@@ -128,11 +128,11 @@ class Plain:
 
     def __post_init__(self) -> None:
         for field, largest in _LIMITS.items():
-            given = getattr(self, field)
-            number = isinstance(given, int | float | np.floating | np.integer) and not isinstance(given, bool)
-            if not number or not math.isfinite(given) or not 0.0 <= given <= largest:
+            value = getattr(self, field)
+            number = isinstance(value, int | float | np.floating | np.integer) and not isinstance(value, bool)
+            if not number or not math.isfinite(value) or not 0.0 <= value <= largest:
                 raise InputError(
-                    f"the noise model '{self.__name__}' declares {field} {given!r}; a number from 0 to {largest:g} is "
+                    f"the noise model '{self.__name__}' declares {field} {value!r}; a number from 0 to {largest:g} is "
                     "allowed."
                 )
 

@@ -52,9 +52,9 @@ def recognise(
     for k, (operation, poses) in enumerate(zip(assembly.operations, as_seen, strict=True)):
         others = tuple(p for p in assembly.solids if p in standing - set(operation.moves))
         around = _Around(observation, rules, k, others)
-        found = around.fixed(belief) if rules.fixed else around.likeliest(belief)
-        belief = found.belief
-        evidence += evidence_of(assembly, k, [(c.contact, c.pair, c.most) for c in found.taken], poses)
+        best = around.fixed(belief) if rules.fixed else around.likeliest(belief)
+        belief = best.belief
+        evidence += evidence_of(assembly, k, [(c.contact, c.pair, c.most) for c in best.taken], poses)
         standing |= set(operation.moves)
     return Recognised(with_contacts(assembly, evidence), tuple(evidence))
 
@@ -101,13 +101,13 @@ class _Around:
         solids = self.seen.assembly.solids
         rules = self.rules
         bounds = {"gap_m": rules.gap_m, "angle_rad": rules.angle_rad, "share": rules.share}
-        found = list[_Candidate]()
+        candidates = list[_Candidate]()
         for a in self.seen.assembly.operations[self.k].moves:
             for b in self.others:
                 known = {(m.face, e.face) for m, e in taken if (m.part, e.part) == (a, b)}
                 for pair in facing(solids[a], now.poses[a], solids[b], now.poses[b], **bounds, known=known):
-                    found += self._judged(a, b, pair, now, belief)
-        return tuple(sorted(found, key=lambda c: (c.distance * (3 / len(c.pair.residual)), c.contact)))
+                    candidates += self._judged(a, b, pair, now, belief)
+        return tuple(sorted(candidates, key=lambda c: (c.distance * (3 / len(c.pair.residual)), c.contact)))
 
     def fixed(self, belief: Belief) -> _Found:
         """Every pair within fixed thresholds; nothing is concluded from one to the other."""

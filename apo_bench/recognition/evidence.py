@@ -57,10 +57,10 @@ def without_contacts(observation: Observation, rules: Rules, verb: str) -> Obser
     Raises:
         InputError: Something else was given to the verb.
     """
-    for given, wanted in ((observation, Observation), (rules, Rules)):
-        if not isinstance(given, wanted):
+    for argument, wanted in ((observation, Observation), (rules, Rules)):
+        if not isinstance(argument, wanted):
             raise InputError(
-                f"{kind(given)} was given to {verb}; an Observation is allowed (read_observation reads one from a "
+                f"{kind(argument)} was given to {verb}; an Observation is allowed (read_observation reads one from a "
                 "file), and as rules RULES_BY_NOISE, FIXED_RULES or Rules(...) of apo_bench.recognition.thresholds."
             )
     return replace(observation, assembly=replace(with_contacts(observation.assembly, ()), gaps={}))
@@ -72,7 +72,8 @@ def with_contacts(assembly: Assembly, evidence: Iterable[Evidence]) -> Assembly:
     for each in evidence:
         contacts[each.made].append(each.contact)
     operations = tuple(
-        replace(operation, contacts=tuple(made)) for operation, made in zip(assembly.operations, contacts, strict=True)
+        replace(operation, contacts=tuple(touching))
+        for operation, touching in zip(assembly.operations, contacts, strict=True)
     )
     return replace(assembly, operations=operations)
 
@@ -95,9 +96,9 @@ def evidence_of(
             for i in (among.index(of.part), [*solids[of.part].faces, *solids[of.part].rounds].index(of.face))
         ]
 
-    found = list[Evidence]()
+    evidence = list[Evidence]()
     for contact, pair, most in sorted(taken, key=place):
         a, b = contact
         seen_gap_m = face_gap(assembly.face_of(a), as_seen[a.part], assembly.face_of(b), as_seen[b.part])
-        found.append(Evidence(contact, k, pair.gap_m, pair.angle_rad, pair.share, most, seen_gap_m))
-    return found
+        evidence.append(Evidence(contact, k, pair.gap_m, pair.angle_rad, pair.share, most, seen_gap_m))
+    return evidence

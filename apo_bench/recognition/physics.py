@@ -84,12 +84,13 @@ def _least_unlikely(
     at: Situation, rules: Rules, mine: Collection[Candidate], directions: Array, lengths: Array, deviations: Array
 ) -> float:
     for i in np.argsort(lengths / deviations):
-        found = _unlikely(-lengths[i], deviations[i]) - _unlikely(0.0, 1.0)
+        # Of ways of no length, which are as likely as not, nothing is surprising.
+        penalty = _unlikely(-lengths[i], deviations[i]) - _unlikely(0.0, 1.0)
         far = lengths[i] > _DEEP_M + 2.0 * at.seen.play_m
-        if found > _OUT_OF_QUESTION:
+        if penalty > _OUT_OF_QUESTION:
             break
         if not far or all(_covers(at, rules, c, lengths[i] * directions[i]) for c in mine):
-            return found
+            return penalty
     return IMPOSSIBLE
 
 

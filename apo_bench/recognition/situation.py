@@ -102,7 +102,7 @@ class Situation:
 
     def candidates(self, rules: Rules, taken: Collection[Contact]) -> tuple[Candidate, ...]:
         """The pairs of faces within the thresholds that were not taken yet."""
-        found = list[Candidate]()
+        candidates = list[Candidate]()
         for a, b in self.pairs():
             known = {(m.face, e.face) for m, e in taken if (m.part, e.part) == (a, b)}
             of_a = self.seen.assembly.solids[a]
@@ -110,8 +110,8 @@ class Situation:
             most = self._bounds(rules, a, b)
             bounds = {"gap_m": most.gap_m, "angle_rad": most.angle_rad, "share": rules.share}
             for pair in facing(of_a, self.now.poses[a], of_b, self.now.poses[b], **bounds, known=known):
-                found += self._judged(rules, a, b, pair)
-        return tuple(found)
+                candidates += self._judged(rules, a, b, pair)
+        return tuple(candidates)
 
     def _judged(self, rules: Rules, a: str, b: str, pair: Facing) -> Iterator[Candidate]:
         """The pair as a candidate, if it is one."""

@@ -34,10 +34,10 @@ class Rules:
 
     def __post_init__(self) -> None:
         for name, high in (("miss", 1.0), ("gap_m", 1.0), ("angle_rad", math.pi / 2), ("share", 1.0)):
-            given = getattr(self, name)
-            if not (isinstance(given, int | float) and 0.0 < given < high):
+            value = getattr(self, name)
+            if not (isinstance(value, int | float) and 0.0 < value < high):
                 raise InputError(
-                    f"{name}={given!r} was given as a rule of recognition; above 0 and below {high:g} is allowed."
+                    f"{name}={value!r} was given as a rule of recognition; above 0 and below {high:g} is allowed."
                 )
 
     def most_of(self, count: int) -> float:

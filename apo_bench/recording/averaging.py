@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, frozen
 
-_FRAME_FLOOR = np.repeat([2e-5, 2e-4], 3)
+_FRAME_FLOOR = frozen(np.repeat([2e-5, 2e-4], 3), 6)
 """No axis of one frame is surer than this, [m, rad]: what a file with rounded numbers can say."""
-_FRAME_FLOOR.flags.writeable = False
 _FAR = 5.0
 """A frame that is farther off, in standard deviations of any axis, is an outlier: 1 in 300,000 by chance."""
 _ROUNDS = 12

@@ -8,13 +8,12 @@ from typing import final
 import numpy as np
 
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.recording.averaging import Mean
 
 _ROUNDS = 50
-_PLACED = np.repeat([2e-4, 2e-3], 3)
+_PLACED = frozen(np.repeat([2e-4, 2e-3], 3), 6)
 """How well a place is known, per axis, [m, rad]."""
-_PLACED.flags.writeable = False
 
 
 @final

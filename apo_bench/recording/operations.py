@@ -116,13 +116,13 @@ def seen_operation(
 
 def approaches(scenario: Scenario, operations: Sequence[SeenOperation], T_world_camera: Array) -> Sequence[Approach]:
     """Every operation that was seen."""
-    found = list[Approach]()
+    each = list[Approach]()
     for k, (operation, nominal) in enumerate(zip(operations, nominal_operations(scenario), strict=True)):
         if operation.path is None or operation.rest is None:
             continue
         end = last_straight(operation.path, T_world_camera @ operation.rest.T)
         if end is None:
-            found.append(Approach(k, None, "", 0.0))
+            each.append(Approach(k, None, "", 0.0))
             continue
         arrival = nominal.after
         ways: dict[str, Array] = {macro.name: arrival.own(macro.direction) for macro in arrival.macros}
@@ -131,8 +131,8 @@ def approaches(scenario: Scenario, operations: Sequence[SeenOperation], T_world_
             name: float(np.degrees(np.arccos(np.clip(end.direction @ way, -1.0, 1.0)))) for name, way in ways.items()
         }
         nearest = min(angles, key=lambda name: angles[name])
-        found.append(Approach(k, end, nearest, angles[nearest]))
-    return found
+        each.append(Approach(k, end, nearest, angles[nearest]))
+    return each
 
 
 def last_straight(path: PoseTrack, goal: Array) -> StraightEnd | None:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.recording.averaging import Mean, average, common_scatter, pooled_mean
 from apo_bench.recording.log import PoseTrack
 
@@ -22,9 +22,8 @@ _FEWEST = 4
 """Frames of a rest."""
 _ENOUGH_HZ = 30.0
 """Rests are looked for in so many frames a second."""
-_LEAST = np.repeat([2e-4, 1.7e-3], 3)
+_LEAST = frozen(np.repeat([2e-4, 1.7e-3], 3), 6)
 """Noise per axis below which changes are not looked for: 0.2 mm, 0.1 deg."""
-_LEAST.flags.writeable = False
 _STILL = 5.3
 """sqrt of the 99.99 % quantile of chi-square with 6 degrees of freedom."""
 _MEDIAN = 1.77

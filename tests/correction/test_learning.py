@@ -22,10 +22,9 @@ from apo_bench.geometry import pose
 from apo_bench.observation.fitting.components import COMPONENTS, component_factors, view_ways
 from apo_bench.observation.models.anisotropic import ACROSS_SIGHT, ALONG_SIGHT, IN_IMAGE, OUT_OF_IMAGE
 from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.fitted import view_frame
+from apo_bench.observation.models.fitted import restated, view_frame
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.noise_file import noise_text, read_noise
-from apo_bench.observation.restated import restated
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.trial.learned_noise import learn

@@ -9,7 +9,7 @@ from apo_bench.recording.camera_file import CameraFile, Conventions
 from apo_bench.recording.camera_pose import CameraPose
 from apo_bench.recording.importing import planned_starts
 from apo_bench.recording.log import Log
-from apo_bench.recording.show.drawing_content import unfit_drawing
+from apo_bench.recording.show.drawing import unfit_drawing
 from apo_bench.recording.show.text import camera_lines
 from apo_bench.scenario.file import load_scenario
 from tests.recorded import seen

@@ -38,11 +38,11 @@ def split_of_quantiles(across: Mapping[float, float], along: Mapping[float, floa
 
     def off(at: Array) -> Array:
         split = of_numbers(at, limit)
-        found = [
+        sizes = [
             np.interp(np.array([*given]) / 100.0, np.maximum.accumulate(cdf(grid)), grid)
             for given, cdf in ((across, split.cdf_across), (along, split.cdf_along))
         ]
-        return np.asarray(np.log(np.concatenate(found)) - target)
+        return np.asarray(np.log(np.concatenate(sizes)) - target)
 
     start = [np.log(np.median([*across.values()])), 0.3, np.log(np.median([*along.values()])), 0.3]
     low = [np.log(SMALLEST_SCALE * limit), 0.0] * 2

@@ -16,7 +16,7 @@ from apo_bench.observation.models.camera import (
     WORKSPACE_MIDDLE_M,
     Camera,
 )
-from apo_bench.observation.models.isotropic import observe_displaced
+from apo_bench.observation.models.isotropic import displaced, observe_displaced
 from apo_bench.observation.models.level import Facts, Level
 
 ALONG_SIGHT = 3.0
@@ -116,8 +116,8 @@ class Sighted:
         rad = np.radians(self.level.deg)
         sigma = np.array([mm * self.across] * 2 + [mm * self.along] + [rad * self.tilt] * 2 + [rad * self.about])
         xi = self.camera.twists(demonstration.goals, rng.standard_normal((len(assembly), 6)) * sigma)
-        seen = observe_displaced(assembly, demonstration, xi, np.zeros((6, 6)))
-        return observe_displaced(assembly, demonstration, xi, self.camera.covariance(seen.goals, np.diag(sigma**2)))
+        stated = self.camera.covariance(displaced(demonstration.goals, xi), np.diag(sigma**2))
+        return observe_displaced(assembly, demonstration, xi, stated)
 
 
 def line_of_sight() -> Array:

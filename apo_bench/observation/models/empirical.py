@@ -88,10 +88,10 @@ class Empirical:
         if len(sample.outliers):
             errors = np.where(chance[:, 1:2] < sample.gross, _picked(sample.outliers, chance[:, 0]), errors)
         missed = chance[:, 2] < sample.missed
-        made = observe_in_ray_frames(
+        seen = observe_in_ray_frames(
             self.camera, self.level, demonstration, assembly, sign * errors, sample.covariance, missed
         )
-        return replace(made, outliers=measured_rates(sample.gross))
+        return replace(seen, outliers=measured_rates(sample.gross))
 
 
 def empirical_noise(path: Path, level: Level) -> Empirical:
@@ -101,12 +101,12 @@ def empirical_noise(path: Path, level: Level) -> Empirical:
         InputError: Anything in the file that is not as described, with the line where it stands.
     """
     try:
-        found = path.stat()
+        state = path.stat()
     except (OSError, ValueError) as error:
         raise InputError(
             f"{path}: the file of residuals cannot be read; check the path behind 'empirical:'."
         ) from error
-    return Empirical(_read_once(path, found.st_mtime_ns, found.st_size), level)
+    return Empirical(_read_once(path, state.st_mtime_ns, state.st_size), level)
 
 
 def residuals_text(residuals: Residuals) -> str:
@@ -139,15 +139,15 @@ def read_residuals(path: str | Path) -> Sample:
         if kind not in _KINDS:
             row.fail("kind", f"{', '.join(_KINDS[:-1])} or {_KINDS[-1]} is needed")
         errors[kind].append([] if kind == _MISSED else _error(row))
-    count = {kind: len(found) for kind, found in errors.items()}
-    found = sum(count.values()) - count[_MISSED]
+    count = {kind: len(estimates) for kind, estimates in errors.items()}
+    estimates = sum(count.values()) - count[_MISSED]
     if not count[_INLIER]:
         raise InputError(f"{path}: no residual of an inlier stands in the file; write one with noise fit --residuals.")
     return Sample(
         inliers=_acting_where_seen(errors[_INLIER]),
         outliers=_acting_where_seen(errors[_OUTLIER]),
-        missed=count[_MISSED] / (found + count[_MISSED]),
-        gross=count[_OUTLIER] / found,
+        missed=count[_MISSED] / (estimates + count[_MISSED]),
+        gross=count[_OUTLIER] / estimates,
     )
 
 

@@ -1,4 +1,7 @@
-"""Noise with the tails, outliers and misses that were measured of a pose estimator; `noise fit` writes its numbers."""
+"""Noise with the tails, outliers and misses that were measured of a pose estimator; `noise fit` writes its numbers.
+
+It is drawn, or stated of an observation that a camera of this noise has made.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -16,7 +19,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.isotropic import observe_displaced, with_shared
+from apo_bench.observation.models.isotropic import displaced, floored, observe_displaced, with_shared
 from apo_bench.observation.models.level import Facts, Level
 from apo_bench.observation.models.outliers import UNSEEN_DEVIATION, last_seen
 from apo_bench.observation.models.tails import Split
@@ -24,12 +27,11 @@ from apo_bench.observation.models.tails import Split
 SMALLEST_SCALE = 1e-4
 LEAST_FREEDOM = 0.5
 """Least scale, as a part of the limit, and least degrees of freedom, of a tail that is fitted or read."""
-
-
 LEVEL_UNITS = np.repeat([1e-3, np.radians(1.0)], 3)
 """[m] per mm and [rad] per degree."""
 _GAUSSIAN = 1e9
 """Degrees of freedom of a Gaussian, as good as infinitely many."""
+_AS_MEASURED = Level(1.0, 1.0)
 LARGEST_M = 0.4
 LARGEST_RAD = 2.0
 """A standard deviation per axis beyond which a level makes no sense."""
@@ -122,21 +124,40 @@ class Fitted:
         chance = rng.random((n, 2))
         errors = np.where(chance[:, :1] < measured.outliers, gross, errors)
         missed = chance[:, 1] < measured.missed
-        made = observe_in_ray_frames(
+        seen = observe_in_ray_frames(
             self.camera, self.level, demonstration, assembly, errors * LEVEL_UNITS, self.covariance, missed
         )
-        tails = stated_tails(measured, self.level, self.camera, made.goals) if min(self.level) > 0.0 else None
-        made = replace(made, outliers=measured_rates(measured.outliers), tails=tails)
-        return made if measured.view is None else self._displaced(made, rng.standard_normal(6))
+        tails = stated_tails(measured, self.level, self.camera, seen.goals) if min(self.level) > 0.0 else None
+        seen = replace(seen, outliers=measured_rates(measured.outliers), tails=tails)
+        return seen if measured.view is None else self._displaced(seen, rng.standard_normal(6))
 
-    def _displaced(self, made: Observation, unit: Array) -> Observation:
+    def _displaced(self, seen: Observation, unit: Array) -> Observation:
         """What is seen if the whole view is off as well."""
         sigma = np.repeat(self.measured.view or (0.0, 0.0), 3) * LEVEL_UNITS * np.repeat(self.level, 3)
-        if not sigma.any() or not len(made.goals):
-            return made
-        P = view_frame(self.camera, [made.goals])
-        goals = P @ pose.exp(sigma * unit) @ pose.inverse(P) @ made.goals
-        return with_shared(replace(made, goals=goals), view_error(self.camera, goals, sigma))
+        if not sigma.any() or not len(seen.goals):
+            return seen
+        P = view_frame(self.camera, [seen.goals])
+        goals = P @ pose.exp(sigma * unit) @ pose.inverse(P) @ seen.goals
+        return with_shared(replace(seen, goals=goals), view_error(self.camera, goals, sigma))
+
+
+def restated(observation: Observation, measured: MeasuredNoise, camera: Camera) -> Observation:
+    """What was seen, a constant error of the camera taken out, with the covariances of measured noise.
+
+    Covariances that it stated itself are not looked at, but for those of operations that were not seen.
+    """
+    goals = np.array(observation.goals)
+    if measured.constant is not None:
+        # T_seen = P exp(c) P^-1 T, so T = P exp(-c) P^-1 T_seen.
+        P = measured.constant.frame
+        goals = P @ pose.exp(-measured.constant.twist) @ pose.inverse(P) @ goals
+    stated = floored(camera.covariance(goals, Fitted(measured, _AS_MEASURED, camera).covariance))
+    stated = np.where(observation.seen[:, None, None], stated, observation.covariance)
+    tails = stated_tails(measured, _AS_MEASURED, camera, goals)
+    seen = replace(observation, goals=goals, covariance=stated, shared=(), tails=tails)
+    if measured.view is None or not any(measured.view) or not len(goals):
+        return seen
+    return with_shared(seen, view_error(camera, goals, np.repeat(measured.view, 3) * LEVEL_UNITS))
 
 
 def stated_tails(measured: MeasuredNoise, level: Level, camera: Camera, goals: Array) -> Tails:
@@ -173,10 +194,10 @@ def check_measured_level(level: Level, covariance: Array) -> None:
         covariance: (6, 6), at level 1, [m, rad].
     """
     worst = np.sqrt(np.diagonal(covariance).reshape(2, 3).max(axis=1))
-    for given, deviation, largest, unit in zip(level, worst, (LARGEST_M, LARGEST_RAD), ("mm", "degrees"), strict=True):
-        if given * deviation > largest:
+    for value, deviation, largest, unit in zip(level, worst, (LARGEST_M, LARGEST_RAD), ("mm", "degrees"), strict=True):
+        if value * deviation > largest:
             raise InputError(
-                f"a level of {given:g} {unit} was given for noise that is measured, where 1 is as measured; at most "
+                f"a level of {value:g} {unit} was given for noise that is measured, where 1 is as measured; at most "
                 f"{np.floor(10.0 * largest / deviation) / 10.0:g} is allowed, else parts are seen outside the room."
             )
 
@@ -199,16 +220,15 @@ def observe_in_ray_frames(
     """
     scale = np.repeat([level.mm, level.deg], 3)
     xi = camera.twists(demonstration.goals, errors * scale)
-    found = observe_displaced(assembly, demonstration, xi, np.zeros((6, 6)))
-    made = observe_displaced(
-        assembly, demonstration, xi, camera.covariance(found.goals, covariance * np.outer(scale, scale))
-    )
+    seen_goals = displaced(demonstration.goals, xi)
+    stated = camera.covariance(seen_goals, covariance * np.outer(scale, scale))
+    seen = observe_displaced(assembly, demonstration, xi, stated)
     missed = missed & (max(level) > 0.0)
-    goals = made.goals.copy()
-    stated = made.covariance.copy()
+    goals = seen.goals.copy()
+    stated = seen.covariance.copy()
     goals[missed] = last_seen(assembly, demonstration.start, goals, ~missed)[missed]
     stated[missed] = np.diag(UNSEEN_DEVIATION**2)
-    return replace(made, goals=goals, covariance=stated, seen=~missed)
+    return replace(seen, goals=goals, covariance=stated, seen=~missed)
 
 
 def _gross(measured: MeasuredNoise, n: int, rng: np.random.Generator) -> Array:

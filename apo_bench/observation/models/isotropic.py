@@ -150,11 +150,14 @@ def observe_displaced(assembly: Assembly, demonstration: Demonstration, xi: Arra
         xi: (n, 6), body twists; where one is zero the goal is the one that was shown, bit for bit.
         covariance: (6, 6) or (n, 6, 6), of xi, [m, rad].
     """
-    goals = np.where(
-        np.any(xi, axis=1, keepdims=True)[..., None], demonstration.goals @ pose.exp(xi), demonstration.goals
-    )
+    goals = displaced(demonstration.goals, xi)
     stated = floored(covariance + demonstration.careless)
     return Observation(assembly, demonstration.start, goals, stated, np.ones(len(assembly), dtype=np.bool_))
+
+
+def displaced(goals: Array, xi: Array) -> Array:
+    """`T exp(xi)` of goals (n, 4, 4); where a twist is zero the goal as it is, bit for bit."""
+    return np.where(np.any(xi, axis=1, keepdims=True)[..., None], goals @ pose.exp(xi), goals)
 
 
 def observe_shared(

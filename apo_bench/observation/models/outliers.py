@@ -76,14 +76,14 @@ class Outliers:
         unit = rng.standard_normal((len(assembly), 6))
         chance = rng.random((len(assembly), 2))
         times = np.where(chance[:, :1] < self.outliers, self.times, 1.0)
-        made = observe_displaced(assembly, demonstration, unit * times * sigma, np.diag(sigma**2))
+        seen = observe_displaced(assembly, demonstration, unit * times * sigma, np.diag(sigma**2))
         missed = (chance[:, 1] < self.misses) & (max(self.level) > 0.0)
-        goals = made.goals.copy()
-        covariance = made.covariance.copy()
+        goals = seen.goals.copy()
+        covariance = seen.covariance.copy()
         goals[missed] = last_seen(assembly, demonstration.start, goals, ~missed)[missed]
         covariance[missed] = np.diag(UNSEEN_DEVIATION**2)
         stated = measured_rates(0.0, self.outliers, self.times) if self.times > 1.0 else None
-        return replace(made, goals=goals, covariance=covariance, seen=~missed, outliers=stated)
+        return replace(seen, goals=goals, covariance=covariance, seen=~missed, outliers=stated)
 
 
 def last_seen(assembly: Assembly, start: Poses, goals: Array, seen: NDArray[np.bool_]) -> Array:

@@ -67,13 +67,13 @@ class Residuals:
     def round_objects(self) -> tuple[int, ...]:
         """Objects that look alike turned by any angle about an axis, as far as estimates tell: fewer than half of the
         inliers are upright, and turns are everywhere."""
-        found = list[int]()
+        parts = list[int]()
         for part in np.unique(self.where[self.inlier, 2]).tolist():
             angle = self.angle_deg[self.inlier & (self.where[:, 2] == part)]
             between = (angle >= TURNED_DEG) & (angle < _GAP_DEG)
             if np.mean(angle < TURNED_DEG) < 0.5 and between.mean() > _IN_GAP:
-                found.append(part)
-        return tuple(found)
+                parts.append(part)
+        return tuple(parts)
 
     @cached_property
     def turn_known(self) -> NDArray[np.bool_]:
@@ -109,7 +109,7 @@ def match_residuals(estimates: PoseRows, truth: PoseRows, scene: int | None = No
     partner = match_rows(estimates, truth)
     found = partner >= 0
     n = len(partner)
-    given = len(estimates.where) if scene is None else int(np.sum(estimates.where[:, 0] == scene))
+    among_all = len(estimates.where) if scene is None else int(np.sum(estimates.where[:, 0] == scene))
     there = np.tile(np.eye(4), (n, 1, 1))
     there[:, :3, 3] = truth.t_mm * 1e-3
     F = Camera(np.eye(4)).frames(there)[found]
@@ -129,7 +129,7 @@ def match_residuals(estimates: PoseRows, truth: PoseRows, scene: int | None = No
         turn_deg=turned,
         trace_deg=trace,
         score=np.where(found, estimates.score[partner], np.nan),
-        surplus=given - int(found.sum()),
+        surplus=among_all - int(found.sum()),
         absent=_absent(estimates.where, truth.where, scene),
         distance_mm=float(np.median(np.linalg.norm(truth.t_mm, axis=1))),
     )

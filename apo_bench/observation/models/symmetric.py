@@ -90,12 +90,12 @@ def _principal(solid: Solid, group: Array) -> tuple[Array, Array]:
     the same in a whole turn about each, (3,).
     """
     frame = pose.at(solid.centroid)
-    found = revolution(solid)
-    if found is None:
+    body = revolution(solid)
+    if body is None:
         return frame, folds(group)
-    x = across_axis(found.axis)
+    x = across_axis(body.axis)
     frame = np.array(frame)
-    frame[:3, :3] = np.column_stack([x, np.cross(found.axis, x), found.axis])
+    frame[:3, :3] = np.column_stack([x, np.cross(body.axis, x), body.axis])
     return frame, np.array([len(group), len(group), np.inf])
 
 
@@ -119,6 +119,6 @@ class AnyTurn:
     @staticmethod
     def _one(solid: Solid, rng: np.random.Generator) -> Array:
         group = symmetries(solid)
-        found = revolution(solid)
-        one = np.asarray(group[rng.integers(len(group))])
-        return one if found is None else turn_about(found.point, found.axis, rng.uniform(-np.pi, np.pi)) @ one
+        body = revolution(solid)
+        turn = np.asarray(group[rng.integers(len(group))])
+        return turn if body is None else turn_about(body.point, body.axis, rng.uniform(-np.pi, np.pi)) @ turn

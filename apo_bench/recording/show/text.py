@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.io.words import columns, direction
 from apo_bench.recording.camera_pose import CameraPose
 from apo_bench.recording.importing import ImportedRecording
@@ -19,9 +19,8 @@ from apo_bench.recording.without_scenario import UnplannedRecording
 
 _HEADS = ("", "part", "rests from", "until s", "frames", "outliers", "x mm", "y mm", "z mm", "a frame is off by")
 _MOST_TIMES = 5
-_POSE_UNITS = np.array([1e3, 1e3, 1e3, 1.0, 1.0, 1.0, 1.0])
+_POSE_UNITS = frozen([1e3, 1e3, 1e3, 1.0, 1.0, 1.0, 1.0], 7)
 """mm for m of a packed pose."""
-_POSE_UNITS.flags.writeable = False
 
 
 def reading_lines(log: Log, objects: ObjectsFile) -> list[tuple[str, str]]:
