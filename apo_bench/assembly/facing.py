@@ -125,8 +125,8 @@ def _pair(a: _Posed, i: int, T_a: Array, b: _Posed, j: int, T_b: Array, share: f
     middle = common.corners.mean(axis=0)
     u, v = _axes(n_b, T_b[:3, :3])
     residual = np.array([n_a @ (middle - a.corners[i][0]), u @ n_a, v @ n_a])
-    # A twist (v, w) of a about the origin moves its plane along n_a by n_a . v + (p x n_a) . w at p, the middle on b, by
-    # which the gap gets smaller, and changes u . n_a by (n_a x u) . w.
+    # A twist (v, w) of a about the origin moves its plane along n_a by n_a . v + (p x n_a) . w at p, the middle on b,
+    # by which the gap gets smaller, and changes u . n_a by (n_a x u) . w.
     lever, turn_u, turn_v = np.cross(np.array([middle, n_a, n_a]), np.array([n_a, u, v]))
     slope = np.zeros((3, 6))
     slope[0] = [*-n_a, *-lever]
