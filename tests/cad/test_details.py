@@ -11,6 +11,7 @@ import pytest
 from manifold3d import Manifold
 from scipy.spatial import ConvexHull
 
+from apo_bench.cad.import_report import import_lines, unit_line
 from apo_bench.cad.importing import _why_not, import_part, raw_solids
 from apo_bench.cad.pieces.corners import corners_of, without_near
 from apo_bench.cad.step.from_brep import raw_of
@@ -73,27 +74,30 @@ def test_a_corner_that_is_not_there_is_refused_and_logs_stay_as_they_were(tmp_pa
         log.setLevel(before)
 
 
-def drilled(hole: bool) -> BrepSolid:
-    """A cylinder, or a block with a hole, as the reader of STEP files gives it; its wall has corners at half height."""
-    low = rod(5.0, 10.0)
-    body = block(30, 20, 20) - low - rod(5.0, 10.0, (0, 0, 10)) if hole else low + rod(5.0, 10.0, (0, 0, 10))
+def as_brep(body: Any) -> BrepSolid:
+    """A body with one round wall of radius 5 about the z axis, as the reader of STEP files may give it.
+
+    Normals of flat faces look into the part, as the planes of a file may.
+    """
     corners = triangles(body).astype(np.float64)
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normals = across / np.linalg.norm(across, axis=1)[:, None]
-    middle = corners.mean(axis=1)
-    wall = (np.hypot(middle[:, 0], middle[:, 1]) < 5.1) & (np.abs(normals[:, 2]) < 0.1)
+    reach = np.hypot(*corners.mean(axis=1)[:, :2].T)
+    wall = (np.abs(reach - 5.0) < 0.01) & (np.abs(normals[:, 2]) < 0.1)
     index = np.arange(3 * len(corners)).reshape(-1, 3)
     z = np.array([0.0, 0.0, 1.0])
     round_face = BrepFace("cylinder", np.zeros(3), z, 5.0, 0.0, corners[wall].reshape(-1, 3), index[: wall.sum()])
     flat = [
-        BrepFace("plane", p[0], n, 0.0, 0.0, p, index[:1]) for p, n in zip(corners[~wall], normals[~wall], strict=True)
+        BrepFace("plane", p[0], -n, 0.0, 0.0, p, index[:1]) for p, n in zip(corners[~wall], normals[~wall], strict=True)
     ]
     return BrepSolid("a", (round_face, *flat), float(body.volume()), np.array([0.0, 0.0, 10.0]), np.eye(3), ())
 
 
 @pytest.mark.parametrize("hole", [False, True])
 def test_a_wall_of_a_step_file_becomes_strips_that_look_out_of_the_part(hole: bool, tmp_path: Path) -> None:
-    solid = drilled(hole)
+    """Its wall has corners at half height, which strips from end to end leave out."""
+    two = rod(5.0, 10.0) + rod(5.0, 10.0, (0, 0, 10))
+    solid = as_brep(block(30, 20, 20) - two if hole else two)
     raw = raw_of(tmp_path / "a.step", solid)
     assert raw.mesh.volume == pytest.approx(solid.size, rel=1e-7)
     (wall,) = (region for region in raw.regions if region.is_round)
@@ -103,6 +107,27 @@ def test_a_wall_of_a_step_file_becomes_strips_that_look_out_of_the_part(hole: bo
     assert heights.tolist() == [0.0, 20.0]
     outward = raw.mesh.across[wall.triangles] * raw.mesh.corners[raw.mesh.triangles[wall.triangles]].mean(axis=1)
     assert (np.sign(outward[:, :2].sum(axis=1)) == (-1.0 if hole else 1.0)).all()
+    top = raw.named()["pz"]
+    assert top.direction.tolist() == [0.0, 0.0, 1.0]
+    assert top.point[2] == pytest.approx(20.0)
+
+
+def test_half_a_wall_of_a_step_file_stays_half(tmp_path: Path) -> None:
+    solid = as_brep(rod(5.0, 20.0) - block(20, 10, 30, (0, -5, -5)))
+    raw = raw_of(tmp_path / "a.step", solid)
+    assert raw.mesh.volume == pytest.approx(solid.size, rel=1e-7)
+    (wall,) = (region for region in raw.regions if region.is_round)
+    assert wall.turn == pytest.approx(np.pi, abs=1e-3)
+    assert not wall.is_whole
+    assert wall.name == ""
+
+
+def test_a_window_in_a_wall_of_a_step_file_stays_open(tmp_path: Path) -> None:
+    solid = as_brep(rod(5.0, 20.0) - block(6, 4, 4, (5, 0, 8)))
+    raw = raw_of(tmp_path / "a.step", solid)
+    assert raw.mesh.volume == pytest.approx(solid.size, rel=1e-7)
+    (wall,) = (region for region in raw.regions if region.is_round)
+    assert (wall.is_whole, wall.square) == (True, False)
 
 
 def test_a_cut_through_the_wide_end_of_a_countersink_leaves_nothing_in_it(tmp_path: Path) -> None:
@@ -121,3 +146,23 @@ def test_free_radius_of_a_blind_hole_and_volume_of_its_part(tmp_path: Path) -> N
     part = import_part(raw, "a", tmp_path, "a.stl")
     assert part.free_mm["hole1"] == pytest.approx(4.0, abs=0.01)
     assert 1e9 * part.solid.volume == pytest.approx(24000.0 - disc(4, 12), rel=1e-5)
+
+
+def test_what_an_import_did_is_said_in_lines(tmp_path: Path) -> None:
+    path = write_stl(block(40.125, 30, 10) - rod(4, 10, n=32), tmp_path / "lid.stl")
+    file, (raw,) = raw_solids(path, None)
+    assert unit_line(file) == "unit mm, taken from the size; the file states none"
+    assert raw_solids(path, "mm")[0][:2] == ("mm", "as asked")
+    lines = list(import_lines(import_part(raw, "lid", tmp_path, "lid.stl")))
+    assert lines[0].startswith("lid: 40.125 x 30 x 10 mm, ")
+    assert "    px: flat, looks along (1, 0, 0), 20.0625 mm from the origin" in lines
+    assert any(
+        line.startswith("    hole1: hole, cylinder, radius 4 mm, axis from (0, 0, 0) to (0, 0, 10) mm")
+        for line in lines
+    )
+
+
+def test_a_part_that_is_too_light_is_refused(tmp_path: Path) -> None:
+    _, (raw,) = raw_solids(write_stl(block(2, 2, 2), tmp_path / "a.stl"), "mm")
+    with pytest.raises(InputError, match="the part weighs 8e-06 g at 1 kg/m"):
+        import_part(raw, "a", tmp_path, "a.stl", 1.0)

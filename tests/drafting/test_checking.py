@@ -32,6 +32,18 @@ def test_all_is_well_and_the_robot_that_knows_the_truth_succeeds(folder: Path) -
     assert str(findings[-1]) == "ok     oracle   1 of 1 trials in which the robot knows the truth are right"
 
 
+def test_a_trial_that_fails_is_said_with_the_line_to_change(folder: Path) -> None:
+    text = (folder / "own.toml").read_text(encoding="utf-8").replace("center_mm = [100, 0]", "center_mm = [500, 0]")
+    path = folder / "far.toml"
+    path.write_text(text, encoding="utf-8")
+    failed, summary = (finding for finding in check_file(path, seeds=1, fidelity="contact") if finding.what == "oracle")
+    assert failed.sentence.startswith(
+        "site: move it nearer to the arm, which stands at (-420, 0) mm: the robot with seed 0:"
+    )
+    assert failed.line == 1 + next(i for i, line in enumerate(text.splitlines()) if line.startswith("[site]"))
+    assert (summary.ok, summary.sentence) == (False, "0 of 1 trials in which the robot knows the truth are right")
+
+
 def test_a_screw_is_known_by_its_name(folder: Path) -> None:
     path = folder / "renamed.toml"
     path.write_text((folder / "own.toml").read_text(encoding="utf-8").replace("pin_1", "screw_m4"), encoding="utf-8")

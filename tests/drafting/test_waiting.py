@@ -10,10 +10,11 @@ import pytest
 
 from apo_bench.drafting.draft import draft
 from apo_bench.drafting.posed import on_the_table, read_posed
-from apo_bench.drafting.waiting import laid_out, site_of, stance
+from apo_bench.drafting.waiting import Stance, laid_out, site_of, stance
 from apo_bench.drafting.writing import scenario_text
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
+from apo_bench.geometry.hull import Cylinder, cylinder_hull
 from apo_bench.geometry.solid import Box, Solid
 from apo_bench.parts.making import extrude, rectangle, shaft
 from tests.drafting.test_draft import at, made
@@ -66,6 +67,15 @@ def test_what_is_heavy_beside_its_foot_does_not_stand() -> None:
     assert not stance(brick(0.02, 0.02, 0.05, (0.021, 0.0, 0.0)), np.eye(3)).stands
     assert not stance(brick(0.02, 0.02, 0.05, (0.017, 0.0, 0.05)), np.eye(3)).stands, "within 4 % of its height"
     assert stance(brick(0.02, 0.02, 0.05, (0.0155, 0.0, 0.05)), np.eye(3)).stands
+
+
+def test_a_cylinder_that_lies_stands_only_where_its_middle_is_over_its_line() -> None:
+    def lying(x: float) -> Stance:
+        hull = cylinder_hull("p1", Cylinder(np.zeros(3), np.array([1.0, 0.0, 0.0]), 0.01, 0.03))
+        return stance(Solid("rod", {}, (hull,), np.array([x, 0.0, 0.0]), 1e-5), np.eye(3))
+
+    assert lying(0.02) == (pytest.approx(0.01), True, True)
+    assert lying(0.04) == (pytest.approx(0.01), False, False)
 
 
 def test_a_part_that_rolls_or_is_too_wide_is_said_and_written(tmp_path: Path) -> None:

@@ -32,7 +32,7 @@ def wall_strips(mesh: Mesh, triangles: Any, surface: Round) -> Any:
         mine = np.flatnonzero(left & (np.abs(height - end) < near))
         left[mine] = False
         ends.append(mine[np.argsort(angle[mine])])
-    if left.any() or tip.sum() > 1:
+    if left.any():
         return None
     low, high = ends
     if tip.any() and (len(low) == 1) == (len(high) == 1):
