@@ -1,7 +1,5 @@
 """What a corrector may be given: observations whose poses and numbers make sense, whoever made them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from math import inf
 from typing import Any

@@ -5,8 +5,6 @@ with as many degrees of freedom as the contacts fix. A redundant contact that is
 is not redundant only asks for a correction that is too long.
 """
 
-from __future__ import annotations
-
 from math import isfinite, sqrt
 
 import numpy as np

@@ -3,8 +3,6 @@
 Every motion parameter is free; what the contacts do not ask for is not changed, since any change costs likelihood.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, final

@@ -1,7 +1,5 @@
 """Correct an observation by any corrector: by name, as `module:name`, or the object itself."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial

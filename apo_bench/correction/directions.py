@@ -5,8 +5,6 @@ the axes of the part where it can. A turn is about the point of its axis that is
 once shifts that are free anyway are taken out. What is left of a shift along the axis makes it a screw.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final

@@ -8,8 +8,6 @@ How uncertain a direction still is comes from the posterior of all goals at once
 as it was seen, or less where several parts that must move together were seen.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from typing import final

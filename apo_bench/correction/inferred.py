@@ -6,8 +6,6 @@ a contact of an operation says this of its goal alone. The operation of which mo
 known to the others.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from itertools import product as pairs
 from typing import Literal, NamedTuple

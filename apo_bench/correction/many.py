@@ -1,7 +1,5 @@
 """Correct many observations of one assembly at once: what they share is worked out once, the rest is one array."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

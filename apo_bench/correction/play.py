@@ -6,8 +6,6 @@ inside another one also shifts within their play until it is let go of, so its l
 its carrier before, and by where it lies then: play adds up along what is carried.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from math import sqrt
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """Is the truth in the region that a correction states? For benchmarks and tests, which know the truth."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

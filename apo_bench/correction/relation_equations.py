@@ -5,8 +5,6 @@ as by all of them; then the farthest and latest that are not needed are left out
 irreducible: without any one of them the part would be freer.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final

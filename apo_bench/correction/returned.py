@@ -1,7 +1,5 @@
 """What a corrector of somebody else's returned: whether it can be executed and written into a row."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """What a correction tells of the errors that operations share: the camera is off by so much, and how sure that is."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import final
 

@@ -1,7 +1,5 @@
 """The nearest goals by some of the contacts, and the test of the correction that leads there."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import cos, radians
 from typing import NamedTuple

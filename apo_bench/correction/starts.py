@@ -6,8 +6,6 @@ from symmetry: a part that looks the same when it is turned may have been seen t
 to the one nearest to what was seen is taken, in the metric of the noise.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator
 
 import numpy as np

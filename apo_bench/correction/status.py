@@ -1,7 +1,5 @@
 """How a correction ends: a status with its sentence."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

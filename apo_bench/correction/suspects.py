@@ -4,8 +4,6 @@ Everything fits once a relation that is wrong is left out, so the relations are 
 them. More than one may do: they form the ambiguity set, and nothing that was seen tells them apart.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from math import sqrt
 

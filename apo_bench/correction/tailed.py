@@ -6,8 +6,6 @@ were seen are compared with numbers that were drawn (Monte Carlo p-value; Daviso
 their Application", 1997, Section 4.2).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.assembly.goals import Observation

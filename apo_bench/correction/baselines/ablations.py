@@ -1,7 +1,5 @@
 """The corrector of the paper with one thing taken away, to see what it is worth."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from itertools import combinations, islice
 

@@ -5,8 +5,6 @@ parameters in the ODLs that its two parts had when it was made; so it does after
 has no ODL, nor has a part that was never moved: nothing is connected through them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ the Jacobian of contacts serves here too. Of the six directions along which two 
 sides, the shortest way out counts; cross products of edges are left aside, and so are pieces that are no boxes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import final
 

@@ -7,8 +7,6 @@ gradient are below 1e-12, or after `EVALUATIONS`. As contacts are soft they hold
 CONTACT_M^2 / (standard deviation of the noise) only. Made for some tens of operations: matrices are dense.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.assembly.correction_record import Correction

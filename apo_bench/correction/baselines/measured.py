@@ -1,7 +1,5 @@
 """Goals that come without a word, measured: how wide they leave the contacts, and what is said of that."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The corrector without memory (Section 3.1): the parts where they stand at the end, one pose each, no ODL."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

@@ -4,8 +4,6 @@ A goal that is no candidate is executed all the same, and a little wrong it does
 wedged in the fingers that let go of it.
 """
 
-from __future__ import annotations
-
 from apo_bench.assembly.equations import Equations
 from apo_bench.correction.solvers.newton import solve_newton
 from apo_bench.geometry.arrays import Array

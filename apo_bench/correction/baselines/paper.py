@@ -1,7 +1,5 @@
 """The corrector of the paper, all at once: the whole graph after the whole demonstration (Section 3.3)."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -11,8 +11,6 @@ the contact was made, and z_k = L_k^-1 xi_k. Adam (Kingma and Ba, arXiv 1412.698
 length falls from `LENGTH` to nothing along a quarter of a cosine. It ends there, at rest or not.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import final
 

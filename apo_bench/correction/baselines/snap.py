@@ -5,8 +5,6 @@ as they are. Where earlier errors leave no place at which all of them hold, thei
 sense of least squares.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.assembly.correction_record import Correction

@@ -5,8 +5,6 @@ do not hold, the k most recent candidates are freed, k = 1, 2, .., until they do
 back to the oldest of them and builds it again. The result is a schedule of do and undo steps.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import final

@@ -6,8 +6,6 @@ known without the truth: Gaussian with covariance B S B^t if xi has the covarian
 tells nothing of S; without it, and without the contacts in which it has a part, fewer directions are fixed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from typing import final

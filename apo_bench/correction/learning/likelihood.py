@@ -11,8 +11,6 @@ where d directions that would be fixed are not, of an error that may be anything
 MacKay, "Bayesian interpolation", 1992). A constant error of the camera has m = B_g A c.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, final

@@ -5,8 +5,6 @@
 The JSON says type and shape of every array under `arrays`.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import socket

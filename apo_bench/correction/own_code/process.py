@@ -1,7 +1,5 @@
 """The process of a module of one's own, as the one who asks sees it."""
 
-from __future__ import annotations
-
 import os
 import signal
 import socket

@@ -5,8 +5,6 @@ of a socket of its own; this process never reads it, so that no fork finds what 
 standard error here, and whatever a fork leaves behind is ended.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import resource

@@ -3,8 +3,6 @@
 It can ask to look again: at what it left out or did not see, and at what it is least sure of.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import final

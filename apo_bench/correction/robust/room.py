@@ -5,8 +5,6 @@ that was inferred: the one where faces of contacts cover each other, then where 
 of these the one where faces cover most.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ Views of one operation that are believed are merged into one Gaussian. That they
 since gross views lie anywhere.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import combinations
 from typing import NamedTuple

@@ -5,8 +5,6 @@ part that was seen upside down, of which every turn is about as far, its steps s
 derivative of the Lagrangian |z|^2 / 2 + l f(z) along the free directions says where they lead.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from apo_bench.correction.solvers.compact import CompactEquations

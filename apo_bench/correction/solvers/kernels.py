@@ -7,8 +7,6 @@ written for a short compilation, too: few statements, each with few indices, and
 observations of one assembly with c contacts, n operations and p parts.
 """
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Callable

@@ -4,8 +4,6 @@ The loop of `gauss_newton` knows no matrices. It asks a step to linearise the co
 shortest z that satisfies what was linearised.
 """
 
-from __future__ import annotations
-
 from typing import Any, Protocol, final
 
 import numpy as np

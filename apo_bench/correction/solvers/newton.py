@@ -11,8 +11,6 @@ Two numbers that the paper does not give decide whether redundant directions sta
   centimetres along directions of which the contacts say nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
 from typing import final

@@ -6,8 +6,6 @@ within the tangent space of the contact manifold only, and there as much as the 
 basis N of the null space, cov(z) = N N^t.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, final
 

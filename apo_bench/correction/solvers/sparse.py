@@ -6,8 +6,6 @@ Cholesky decomposition solves for the multipliers. Otherwise (grids, one part th
 for together with z, in the sparse matrix [I J^t; J -mu].
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, final

@@ -4,8 +4,6 @@ Where errors of operations are independent, L has a block for each, (n, 6, 6), a
 its own. Where they share errors, L is the factor of their joint covariance, (n, 6, 6 n): the six rows of each.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import final
 
