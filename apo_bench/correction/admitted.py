@@ -25,10 +25,12 @@ def check_observations(observations: Sequence[Any]) -> None:
         InputError: One is no `Observation`, a pose is not rigid or absurdly far away, a part has no start, a covariance
             is not symmetric, or a length makes no sense.
     """
-    for i, one in enumerate(observations):
-        if not isinstance(one, Observation):
-            raise InputError(f"an Observation is needed, {kind(one)} was given; make one, or read it from a file.")
-        _check_lengths(one, _name(observations, i))
+    for i, observation in enumerate(observations):
+        if not isinstance(observation, Observation):
+            raise InputError(
+                f"an Observation is needed, {kind(observation)} was given; make one, or read it from a file."
+            )
+        _check_lengths(observation, _name(observations, i))
     if not observations:
         return
     first = observations[0]
@@ -45,8 +47,8 @@ def check_observations(observations: Sequence[Any]) -> None:
             return f"the start of '{parts[j]}' in {_name(observations, 0)}"
         return f"the goal of {_operation(observations, j - len(parts))}"
 
-    _check_poses(np.concatenate([starts, *(one.goals for one in observations)]), name)
-    C = np.concatenate([one.covariance for one in observations])
+    _check_poses(np.concatenate([starts, *(observation.goals for observation in observations)]), name)
+    C = np.concatenate([observation.covariance for observation in observations])
     off = C - np.swapaxes(C, 1, 2)
     if not off.any():
         return
@@ -57,10 +59,14 @@ def check_observations(observations: Sequence[Any]) -> None:
         )
 
 
-def _check_lengths(one: Observation, name: str) -> None:
-    if type(one.gap_m) is type(one.play_m) is float and 0.0 < one.gap_m < inf and 0.0 <= one.play_m < inf:
+def _check_lengths(observation: Observation, name: str) -> None:
+    if (
+        type(observation.gap_m) is type(observation.play_m) is float
+        and 0.0 < observation.gap_m < inf
+        and 0.0 <= observation.play_m < inf
+    ):
         return
-    for field, x, low in (("gap_m", one.gap_m, "above"), ("play_m", one.play_m, "from")):
+    for field, x, low in (("gap_m", observation.gap_m, "above"), ("play_m", observation.play_m, "from")):
         number = isinstance(x, float | int | np.floating | np.integer) and not isinstance(x, bool)
         if not number or not np.isfinite(x) or x < 0.0 or (low == "above" and x == 0.0):
             raise InputError(f"{name} states {field}={x!r}; a finite length {low} 0 is needed, in metres.")
@@ -85,7 +91,7 @@ def _check_poses(T: Array, name: Callable[[int], str]) -> None:
 
 def _operation(observations: Sequence[Observation], j: int) -> str:
     """Row j of all operations of all observations: `operation 2 in observation 3`."""
-    i, k = [(i, k) for i, one in enumerate(observations) for k in range(len(one.goals))][j]
+    i, k = [(i, k) for i, observation in enumerate(observations) for k in range(len(observation.goals))][j]
     return f"operation {k + 1} in {_name(observations, i)}"
 
 

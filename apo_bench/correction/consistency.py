@@ -20,7 +20,7 @@ TEST_LEVEL = 0.01
 """False alarms that are accepted."""
 ROUNDING = 1e-13
 """Part of the largest diagonal entry that is added to all: redundant contacts without play have no other."""
-SOFT_M = 0.05e-3
+CONTRADICTION_M = 0.05e-3
 """Standard deviation that contradictory contacts are given, [m], so that their contradiction can be measured."""
 
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly.correction_record import Consistency, Correction, Iterate, Suspect
 from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.lowering import lowered_observation, lowered_together
+from apo_bench.assembly.lowering import lowered_together
 from apo_bench.correction.consistency import TEST_LEVEL
 from apo_bench.correction.problem import Problem, problem_of
 from apo_bench.correction.solved import Solved, solve
@@ -70,9 +70,12 @@ class ContactCorrector:
             InputError: As of one.
         """
         observations = lowered_together(observations)
-        made = [None if one.seen.all() else refused_correction(one) for one in observations]
+        made = [None if observation.seen.all() else refused_correction(observation) for observation in observations]
         whole = [i for i, correction in enumerate(made) if correction is None]
-        alone = any(6 * len(one.goals) > LARGEST_DENSE or one.shared or one.tails for one in observations)
+        alone = any(
+            6 * len(observation.goals) > LARGEST_DENSE or observation.shared or observation.tails
+            for observation in observations
+        )
         for batch in ([i] for i in whole) if alone else [whole] if whole else []:
             for i, correction in zip(batch, self._corrected([observations[i] for i in batch]), strict=True):
                 made[i] = correction
@@ -80,7 +83,7 @@ class ContactCorrector:
 
     def leaving_out(self, observation: Observation, dropped: tuple[str, ...]) -> Correction:
         """Correct an observation by all contacts but those of some relations."""
-        problem = problem_of((lowered_observation(observation),), self.level, self.compiled)
+        problem = problem_of((observation,), self.level, self.compiled)
         solved = solve(problem, problem.without(dropped))[0]
         (before_m,) = problem.seen_gap_m()
         return opposing(problem.observation, self._report(problem, 0, solved, before_m, dropped))
@@ -88,14 +91,14 @@ class ContactCorrector:
     def _corrected(self, observations: Sequence[Observation]) -> list[Correction]:
         """Correct a batch, lowered, every operation seen: all at once, then by itself what is in doubt."""
         problem = problem_of(observations, self.level, self.compiled)
-        made = []
+        corrections = []
         for i, (before_m, solved) in enumerate(zip(problem.seen_gap_m(), solve(problem, problem.every), strict=True)):
             sure = (solved.test.passes or self.doubt == "apply") and not solved.far and not solved.away
             if sure and _status(solved, observations[i].gap_m) == "converged":
-                made.append(self._report(problem, i, solved, before_m))
+                corrections.append(self._report(problem, i, solved, before_m))
             else:
-                made.append(self._in_doubt(problem.only(i), solved, before_m))
-        return made
+                corrections.append(self._in_doubt(problem.only(i), solved, before_m))
+        return corrections
 
     def _in_doubt(self, problem: Problem, first: Solved, before_m: float) -> Correction:
         """Correct an observation whose first solution is none, or far, or fails the test: other starts, suspects."""
@@ -177,10 +180,10 @@ def _status(solved: Solved, gap_m: float) -> str:
     return "inconsistent"
 
 
-def _doubts(tested: Consistency, dropped: tuple[str, ...]) -> str:
+def _doubts(test: Consistency, dropped: tuple[str, ...]) -> str:
     """What the test says, if it has something to say."""
-    if tested.passes:
+    if test.passes:
         return ""
-    named = ", ".join(suspect.relation for suspect in tested.ambiguous) or "none alone"
-    said = f"; the correction is longer than the stated noise explains (p = {tested.p_value:.2g}), suspected: {named}"
-    return f"{said}; left out: {', '.join(dropped)}" if dropped else said
+    named = ", ".join(suspect.relation for suspect in test.ambiguous) or "none alone"
+    words = f"; the correction is longer than the stated noise explains (p = {test.p_value:.2g}), suspected: {named}"
+    return f"{words}; left out: {', '.join(dropped)}" if dropped else words

@@ -9,6 +9,7 @@ import numpy as np
 
 from apo_bench.assembly.correction_record import Correction, Look, LookingCorrector
 from apo_bench.assembly.goals import Observation
+from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.baselines.measured import gap_of, goals_as_given
 from apo_bench.correction.contact import ContactCorrector
@@ -51,27 +52,34 @@ def correct(observation: Observation, corrector: Any = CORRECTOR, look: Look | N
         )
     chosen = checked_corrector(corrector)
     name = corrector if isinstance(corrector, str) else getattr(chosen, "__name__", type(chosen).__name__)
+    ours = _ours(chosen)
+    # The equations know planes alone: for what comes with the package round faces are lowered to planes here, once.
+    flat = lowered_observation(observation)
+    given = flat if ours else observation
     try:
-        asks = look is not None and isinstance(chosen, LookingCorrector)
-        found = chosen.looking(observation, look) if asks else chosen(observation)
-        return _admitted(found, observation, chosen, name)
+        looks = look is not None and isinstance(chosen, LookingCorrector)
+        returned = chosen.looking(given, look) if looks else chosen(given)
+        correction = _admitted(returned, flat, chosen, name)
+        if flat is observation or correction.believed is None:
+            return correction
+        return replace(correction, believed=replace(correction.believed, assembly=observation.assembly))
     except InputError as error:
-        if _ours(chosen) or isinstance(error, CorrectorMisbehaved):
+        if ours or isinstance(error, CorrectorMisbehaved):
             raise
         raise CorrectorMisbehaved(str(error)) from error
     except Exception as error:
         raise CorrectorMisbehaved(str(failed(f"the corrector '{name}'", error))) from error
 
 
-def checked_corrector(given: Any) -> Any:
+def checked_corrector(corrector: Any) -> Any:
     """The corrector that is named, or was given.
 
     Raises:
         InputError: There is no such corrector, or it is no function.
     """
-    chosen = resolve(given, CORRECTORS, "corrector")
+    chosen = resolve(corrector, CORRECTORS, "corrector")
     if not callable(chosen) or isinstance(chosen, type):
-        name = given if isinstance(given, str) else getattr(chosen, "__name__", type(chosen).__name__)
+        name = corrector if isinstance(corrector, str) else getattr(chosen, "__name__", type(chosen).__name__)
         raise InputError(
             f"the corrector '{name}' is {kind(chosen)}; give a function that takes an Observation "
             "and returns a Correction, or an object with such a __call__."
@@ -79,25 +87,25 @@ def checked_corrector(given: Any) -> Any:
     return chosen
 
 
-def _admitted(found: Any, observation: Observation, chosen: Any, name: str) -> Correction:
+def _admitted(returned: Any, observation: Observation, chosen: Any, name: str) -> Correction:
     """What a corrector returned, as a `Correction` that makes sense."""
-    if isinstance(found, Correction) and _ours(chosen):
-        return found if isinstance(chosen, ContactCorrector) else opposing(observation, found)
-    if not isinstance(found, Correction):
+    if isinstance(returned, Correction) and _ours(chosen):
+        return returned if isinstance(chosen, ContactCorrector) else opposing(observation, returned)
+    if not isinstance(returned, Correction):
         return goals_as_given(
-            observation, _bare(found, len(observation.goals), name), "the corrector returned goals and no status"
+            observation, _bare(returned, len(observation.goals), name), "the corrector returned goals and no status"
         )
-    if found.status not in _STATUSES:
+    if returned.status not in _STATUSES:
         raise InputError(
-            f"the corrector '{name}' returned the status {found.status!r}; return one of {', '.join(_STATUSES)}."
+            f"the corrector '{name}' returned the status {returned.status!r}; return one of {', '.join(_STATUSES)}."
         )
-    goals = _bare(found.goals, len(observation.goals), name)
-    found = check_correction(found, observation.assembly, name)
-    if found.ok and not _ours(chosen):
+    goals = _bare(returned.goals, len(observation.goals), name)
+    returned = check_correction(returned, observation.assembly, name)
+    if returned.ok and not _ours(chosen):
         before = gap_of(observation, observation.goals)
         after = gap_of(observation, goals)
-        found = replace(found, gap_before_m=before, gap_after_m=after)
-    return found
+        returned = replace(returned, gap_before_m=before, gap_after_m=after)
+    return returned
 
 
 def _ours(corrector: Any) -> bool:
@@ -108,17 +116,19 @@ def _ours(corrector: Any) -> bool:
     return str(module).startswith("apo_bench.")
 
 
-def _bare(found: Any, n: int, name: str) -> Array:
+def _bare(returned: Any, n: int, name: str) -> Array:
     """Goals as an array (n, 4, 4), numbers that are not finite let through."""
     try:
-        goals = real(found)
+        goals = real(returned)
     except NotReal as error:
         raise InputError(f"the corrector '{name}' returned complex numbers as goals; return real ones.") from error
     except (TypeError, ValueError):
         goals = np.zeros(0)
     if goals.shape != (n, 4, 4):
-        given = f"an array of shape {found.shape}" if isinstance(found, np.ndarray) else kind(found)
-        raise InputError(f"the corrector '{name}' returned {given}; return a Correction or goals of shape ({n}, 4, 4).")
+        description = f"an array of shape {returned.shape}" if isinstance(returned, np.ndarray) else kind(returned)
+        raise InputError(
+            f"the corrector '{name}' returned {description}; return a Correction or goals of shape ({n}, 4, 4)."
+        )
     for k in np.flatnonzero(np.isfinite(goals).all(axis=(1, 2)) & ~is_rigid(goals)):
         raise InputError(
             f"the corrector '{name}' returned a goal for operation {k + 1} that is not a rigid pose; {RIGID}."

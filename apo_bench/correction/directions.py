@@ -74,12 +74,12 @@ def directions(space: Array) -> tuple[Direction, ...]:
     turning = int(np.count_nonzero(w > _ZERO))
     shifts = _aligned(_span(F[:3] @ Vt[turning:].T))
     turns = F @ Vt[:turning].T
-    found = [Direction(np.concatenate([axis, np.zeros(3)])) for axis in shifts]
+    axes = [Direction(np.concatenate([axis, np.zeros(3)])) for axis in shifts]
     for axis in _aligned(_span(turns[3:])):
-        one = turns @ np.linalg.lstsq(turns[3:], axis, rcond=None)[0] * _LENGTH_M
-        v = one[:3] - sum((b @ one[:3]) * b for b in shifts)
-        found.append(Direction(np.concatenate([np.where(np.abs(v) < _ZERO * _LENGTH_M, 0.0, v), axis])))
-    return tuple(found)
+        turn = turns @ np.linalg.lstsq(turns[3:], axis, rcond=None)[0] * _LENGTH_M
+        v = turn[:3] - sum((b @ turn[:3]) * b for b in shifts)
+        axes.append(Direction(np.concatenate([np.where(np.abs(v) < _ZERO * _LENGTH_M, 0.0, v), axis])))
+    return tuple(axes)
 
 
 def held(free: Sequence[Direction]) -> tuple[str, ...]:
@@ -97,11 +97,11 @@ def _span(columns: Array) -> Array:
 def _aligned(basis: Array) -> list[Array]:
     """An orthonormal basis, (3,) each, of a space of vectors (3, d), the nearest axis first each time."""
     P = basis @ basis.T
-    found = list[Array]()
+    vectors = list[Array]()
     for _ in range(basis.shape[1]):
         i = int(np.argmax(np.diag(P).round(6)))
         b = P[:, i] / np.linalg.norm(P[:, i])
         P = P - np.outer(b, b)
         b = np.where(np.abs(b) < _ZERO, 0.0, b)
-        found.append(b / np.linalg.norm(b))
-    return found
+        vectors.append(b / np.linalg.norm(b))
+    return vectors

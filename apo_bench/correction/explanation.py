@@ -25,7 +25,7 @@ from apo_bench.correction.relation_equations import RelationHold, by_relation, r
 from apo_bench.correction.shared_estimate import SharedEstimate, estimate_shared
 from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR, Freedom, freedom
-from apo_bench.correction.solvers.whitened import spread
+from apo_bench.correction.solvers.whitened import twists_of
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -139,17 +139,17 @@ def explain(observation: Observation, goals: Array, dropped: Collection[str] = (
     known = freedom(relations.Jt)
     if known is None:
         raise _too_many(n)
-    spans = spread(B, known.free)
+    spans = twists_of(B, known.free)
     shared = tuple[SharedEstimate, ...]()
     if observation.shared:
         shared, spans = estimate_shared(observation, xi, Jr, system.among(kept))
-    found = []
+    explained = []
     for k, own in enumerate(_own(known, n)):
         block = slice(6 * k, 6 * k + 6)
         C = spans[k] @ spans[k].T
         named = directions(B[k] @ own[block])
         needed = relations.holding(k, 6 - own.shape[1])
-        found.append(
+        explained.append(
             OperationExplanation(
                 operation=k,
                 part=assembly.operations[k].main,
@@ -164,7 +164,7 @@ def explain(observation: Observation, goals: Array, dropped: Collection[str] = (
     return Explanation(
         assembly=given,
         goals=goals,
-        operations=tuple(found),
+        operations=tuple(explained),
         parts=_standing(assembly, observation.start, goals, B, spans),
         rank=known.rank,
         freedom=known.free.shape[1],
@@ -223,7 +223,7 @@ def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, spans: A
     last = assembly.odls()[-1]
     words = _rooted(assembly)
     stack = np.concatenate([np.array([start[part] for part in assembly.solids]), goals])
-    found = []
+    explained = []
     for part in last:
         reach = _reach(words[part], stack, len(assembly.solids), len(goals))
         moved = reach.reshape(6, -1) @ spans.reshape(reach[0].size, -1)
@@ -233,8 +233,8 @@ def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, spans: A
         named = directions(unit * U[:, w > _ZERO])
         loose = tuple(FreeDirection(d, _deviation(C, d)) for d in named)
         placing = max(k for k, operation in enumerate(assembly.operations) if part in operation.moves)
-        found.append(PartExplanation(part, placing, last[part], final[part], 6 - len(loose), held(named), loose, C))
-    return tuple(sorted(found, key=lambda one: one.placed))
+        explained.append(PartExplanation(part, placing, last[part], final[part], 6 - len(loose), held(named), loose, C))
+    return tuple(sorted(explained, key=lambda one: one.placed))
 
 
 def _rooted(assembly: Assembly) -> dict[str, ODL]:
@@ -249,10 +249,10 @@ def _reach(word: ODL, stack: Array, constants: int, n: int) -> Array:
     T exp(xi) M = T M exp(Ad(M^-1) xi), and (T exp(xi))^-1 M = T^-1 M exp(-Ad(M^-1 T) xi).
     """
     behind = np.eye(4)
-    found = np.zeros((n, 6, 6))
+    reach = np.zeros((n, 6, 6))
     for k, inverse in reversed(word):
         behind = pose.inverse(stack[k]) @ behind if inverse else behind
         if k >= constants:
-            found[k - constants] += (-1.0 if inverse else 1.0) * pose.adjoint(pose.inverse(behind))
+            reach[k - constants] += (-1.0 if inverse else 1.0) * pose.adjoint(pose.inverse(behind))
         behind = behind if inverse else stack[k] @ behind
-    return np.swapaxes(found, 0, 1)
+    return np.swapaxes(reach, 0, 1)

@@ -47,7 +47,7 @@ class Ends(NamedTuple):
     """Whether the middles are the same point."""
 
 
-class _Said(NamedTuple):
+class _Condition(NamedTuple):
     """What one contact says of the pose T of an operation: R own = way, and u . (R at + t - there) = 0 for some u."""
 
     own: Array
@@ -92,10 +92,10 @@ def inferred_goals(observation: Observation, unknown: Collection[int]) -> Inferr
         if not np.isfinite(goals[k]).all():
             goals[k] = np.eye(4)
     while left:
-        told = {k: _said(observation.assembly, start, goals, k, left) for k in sorted(left)}
-        k = max(told, key=lambda k: (_rank(told[k]), len(told[k]), -k))
-        if told[k]:
-            goals[k] = _placed(told[k], goals[k])
+        conditions = {k: _conditions(observation.assembly, start, goals, k, left) for k in sorted(left)}
+        k = max(conditions, key=lambda k: (_rank(conditions[k]), len(conditions[k]), -k))
+        if conditions[k]:
+            goals[k] = _placed(conditions[k], goals[k])
         else:
             baseless.append(k)
         left.discard(k)
@@ -109,16 +109,16 @@ def contact_ends(assembly: Assembly) -> tuple[Ends | None, ...]:
     Args:
         assembly: As `lowered` makes it.
     """
-    found = list[Ends | None]()
-    told = set[tuple[int, Contact]]()
+    ends_of_each = list[Ends | None]()
+    seen_contacts = set[tuple[int, Contact]]()
     for contact, made, _ in assembly.relations():
-        given = assembly.given(contact)
-        ends = _flat_ends(assembly, contact) if given is contact else _round_ends(assembly, contact, given)
-        new = ends is not None and (given is contact or (made, given) not in told)
-        found.append(ends if new else None)
+        stated = assembly.given(contact)
+        ends = _flat_ends(assembly, contact) if stated is contact else _round_ends(assembly, contact, stated)
+        new = ends is not None and (stated is contact or (made, stated) not in seen_contacts)
+        ends_of_each.append(ends if new else None)
         if new:
-            told.add((made, given))
-    return tuple(found)
+            seen_contacts.add((made, stated))
+    return tuple(ends_of_each)
 
 
 def _flat_ends(assembly: Assembly, contact: Contact) -> Ends:
@@ -127,11 +127,11 @@ def _flat_ends(assembly: Assembly, contact: Contact) -> Ends:
     return Ends((a.normal, b.normal), (a.outline.mean(axis=0), b.outline.mean(axis=0)), reach)
 
 
-def _round_ends(assembly: Assembly, contact: Contact, given: Contact) -> Ends | None:
+def _round_ends(assembly: Assembly, contact: Contact, stated: Contact) -> Ends | None:
     """What a contact of sheets tells of that of round faces; of cones the one that says where they sit tells all."""
-    kind = contact_kind(*map(assembly.face_of, given))
+    kind = contact_kind(*map(assembly.face_of, stated))
     ends = _flat_ends(assembly, contact)
-    own = {of.part: of.face for of in given}
+    own = {of.part: of.face for of in stated}
     a, b = (assembly.solids[of.part].rounds.get(own[of.part]) for of in contact)
     assert b is not None
     if a is None:
@@ -142,11 +142,11 @@ def _round_ends(assembly: Assembly, contact: Contact, given: Contact) -> Ends | 
     return ends._replace(reach_m=max(a.radius, b.radius), seated=True) if seats else None
 
 
-def _said(assembly: Assembly, start: Array, goals: Array, k: int, left: Collection[int]) -> list[_Said]:
+def _conditions(assembly: Assembly, start: Array, goals: Array, k: int, left: Collection[int]) -> list[_Condition]:
     """What contacts say of operation k that depend on no other operation of those left."""
     p = len(start)
     poses = np.concatenate([start, goals])
-    found = list[_Said]()
+    conditions = list[_Condition]()
     others = {p + other for other in left if other != k}
     for word, ends in zip(pattern(assembly).words, contact_ends(assembly), strict=True):
         letters = [letter for letter, _ in word]
@@ -161,13 +161,13 @@ def _said(assembly: Assembly, start: Array, goals: Array, k: int, left: Collecti
         (own, at), (other, there) = (a, b) if inverted else (b, a)
         beside = behind[:3, :3] if inverted else before[:3, :3]
         way = -other if ends.lie == "opposite" else other
-        found.append(_Said(own, at, way, there, beside, ends, inverted))
-    return found
+        conditions.append(_Condition(own, at, way, there, beside, ends, inverted))
+    return conditions
 
 
-def _rank(told: Sequence[_Said]) -> int:
+def _rank(conditions: Sequence[_Condition]) -> int:
     """In how many directions normals look."""
-    return _directions(np.array([one.own for one in told])) if told else 0
+    return _directions(np.array([condition.own for condition in conditions])) if conditions else 0
 
 
 def _directions(own: Array) -> int:
@@ -175,17 +175,17 @@ def _directions(own: Array) -> int:
     return int((np.linalg.svd(own, compute_uv=False) > _APART).sum())
 
 
-def _placed(told: Sequence[_Said], seen: Array) -> Array:
+def _placed(conditions: Sequence[_Condition], seen: Array) -> Array:
     """The pose that agrees best with what is said; what is not said of its orientation is as it was seen."""
     T = np.eye(4)
-    T[:3, :3] = R = _turned(told, seen[:3, :3])
-    exact = [one.exact(R) for one in told]
+    T[:3, :3] = R = _turned(conditions, seen[:3, :3])
+    exact = [condition.exact(R) for condition in conditions]
     A = np.zeros((3, 3))
     b = np.zeros(3)
     fixed = _across(np.concatenate(exact))
-    for one, known in zip(told, exact, strict=True):
-        off = one.there - R @ one.at
-        across = 1.0 / one.ends.reach_m**2
+    for condition, known in zip(conditions, exact, strict=True):
+        off = condition.there - R @ condition.at
+        across = 1.0 / condition.ends.reach_m**2
         along = 1.0 / _PLANE_M**2
         ways = [fixed @ way for way in known]
         A += sum(along * np.outer(way, way) for way in ways) + across * np.eye(3)
@@ -204,38 +204,43 @@ def _across(ways: Array) -> Array:
     return np.asarray(known.T @ known)
 
 
-def _turned(told: Sequence[_Said], seen: Array) -> Array:
+def _turned(conditions: Sequence[_Condition], seen: Array) -> Array:
     """(3, 3): normals oppose, axes point the way that fits best; what is left of a shaft on a plane turns the least."""
-    sure = [one for one in told if one.ends.lie != "across"]
+    sure = [condition for condition in conditions if condition.ends.lie != "across"]
     R = _sensed(sure, seen) if sure else seen
-    if len(sure) == len(told) or _rank(sure) > 1:
+    if len(sure) == len(conditions) or _rank(sure) > 1:
         return R
-    own = np.array([one.own for one in told])
-    way = np.array([_beside(R @ one.own, one.way) if one.ends.lie == "across" else R @ one.own for one in told])
+    own = np.array([condition.own for condition in conditions])
+    way = np.array(
+        [
+            _beside(R @ condition.own, condition.way) if condition.ends.lie == "across" else R @ condition.own
+            for condition in conditions
+        ]
+    )
     return _nearest(way.T @ own + _PLANE_M * R)
 
 
 def _beside(direction: Array, way: Array) -> Array:
     """The nearest direction across another one, (3,)."""
-    found = direction - (direction @ way) * way
-    size = np.sqrt(found @ found)
-    return found / size if size > _APART else np.asarray(np.linalg.svd(way[None])[2][1])
+    across = direction - (direction @ way) * way
+    size = np.sqrt(across @ across)
+    return across / size if size > _APART else np.asarray(np.linalg.svd(way[None])[2][1])
 
 
-def _sensed(told: Sequence[_Said], seen: Array) -> Array:
+def _sensed(conditions: Sequence[_Condition], seen: Array) -> Array:
     """(3, 3): the best of all senses of axes; of several that fit as well the nearest to what was seen."""
-    own, way = (np.array([getattr(one, name) for one in told]) for name in ("own", "way"))
-    axes = [i for i, one in enumerate(told) if one.ends.lie == "along"]
+    own, way = (np.array([getattr(condition, name) for condition in conditions]) for name in ("own", "way"))
+    axes = [i for i, condition in enumerate(conditions) if condition.ends.lie == "along"]
     if not axes:
-        return _fitted(own, way, told[0].beside, seen)
+        return _fitted(own, way, conditions[0].beside, seen)
     tried = list[tuple[float, float, Array]]()
     likely = tuple(np.where(np.einsum("ki,ij,kj->k", way[axes], seen, own[axes]) < 0.0, -1.0, 1.0))
     for signs in pairs((1.0, -1.0), repeat=len(axes)) if len(axes) <= _MOST_AXES else (likely,):
         ways = np.array(way)
         ways[axes] *= np.array(signs)[:, None]
-        R = _fitted(own, ways, told[0].beside, seen)
+        R = _fitted(own, ways, conditions[0].beside, seen)
         tried.append((round(float((ways * (own @ R.T)).sum()), 3), float(np.trace(R.T @ seen)), R))
-    return max(tried, key=lambda one: one[:2])[2]
+    return max(tried, key=lambda condition: condition[:2])[2]
 
 
 def _fitted(own: Array, way: Array, beside: Array, seen: Array) -> Array:

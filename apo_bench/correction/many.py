@@ -38,16 +38,20 @@ def correct_many(observations: Sequence[Observation], corrector: ContactCorrecto
             "correct those together that share them."
         )
     batches = (observations[i : i + BATCH] for i in range(0, len(observations), BATCH))
-    return tuple(made for some in batches for made in corrector.together(some))
+    return tuple(correction for some in batches for correction in corrector.together(some))
 
 
 def _odd_one(observations: Sequence[Observation]) -> int | None:
     """The first that is not of the same assembly, start and play as the one at the head; None if all are."""
     first = observations[0]
-    for i, one in enumerate(observations):
-        if one.assembly is not first.assembly or one.play_m != first.play_m or one.start.keys() != first.start.keys():
+    for i, observation in enumerate(observations):
+        if (
+            observation.assembly is not first.assembly
+            or observation.play_m != first.play_m
+            or observation.start.keys() != first.start.keys()
+        ):
             return i
-    poses = [one.start[part] for one in observations for part in first.start]
+    poses = [observation.start[part] for observation in observations for part in first.start]
     starts = np.concatenate([np.zeros((0, 4)), *poses]).reshape(len(observations), -1)
     odd = np.flatnonzero((starts != starts[0]).any(axis=1))
     return int(odd[0]) if len(odd) else None

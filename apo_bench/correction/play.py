@@ -57,10 +57,13 @@ def fit_covariance(assembly: Assembly, play_m: float) -> Array | None:
     count, unit_m = plays(assembly, play_m)
     if not count.any() or len(shifts) > LARGEST_CORRELATED:
         return None
-    every = {shift: 3 * i for i, shift in enumerate(dict.fromkeys(shift for own in shifts for shift in own))}
+    every = {
+        shift: 3 * i
+        for i, shift in enumerate(dict.fromkeys(shift for shifts_of_contact in shifts for shift in shifts_of_contact))
+    }
     by = np.zeros((len(shifts), 3 * len(every)))
-    for row, own in zip(by, shifts, strict=True):
-        for shift, n in own.items():
+    for row, shifts_of_contact in zip(by, shifts, strict=True):
+        for shift, n in shifts_of_contact.items():
             row[every[shift] : every[shift] + 3] = n
     each = unit_m**2 / 3.0 * np.diff(pattern(assembly).begin)
     by *= np.sqrt(each)[:, None]
@@ -77,9 +80,9 @@ def _shifts(assembly: Assembly, play_m: float) -> tuple[tuple[dict[_Shift, Array
     moved within its carrier since. The second number is the unit of displacements, the largest play, [m].
     """
     relations = assembly.relations()
-    found = []
+    shifts = []
     unit_m = max((assembly.play(relation.contact, play_m) for relation in relations), default=0.0)
-    loose = {one.contact: _looseness(assembly, one.contact, play_m, unit_m) for one in relations}
+    loose = {relation.contact: _looseness(assembly, relation.contact, play_m, unit_m) for relation in relations}
     for contact, made, _ in relations:
         own = dict[_Shift, Array]()
         if loose[contact]:
@@ -90,8 +93,8 @@ def _shifts(assembly: Assembly, play_m: float) -> tuple[tuple[dict[_Shift, Array
             for shift, way in _carried(assembly, face.part, made, loose):
                 added = own.get(shift, np.zeros(3)) + way * (_fitting(assembly, shift, loose) @ n)
                 own[shift] = added
-        found.append(own)
-    return tuple(found), unit_m
+        shifts.append(own)
+    return tuple(shifts), unit_m
 
 
 def _ever_carries(assembly: Assembly, a: PartFace, b: PartFace) -> bool:
@@ -107,7 +110,7 @@ def _looseness(assembly: Assembly, contact: Contact, play_m: float, unit_m: floa
 
 def _carried(assembly: Assembly, part: str, after: int, loose: _Loose) -> list[tuple[_Shift, float]]:
     """The displacements within carriers by which a part is off after an operation: as it lay at first, and then."""
-    found = list[tuple[_Shift, float]]()
+    carried = list[tuple[_Shift, float]]()
     for k in range(after, -1, -1):
         operation = assembly.operations[k]
         if part == operation.main:
@@ -116,21 +119,21 @@ def _carried(assembly: Assembly, part: str, after: int, loose: _Loose) -> list[t
             made = max((m for m, *_ in _together(assembly, part, operation.main, k, loose)), default=None)
             if made is not None:
                 before = _Shift(part, operation.main, made, made)
-                found += [(before, -1.0), (before._replace(until=k), 1.0)]
-    return found
+                carried += [(before, -1.0), (before._replace(until=k), 1.0)]
+    return carried
 
 
 def _together(assembly: Assembly, part: str, other: str, before: int, loose: _Loose) -> list[tuple[int, Array, float]]:
     """The contacts that fit of a part with another one that stand before an operation: who made it, its normal, its
     play in units.
     """
-    found = []
+    contacts = []
     for contact, made, lost in assembly.relations():
         faces = {face.part: face for face in contact}
         stands = made < before and (lost is None or lost >= before)
         if stands and faces.keys() == {part, other} and loose[contact]:
-            found.append((made, assembly.face(faces[part]).normal, loose[contact]))
-    return found
+            contacts.append((made, assembly.face(faces[part]).normal, loose[contact]))
+    return contacts
 
 
 def _fitting(assembly: Assembly, shift: _Shift, loose: _Loose) -> Array:

@@ -151,8 +151,8 @@ def problem_of(
     """
     first = observations[0]
     assembly = first.assembly
-    shared = any(one.shared for one in observations)
-    goals = np.concatenate([one.goals for one in observations]).reshape(len(observations), -1, 4, 4)
+    shared = any(observation.shared for observation in observations)
+    goals = np.concatenate([observation.goals for observation in observations]).reshape(len(observations), -1, 4, 4)
     start = np.array([first.start[part] for part in assembly.solids]).reshape(-1, 4, 4)
     demands = _demands(assembly, first.play_m)
     by = kernels() if compiled else None
@@ -162,8 +162,12 @@ def problem_of(
     if not demands.every:
         systems = (equations(assembly, first.start, T) for T in there)
         inequalities = tuple(bounded(system, demands.exact, demands.low, demands.high) for system in systems)
-    L = np.array([noise_factor(one) for one in observations]) if shared else _factors(observations)
-    begin = None if at is None else np.array([correction_to(*one) for one in zip(goals, L, at, strict=True)])
+    L = np.array([noise_factor(observation) for observation in observations]) if shared else _factors(observations)
+    begin = (
+        None
+        if at is None
+        else np.array([correction_to(*observation) for observation in zip(goals, L, at, strict=True)])
+    )
     return Problem(tuple(observations), goals, L, laid, demands, inequalities, level, by, begin)
 
 
@@ -189,13 +193,13 @@ def _demands(assembly: Assembly, play_m: float) -> _Demands:
 def _factors(observations: Sequence[Observation]) -> Array:
     """L of observations whose operations err each by itself, (b, n, 6, 6)."""
     try:
-        covariances = np.concatenate([one.covariance for one in observations])
+        covariances = np.concatenate([observation.covariance for observation in observations])
         L = np.linalg.cholesky(covariances).reshape(len(observations), -1, 6, 6)
         if np.isfinite(L).all():
             return L
     except np.linalg.LinAlgError:
         pass
-    return np.array([scales(one.covariance) for one in observations])
+    return np.array([scales(observation.covariance) for observation in observations])
 
 
 def seen_system(observation: Observation) -> CompactEquations:

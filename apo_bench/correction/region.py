@@ -9,7 +9,7 @@ from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.correction.problem import seen_system
 from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.posterior import freedom
-from apo_bench.correction.solvers.whitened import noise_factor, unspread
+from apo_bench.correction.solvers.whitened import coordinates_of, noise_factor
 from apo_bench.correction.tailed import drawn_radius
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -38,7 +38,7 @@ def contains_truth(observation: Observation, correction: Correction, truth: Arra
         return None
     free = known.free
     true = pose.log(pose.inverse(observation.goals) @ truth)
-    off = free.T @ unspread(L, true - xi)
+    off = free.T @ coordinates_of(L, true - xi)
     tailed = observation.tails is not None
     most = drawn_radius(observation, L, free, level) if tailed else chdtri(free.shape[1], 1.0 - level)
     return bool(off @ off <= most)

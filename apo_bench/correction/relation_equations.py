@@ -39,13 +39,13 @@ def relation_holds(assembly: Assembly) -> tuple[RelationHold, ...]:
     """Every relation of an assembly."""
     relations = assembly.relations()
     history = assembly.odls()
-    found = []
+    holds = []
     for i, arc in enumerate(assembly.arcs(), start=1):
         contact, made, lost = relations[arc[0]]
         a, b = assembly.given(contact)
         word = simplified((*inverted(history[made].get(a.part, ())), *history[made].get(b.part, ())))
-        found.append(RelationHold(f"R{i}", (a.part, b.part), made, lost, word))
-    return tuple(found)
+        holds.append(RelationHold(f"R{i}", (a.part, b.part), made, lost, word))
+    return tuple(holds)
 
 
 @final

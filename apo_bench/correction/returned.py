@@ -19,17 +19,17 @@ _SAME = 1e-9
 """Poses that differ by less, [m] and unitless, are one and the same."""
 
 
-def check_correction(found: Correction, assembly: Assembly, name: str) -> Correction:
+def check_correction(correction: Correction, assembly: Assembly, name: str) -> Correction:
     """The correction by the corrector called `name`, its schedule made of steps.
 
     Raises:
         InputError: The first thing that is wrong.
     """
-    found = replace(found, schedule=_steps(found.schedule, name))
-    _check_numbers(found, len(assembly), name)
-    _check_words(found, assembly, name)
-    _check_schedule(found, name)
-    return found
+    correction = replace(correction, schedule=_steps(correction.schedule, name))
+    _check_numbers(correction, len(assembly), name)
+    _check_words(correction, assembly, name)
+    _check_schedule(correction, name)
+    return correction
 
 
 def check_near(T: Array, name: str, what: str) -> None:
@@ -48,22 +48,22 @@ def check_near(T: Array, name: str, what: str) -> None:
 def _steps(schedule: Any, name: str) -> tuple[Step, ...]:
     """The schedule as steps; pairs of a whole number and a truth value will do."""
     steps = []
-    for i, given in enumerate(schedule if isinstance(schedule, Sequence) else [schedule], start=1):
-        pair = tuple(given) if isinstance(given, Sequence) and not isinstance(given, str) else (given,)
+    for i, stated in enumerate(schedule if isinstance(schedule, Sequence) else [schedule], start=1):
+        pair = tuple(stated) if isinstance(stated, Sequence) and not isinstance(stated, str) else (stated,)
         k, undo = (*pair, False)[:2]
         if len(pair) not in (1, 2) or not _whole(k) or not isinstance(undo, bool | np.bool_):
             raise InputError(
-                f"the corrector '{name}' returned {given!r} as step {i} of its schedule; "
+                f"the corrector '{name}' returned {stated!r} as step {i} of its schedule; "
                 "return `Step(operation, undo)`, the operation counted from 0."
             )
         steps.append(Step(int(k), bool(undo)))
     return tuple(steps)
 
 
-def _check_numbers(found: Correction, n: int, name: str) -> None:
+def _check_numbers(correction: Correction, n: int, name: str) -> None:
     """What a row repeats: operations that exist, gaps that are numbers."""
-    tried = found.tried if isinstance(found.tried, Sequence) else (found.tried,)
-    named = [("freed", k) for k in _listed(found.freed)]
+    tried = correction.tried if isinstance(correction.tried, Sequence) else (correction.tried,)
+    named = [("freed", k) for k in _listed(correction.freed)]
     for one in tried:
         if not isinstance(one, Try):
             raise InputError(f"the corrector '{name}' returned {one!r} among `tried`; return `Try(step, free, gap_m)`.")
@@ -74,21 +74,23 @@ def _check_numbers(found: Correction, n: int, name: str) -> None:
                 f"the corrector '{name}' returned the operation {k!r} in `{field}`; "
                 f"return whole numbers from 0 to {n - 1}."
             )
-    gaps = [("gap_before_m", found.gap_before_m), ("gap_after_m", found.gap_after_m)]
+    gaps = [("gap_before_m", correction.gap_before_m), ("gap_after_m", correction.gap_after_m)]
     for field, gap_m in (*gaps, *(("gap_m of `tried`", one.gap_m) for one in tried)):
         if not isinstance(gap_m, float | int | np.floating):
             raise InputError(f"the corrector '{name}' returned {gap_m!r} as {field}; return a length in metres.")
 
 
-def _check_words(found: Correction, assembly: Assembly, name: str) -> None:
+def _check_words(correction: Correction, assembly: Assembly, name: str) -> None:
     """What a person reads: a sentence, tests, relations that there are."""
-    said = found.sentence
-    if not isinstance(said, str) or not said.strip() or UNSHOWN.search(said):
-        raise InputError(f"the corrector '{name}' returned {said!r} as its sentence; return one line of plain text.")
-    for field, test in (("test", found.test), ("test_after", found.test_after)):
+    sentence = correction.sentence
+    if not isinstance(sentence, str) or not sentence.strip() or UNSHOWN.search(sentence):
+        raise InputError(
+            f"the corrector '{name}' returned {sentence!r} as its sentence; return one line of plain text."
+        )
+    for field, test in (("test", correction.test), ("test_after", correction.test_after)):
         if test is not None and not isinstance(test, Consistency):
             raise InputError(f"the corrector '{name}' returned {test!r} as `{field}`; return a Consistency or None.")
-    for one in found.dropped if isinstance(found.dropped, tuple) else (found.dropped,):
+    for one in correction.dropped if isinstance(correction.dropped, tuple) else (correction.dropped,):
         if not isinstance(one, str) or assembly.without((one,)).all():
             raise InputError(
                 f"the corrector '{name}' returned {one!r} in `dropped`; return a tuple of relations, such as 'R1'."
@@ -103,24 +105,24 @@ def _whole(value: Any) -> bool:
     return isinstance(value, int | np.integer) and not isinstance(value, bool)
 
 
-def _check_schedule(found: Correction, name: str) -> None:
-    if found.schedule and (wrong := schedule_fault(found.schedule, len(found.goals))):
+def _check_schedule(correction: Correction, name: str) -> None:
+    if correction.schedule and (wrong := schedule_fault(correction.schedule, len(correction.goals))):
         raise InputError(f"the corrector '{name}' returned a schedule that {wrong}; {SCHEDULE_REMEDY}.")
-    if found.targets is None:
+    if correction.targets is None:
         return
-    if not found.schedule:
+    if not correction.schedule:
         raise InputError(
             f"the corrector '{name}' returned targets and no schedule; return one step per target, or no targets."
         )
-    for j in np.flatnonzero(~is_rigid(found.targets)):
+    for j in np.flatnonzero(~is_rigid(correction.targets)):
         raise InputError(
             f"the corrector '{name}' returned a target for step {j + 1} of its schedule that is not a rigid pose; "
             f"{RIGID}."
         )
-    check_near(found.targets, name, "a target for step")
-    ends = {step.operation: i for i, step in enumerate(found.schedule) if not step.undo}
+    check_near(correction.targets, name, "a target for step")
+    ends = {step.operation: i for i, step in enumerate(correction.schedule) if not step.undo}
     for k, i in ends.items():
-        if np.abs(found.targets[i] - found.goals[k]).max() > _SAME:
+        if np.abs(correction.targets[i] - correction.goals[k]).max() > _SAME:
             raise InputError(
                 f"the corrector '{name}' returned a last target for operation {k + 1} that is not its goal; "
                 "return goals that are the targets in force at the end."

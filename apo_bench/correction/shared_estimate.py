@@ -9,7 +9,7 @@ from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.shared_error import SharedError, joint_covariance
 from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
 from apo_bench.correction.solvers.posterior import freedom
-from apo_bench.correction.solvers.whitened import noise_factor, spread
+from apo_bench.correction.solvers.whitened import noise_factor, twists_of
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -59,15 +59,15 @@ def estimate_shared(
         raise InputError(f"{len(seen)} operations that share errors were given; take fewer of them.")
     joint = joint_covariance(seen, observation.covariance, observation.shared)
     free = L.reshape(xi.size, xi.size) @ known.free
-    found = []
-    for one in observation.shared:
-        if one.correlation is not None:
+    estimates = []
+    for error in observation.shared:
+        if error.correlation is not None:
             continue
         A = np.zeros((len(seen), 6, 6))
-        rows = list(one.operations)
-        A[rows] = one.ways(seen)
-        AC = A.reshape(xi.size, 6) @ one.covariance
+        rows = list(error.operations)
+        A[rows] = error.ways(seen)
+        AC = A.reshape(xi.size, 6) @ error.covariance
         K = np.linalg.solve(joint, AC).T
-        C = one.covariance - K @ AC + (K @ free) @ (K @ free).T
-        found.append(SharedEstimate(one, -(K @ xi.ravel()), (C + C.T) / 2))
-    return tuple(found), spread(Jr @ L, known.free)
+        C = error.covariance - K @ AC + (K @ free) @ (K @ free).T
+        estimates.append(SharedEstimate(error, -(K @ xi.ravel()), (C + C.T) / 2))
+    return tuple(estimates), twists_of(Jr @ L, known.free)

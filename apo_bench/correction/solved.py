@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly.correction_record import Consistency
 from apo_bench.assembly.equations import largest
-from apo_bench.correction.consistency import SOFT_M, p_value, softened_length
+from apo_bench.correction.consistency import CONTRADICTION_M, p_value, softened_length
 from apo_bench.correction.problem import Problem
 from apo_bench.correction.solvers.gauss_newton import NearestGoals
 from apo_bench.correction.solvers.inequalities import active_rank, nearest_between
@@ -82,7 +82,7 @@ def tested(problem: Problem, kept: NDArray[np.bool_]) -> Consistency:
 def pull(problem: Problem, kept: NDArray[np.bool_]) -> Array:
     """How hard each contact pulls at the goals of one observation, (c,), by the multipliers of its equations."""
     chosen = kept & problem.demands.exact
-    soft = np.hypot(problem.slack(chosen), SOFT_M)
+    soft = np.hypot(problem.slack(chosen), CONTRADICTION_M)
     multipliers = np.zeros((len(chosen), 3))
     multipliers[chosen] = (problem.nearest(chosen, soft).e[0] / soft).reshape(-1, 3)
     return np.asarray(np.square(multipliers).sum(axis=1))
@@ -140,7 +140,7 @@ def _solved_in_full(problem: Problem, kept: NDArray[np.bool_], nearest: NearestG
     chosen = kept & exact
     chi_square, freedom = _length(problem, chosen, nearest)
     if nearest.finite[0] and largest(problem.gaps(nearest.goals)[:, chosen]) > problem.observation.gap_m:
-        nearest = problem.nearest(chosen, np.hypot(problem.slack(chosen), SOFT_M))
+        nearest = problem.nearest(chosen, np.hypot(problem.slack(chosen), CONTRADICTION_M))
     elif nearest.finite[0] and not exact[kept].all():
         inequalities = problem.inequalities[0].among(kept[~exact])
         start = nearest.at(0)
@@ -175,7 +175,9 @@ def _length(problem: Problem, chosen: NDArray[np.bool_], nearest: NearestGoals) 
     if simple:
         return float(square), freedom
     slack_m = problem.slack(chosen)
-    soft = slack_m if nearest.at_rest[0] and largest(nearest.e) <= SOFT_M else np.hypot(slack_m, SOFT_M)
+    soft = (
+        slack_m if nearest.at_rest[0] and largest(nearest.e) <= CONTRADICTION_M else np.hypot(slack_m, CONTRADICTION_M)
+    )
     relaxed = problem.nearest(chosen, soft)
     softened = soft > 0.0
     over = relaxed.e[0, softened] / soft[softened]
@@ -184,7 +186,7 @@ def _length(problem: Problem, chosen: NDArray[np.bool_], nearest: NearestGoals) 
 
 def _lengths(problem: Problem, chosen: NDArray[np.bool_], nearest: NearestGoals) -> tuple[Array, NDArray[np.bool_]]:
     """Squared lengths of corrections, (b,), and whether that is what the test asks for: contacts hold, (b,)."""
-    holds = nearest.finite & nearest.at_rest & (np.abs(nearest.e).max(axis=1, initial=0.0) <= SOFT_M)
+    holds = nearest.finite & nearest.at_rest & (np.abs(nearest.e).max(axis=1, initial=0.0) <= CONTRADICTION_M)
     S = problem.play(chosen)
     if S is not None:
         Jt = nearest.Jt if isinstance(nearest.Jt, np.ndarray) else nearest.Jt[0].toarray()[None]

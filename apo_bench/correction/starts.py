@@ -93,7 +93,7 @@ def _starts(problem: Problem, first: Solved) -> Array:
     doubted = _doubted(problem, first)
     n = len(observation.goals)
     solids = observation.assembly.solids
-    found = [inferred_goals(observation, some).goals for some in (*((k,) for k in doubted), tuple(range(n)))]
+    starts = [inferred_goals(observation, some).goals for some in (*((k,) for k in doubted), tuple(range(n)))]
     turned = [observation.goals]
     for k in doubted:
         for g in symmetries(solids[observation.assembly.operations[k].main])[1:]:
@@ -101,7 +101,7 @@ def _starts(problem: Problem, first: Solved) -> Array:
             goals[k] = goals[k] @ g
             turned.append(goals)
     away = looking_away(observation.assembly, observation.start, np.array(turned)).sum(axis=1)
-    return np.array([*found, *(goals for goals, count in zip(turned, away, strict=True) if count < away[0])])
+    return np.array([*starts, *(goals for goals, count in zip(turned, away, strict=True) if count < away[0])])
 
 
 def _doubted(problem: Problem, first: Solved) -> Collection[int]:
@@ -129,13 +129,13 @@ def _solutions(problem: Problem, starts: Array) -> Iterator[Array]:
     z = correction_to(observation.goals, L, starts)
     if 6 * n <= LARGEST_DENSE:
         seen = np.broadcast_to(observation.goals, starts.shape)
-        found = [nearest_goals(system, seen, np.broadcast_to(L, (b, *L.shape)), None, z, problem.kernels)]
+        results = [nearest_goals(system, seen, np.broadcast_to(L, (b, *L.shape)), None, z, problem.kernels)]
     else:
-        each = (system.only(i) for i in range(b))
-        found = [nearest_goals(part, observation.goals, L, None, at) for part, at in zip(each, z, strict=True)]
-    goals = np.concatenate([each.goals.reshape(-1, n, 4, 4) for each in found])
-    rest = np.concatenate([np.atleast_1d(each.at_rest) for each in found])
-    e = np.concatenate([np.atleast_2d(each.e) for each in found])
+        result = (system.only(i) for i in range(b))
+        results = [nearest_goals(part, observation.goals, L, None, at) for part, at in zip(result, z, strict=True)]
+    goals = np.concatenate([result.goals.reshape(-1, n, 4, 4) for result in results])
+    rest = np.concatenate([np.atleast_1d(result.at_rest) for result in results])
+    e = np.concatenate([np.atleast_2d(result.e) for result in results])
     holds = np.isfinite(goals).all(axis=(1, 2, 3)) & (np.abs(e).max(axis=1, initial=0.0) <= observation.gap_m)
     holds &= ~looking_away(observation.assembly, observation.start, goals).any(axis=1)
     z = correction_to(observation.goals, problem.L[0], goals[holds])

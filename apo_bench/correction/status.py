@@ -7,19 +7,18 @@ import numpy as np
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import largest_gap
 from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.lowering import lowered
 from apo_bench.assembly.pattern import looking_away
 from apo_bench.correction.solvers.newton import Solution
 from apo_bench.records import outcomes
 
 
-def solver_status(found: Solution, left_m: float, gap_m: float) -> str:
+def solver_status(solution: Solution, left_m: float, gap_m: float) -> str:
     """`converged` if what is left, [m], is within `gap_m`; otherwise why not."""
-    if not found.finite:
+    if not solution.finite:
         return "not_finite"
     if left_m <= gap_m:
         return "converged"
-    return "inconsistent" if found.at_rest else "not_converged"
+    return "inconsistent" if solution.at_rest else "not_converged"
 
 
 def status_sentence(status: str, gap_m: float, of: str = "every contact") -> str:
@@ -27,21 +26,21 @@ def status_sentence(status: str, gap_m: float, of: str = "every contact") -> str
     return f"{of} holds within {gap_m * 1e3:g} mm" if status == "converged" else outcomes.sentence(status)
 
 
-def opposing(observation: Observation, made: Correction) -> Correction:
+def opposing(observation: Observation, correction: Correction) -> Correction:
     """A correction as it is; `inconsistent` in place of `converged` where faces that should touch look the same way."""
-    if not made.ok:
-        return made
-    assembly = lowered(observation.assembly)
-    away = looking_away(assembly, observation.start, made.goals)
-    if made.dropped:
-        away &= assembly.without(made.dropped)
+    if not correction.ok:
+        return correction
+    assembly = observation.assembly
+    away = looking_away(assembly, observation.start, correction.goals)
+    if correction.dropped:
+        away &= assembly.without(correction.dropped)
     if not away.any():
-        return made
+        return correction
     contact = assembly.given(assembly.relations()[int(np.argmax(away))].contact)
-    said = (
+    sentence = (
         f"the faces of {contact} look the same way at the goals that were found; a part was probably seen turned over"
     )
-    return replace(made, status="inconsistent", sentence=said, covariance=None)
+    return replace(correction, status="inconsistent", sentence=sentence, covariance=None)
 
 
 def refused_correction(observation: Observation) -> Correction:

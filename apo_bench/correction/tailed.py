@@ -11,7 +11,7 @@ import numpy as np
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.shared_error import joint_covariance
 from apo_bench.correction.consistency import ROUNDING
-from apo_bench.correction.solvers.whitened import unspread
+from apo_bench.correction.solvers.whitened import coordinates_of
 from apo_bench.geometry.arrays import Array
 
 DRAWS = 2000
@@ -52,4 +52,4 @@ def _drawn(observation: Observation, L: Array) -> Array:
     if observation.tails is None:
         raise ValueError("the observation states no tails")
     joint = joint_covariance(observation.goals, observation.covariance, observation.shared)
-    return unspread(L, observation.tails.draws(joint, DRAWS))
+    return coordinates_of(L, observation.tails.draws(joint, DRAWS))

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.correction.learning.likelihood import Estimate
+from apo_bench.correction.learning.likelihood import EstimatedNumber
 from apo_bench.io.words import columns
 from apo_bench.observation.fitting.components import COMPONENTS
 from apo_bench.trial.learned_noise import Learned
@@ -41,7 +41,7 @@ def learned_lines(learned: Learned) -> list[str]:
     ]
     for component, estimate in zip(COMPONENTS, noise.deviations, strict=True):
         facts.append((component.name, _estimate(estimate, component.unit)))
-    percent = Estimate(*(100.0 * x for x in noise.gross))
+    percent = EstimatedNumber(*(100.0 * x for x in noise.gross))
     facts.append(("outliers", f"{percent.value:.1f} % [{percent.low:.1f} to {percent.high:.1f}] of what was seen"))
     if noise.constant.any():
         deviations = np.sqrt(np.diag(noise.constant_covariance))
@@ -50,7 +50,7 @@ def learned_lines(learned: Learned) -> list[str]:
     return columns(facts)
 
 
-def _estimate(estimate: Estimate, unit: str) -> str:
+def _estimate(estimate: EstimatedNumber, unit: str) -> str:
     """`0.46 mm [0.40 to 0.54]`, or `none found, at most 1.03 mm`."""
     if estimate.low == 0.0:
         return f"none found, at most {estimate.high:.2g} {unit}"

@@ -21,7 +21,7 @@ from apo_bench.correction.solvers.compact import CompactEquations, compact_equat
 from apo_bench.correction.solvers.gauss_newton import nearest_goals
 from apo_bench.correction.solvers.inequalities import Inequalities, demanded, violations
 from apo_bench.correction.solvers.posterior import freedom
-from apo_bench.correction.solvers.whitened import noise_factor, spread
+from apo_bench.correction.solvers.whitened import noise_factor, twists_of
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 
@@ -102,7 +102,7 @@ def free_space(observation: Observation, goals: Array) -> FreeSpace | None:
     known = freedom(nearest.Jt)
     if known is None or not known.free.shape[1]:
         return None
-    return FreeSpace(goals, spread(nearest.B, known.free), held)
+    return FreeSpace(goals, twists_of(nearest.B, known.free), held)
 
 
 def nearest_fitting(space: FreeSpace, fits: Fits, excess: Excess) -> Array | None:

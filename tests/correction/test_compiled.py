@@ -21,7 +21,7 @@ from apo_bench.correction.solvers import kernels
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
 from apo_bench.correction.solvers.gauss_newton import NearestGoals, nearest_goals
 from apo_bench.correction.solvers.linear_step import DenseStep
-from apo_bench.correction.solvers.whitened import unspread
+from apo_bench.correction.solvers.whitened import coordinates_of
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.scenario.file import load_scenario
@@ -224,7 +224,7 @@ def test_kernels_run_as_they_stand(turn: float) -> None:
     rng = np.random.default_rng(0)
     xi = rng.standard_normal((1, len(goals), 6))
     xi[..., 3:] *= turn / np.linalg.norm(xi[..., 3:], axis=-1, keepdims=True)
-    z = unspread(L, xi)
+    z = coordinates_of(L, xi)
     rows = np.arange(1)
     mu = np.array([1e-3])
     plain, looped = (DenseStep(system, goals[None], L[None], None, some) for some in (None, kernels.PLAIN))

@@ -7,7 +7,6 @@ import numpy as np
 
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.correction.baselines.paper import at_once
 from apo_bench.correction.baselines.track import track_operations
 
@@ -38,7 +37,6 @@ def no_disappeared(observation: Observation) -> Correction:
 
     Goals that are no candidates are still settled for what they make, lost contacts too.
     """
-    observation = lowered_observation(observation)
     return at_once(
         observation, np.array([relation.lost is None for relation in observation.assembly.relations()], dtype=np.bool_)
     )

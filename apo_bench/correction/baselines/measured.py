@@ -62,7 +62,6 @@ def as_it_ends(observation: Observation, mended: Callable[[Observation], Array],
     """
     if not observation.seen.all():
         return refused_correction(observation)
-    observation = lowered_observation(observation)
     goals = mended(observation) if observation.assembly.relations() else observation.goals
     left_m = largest_gap(observation.assembly, observation.start, goals)
     return goals_as_given(observation, goals, f"{done}; the largest gap left is {left_m * 1e3:.2g} mm")

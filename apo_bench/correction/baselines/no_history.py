@@ -8,7 +8,6 @@ import numpy as np
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import equations, largest, largest_gap
 from apo_bench.assembly.goals import Observation, placements
-from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.solvers.newton import solve_newton
@@ -27,7 +26,6 @@ def no_history(observation: Observation) -> Correction:
         The status says whether the standing contacts hold at the object poses; the gaps are those of every contact
         ever made. `freed` are the operations that got a new motion parameter.
     """
-    observation = lowered_observation(observation)
     if not observation.seen.all():
         return refused_correction(observation)
     last = {part: k for k, operation in enumerate(observation.assembly.operations) for part in operation.moves}
@@ -35,20 +33,20 @@ def no_history(observation: Observation) -> Correction:
     end = _end(observation.assembly, tuple(last))
     system = equations(end, observation.start, poses)
     free = candidates(end, ~(system.gaps(poses) <= observation.gap_m))
-    found = solve_newton(system.among(system.containing(free)), poses, free)
-    ended = solver_status(found, largest(system.gaps(found.goals)), observation.gap_m)
+    solution = solve_newton(system.among(system.containing(free)), poses, free)
+    status = solver_status(solution, largest(system.gaps(solution.goals)), observation.gap_m)
     freed = _main(observation.assembly, last, free)
     goals = np.array(observation.goals)
-    goals[list(freed)] = found.goals[list(freed.values())]
+    goals[list(freed)] = solution.goals[list(freed.values())]
     return Correction(
         goals=goals,
-        status=ended,
-        sentence=status_sentence(ended, observation.gap_m, "every contact that stands at the end"),
+        status=status,
+        sentence=status_sentence(status, observation.gap_m, "every contact that stands at the end"),
         freed=tuple(freed),
         gap_before_m=largest_gap(observation.assembly, observation.start, observation.goals),
         gap_after_m=largest_gap(observation.assembly, observation.start, goals),
-        rank=found.rank,
-        trace=found.trace,
+        rank=solution.rank,
+        trace=solution.trace,
     )
 
 

@@ -17,7 +17,7 @@ def solve_own_contacts(system: Equations, goals: Array, k: int, gap_m: float) ->
         gap_m: Largest |e| at which a contact holds, [m].
     """
     own = system.among(system.made == k)
-    found = solve_newton(own, goals, (k,))
+    solution = solve_newton(own, goals, (k,))
     held = system.gaps(goals) <= gap_m
-    holds = system.gaps(found.goals) <= gap_m
-    return found.goals if found.finite and (holds | ~held).all() else goals
+    holds = system.gaps(solution.goals) <= gap_m
+    return solution.goals if solution.finite and (holds | ~held).all() else goals

@@ -6,7 +6,6 @@ from numpy.typing import NDArray
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.equations import equations, largest
 from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.baselines.own_contacts import solve_own_contacts
 from apo_bench.correction.solvers.newton import solve_newton
@@ -21,7 +20,6 @@ def paper(observation: Observation) -> Correction:
         `inconsistent`, `not_converged` or `not_finite` (nothing was changed), with its sentence. `freed` are the
         candidates; rank and trace are those of their joint solution.
     """
-    observation = lowered_observation(observation)
     return at_once(observation, np.ones(len(observation.assembly.relations()), dtype=np.bool_))
 
 
@@ -35,21 +33,21 @@ def at_once(observation: Observation, known: NDArray[np.bool_]) -> Correction:
     system = equations(observation.assembly, observation.start, observation.goals)
     before = system.gaps(observation.goals)
     freed = candidates(observation.assembly, known & ~(before <= observation.gap_m), known)
-    found = solve_newton(system.among(known & system.containing(freed)), observation.goals, freed)
-    ended = solver_status(found, largest(system.gaps(found.goals)[known]), observation.gap_m)
-    goals = found.goals
-    if ended == "converged":
+    solution = solve_newton(system.among(known & system.containing(freed)), observation.goals, freed)
+    status = solver_status(solution, largest(system.gaps(solution.goals)[known]), observation.gap_m)
+    goals = solution.goals
+    if status == "converged":
         for k in sorted(set(range(len(goals))).difference(freed)):
             goals = solve_own_contacts(system, goals, k, observation.gap_m)
     return Correction(
         goals=goals,
-        status=ended,
+        status=status,
         sentence=status_sentence(
-            ended, observation.gap_m, "every contact" if known.all() else "every contact that was kept"
+            status, observation.gap_m, "every contact" if known.all() else "every contact that was kept"
         ),
         freed=freed,
         gap_before_m=largest(before),
         gap_after_m=largest(system.gaps(goals)),
-        rank=found.rank,
-        trace=found.trace,
+        rank=solution.rank,
+        trace=solution.trace,
     )

@@ -46,7 +46,7 @@ def _put(own: Equations, goals: Array, k: int, space: Whitened) -> Array:
     the others go to where |z| is least: with V^t d = c for what is fixed, the twist is covariance V (V^t covariance
     V)^-1 (c + V^t xi).
     """
-    one = Whitened(space.observed[k : k + 1], space.factor[k : k + 1])
+    coordinates = Whitened(space.observed[k : k + 1], space.factor[k : k + 1])
     now = np.array(goals)
     z = np.zeros(6)
     for _ in range(_TURNS):
@@ -55,11 +55,11 @@ def _put(own: Equations, goals: Array, k: int, space: Whitened) -> Array:
             break
         U, w, Vt = np.linalg.svd(J[:, 6 * k : 6 * k + 6] / TWIST_UNITS, full_matrices=False)
         rank = int(np.count_nonzero(w > SINGULAR_CUT_OFF * w[0]))
-        fixed = one.pulled(z, Vt[:rank] * TWIST_UNITS)
+        fixed = coordinates.pulled(z, Vt[:rank] * TWIST_UNITS)
         wanted = fixed @ z - (U[:, :rank].T @ e) / w[:rank]
         step = np.linalg.lstsq(fixed, wanted, rcond=None)[0] - z
         z = z + step
-        now[k] = one.goals(z)[0]
-        if np.linalg.norm(one.factor[0] @ step * TWIST_UNITS) < REST_M:
+        now[k] = coordinates.goals(z)[0]
+        if np.linalg.norm(coordinates.factor[0] @ step * TWIST_UNITS) < REST_M:
             break
     return now[k]

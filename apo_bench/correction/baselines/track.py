@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from apo_bench.assembly.correction_record import Correction, Iterate, Try
 from apo_bench.assembly.equations import Equations, equations, largest
 from apo_bench.assembly.goals import Observation, Step
-from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.baselines.own_contacts import solve_own_contacts
 from apo_bench.correction.solvers.newton import Solution, solve_newton
@@ -57,7 +56,6 @@ class TrackedOperation:
 
 def track_operations(observation: Observation, sets: _Sets) -> Correction:
     """Every operation in turn, trying these sets of its candidates."""
-    observation = lowered_observation(observation)
     if not observation.seen.all():
         return refused_correction(observation)
     now = np.array(observation.goals)
@@ -98,17 +96,17 @@ def _next(observation: Observation, goals: Array, sets: _Sets) -> TrackedOperati
         tried.append(Try(n, free, left_m))
         if left_m <= observation.gap_m:
             return TrackedOperation(last.goals, "converged", free, tuple(tried), last.rank, last.trace)
-    ended = "inconsistent" if last is None else solver_status(last, np.inf, observation.gap_m)
-    return TrackedOperation(goals, ended, (), tuple(tried), last.rank if last else 0, last.trace if last else ())
+    status = "inconsistent" if last is None else solver_status(last, np.inf, observation.gap_m)
+    return TrackedOperation(goals, status, (), tuple(tried), last.rank if last else 0, last.trace if last else ())
 
 
 def _trial(
     system: Equations, goals: Array, free: tuple[int, ...], failing: NDArray[np.bool_]
 ) -> tuple[Solution, float]:
     """Solve all equations that contain a free motion parameter; what is left there and of what had failed, [m]."""
-    asked = system.containing(free)
-    found = solve_newton(system.among(asked), goals, free)
-    return found, largest(system.gaps(found.goals)[asked | failing])
+    chosen = system.containing(free)
+    solution = solve_newton(system.among(chosen), goals, free)
+    return solution, largest(system.gaps(solution.goals)[chosen | failing])
 
 
 def _report(
@@ -119,12 +117,12 @@ def _report(
     targets: Array | None = None,
 ) -> Correction:
     system = equations(observation.assembly, observation.start, observation.goals)
-    ended = steps[-1].status if steps else "converged"
-    last = next((step for step in reversed(steps) if step.trace), TrackedOperation(goals, ended))
+    status = steps[-1].status if steps else "converged"
+    last = next((step for step in reversed(steps) if step.trace), TrackedOperation(goals, status))
     return Correction(
         goals=goals,
-        status=ended,
-        sentence=status_sentence(ended, observation.gap_m),
+        status=status,
+        sentence=status_sentence(status, observation.gap_m),
         freed=tuple(sorted({k for step in steps for k in step.freed}, reverse=True)),
         gap_before_m=largest(system.gaps(observation.goals)),
         gap_after_m=largest(system.gaps(goals)),

@@ -20,11 +20,10 @@ from apo_bench.correction.play import fit_covariance
 from apo_bench.correction.solvers.compact import compact_equations
 from apo_bench.correction.solvers.posterior import RANK_CUT_OFF
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, frozen
 
-UNITS = np.repeat([1e-3, np.radians(1.0)], 3)
+UNITS = frozen(np.repeat([1e-3, np.radians(1.0)], 3))
 """(6,): the unit of body twists here, 1 mm and 1 deg."""
-UNITS.flags.writeable = False
 
 
 @final
@@ -56,12 +55,12 @@ def readings(observation: Observation, goals: Array, sets: Iterable[Collection[i
     xi = (pose.log(pose.inverse(goals) @ observation.goals) / UNITS).ravel()
     play = fit_covariance(observation.assembly, observation.play_m)
     operations = pattern(observation.assembly).letters - len(observation.assembly.solids)
-    found = []
+    known = []
     for gross in sets:
         kept = np.repeat(~np.isin(operations, list(gross)).any(axis=1), 3)
         U, w, Vt = np.linalg.svd(J[kept], full_matrices=False)
         r = int(np.count_nonzero(w > RANK_CUT_OFF * w.max(initial=0.0))) if w.size and w[0] > 0.0 else 0
         by = U[:, :r] / w[:r]
         S = np.zeros((r, r)) if play is None else by.T @ play[np.ix_(kept, kept)] @ by
-        found.append(Reading(frozenset(gross), Vt[:r] @ xi, Vt[:r], S))
-    return tuple(found)
+        known.append(Reading(frozenset(gross), Vt[:r] @ xi, Vt[:r], S))
+    return tuple(known)

@@ -20,9 +20,9 @@ import numpy as np
 from apo_bench.correction.learning.evidence import Reading
 from apo_bench.geometry.arrays import Array
 
-_RANGE = 300.0
+GROSS_RANGE = 300.0
 """R: how far a gross error may lead in one direction, [mm] and [deg]."""
-SMALLEST = 1e-3
+LEAST_DEVIATION = 1e-3
 """The least deviation of a component, [mm] or [deg]: none."""
 _LEAST_RATE = 1e-4
 _MOST_RATE = 0.6
@@ -48,7 +48,7 @@ class Shown:
     """Operations that were not seen: they are in every set, and count for no rate."""
 
 
-class Estimate(NamedTuple):
+class EstimatedNumber(NamedTuple):
     """A number with its 95 % interval."""
 
     value: float
@@ -61,9 +61,9 @@ class Estimate(NamedTuple):
 class LearnedNoise:
     """What was learned."""
 
-    deviations: tuple[Estimate, ...]
+    deviations: tuple[EstimatedNumber, ...]
     """Of each component, [mm] or [deg]; a low end of 0 says that it may be missing."""
-    gross: Estimate
+    gross: EstimatedNumber
     """Part of the operations that are grossly wrong."""
     constant: Array
     """(6,), the constant error, [mm, deg]; zero if it was not asked for."""
@@ -73,7 +73,7 @@ class LearnedNoise:
     observations: int
 
 
-def learn_noise(shown: Sequence[Shown], start: Sequence[float], constant: bool) -> LearnedNoise:
+def learn_noise(observations: Sequence[Shown], start: Sequence[float], constant: bool) -> LearnedNoise:
     """The most likely noise.
 
     Args:
@@ -85,10 +85,10 @@ def learn_noise(shown: Sequence[Shown], start: Sequence[float], constant: bool) 
     k = len(start)
     c = np.zeros(6)
     C = np.zeros((6, 6))
-    x = np.array([*(2.0 * np.log(np.maximum(start, SMALLEST))), _logit(0.05)])
-    low = [2.0 * np.log(SMALLEST)] * k + [_logit(_LEAST_RATE)]
-    bounds = list(zip(low, [2.0 * np.log(_RANGE)] * k + [_logit(_MOST_RATE)], strict=True))
-    prepared = [_prepared(one) for one in shown]
+    x = np.array([*(2.0 * np.log(np.maximum(start, LEAST_DEVIATION))), _logit(0.05)])
+    low = [2.0 * np.log(LEAST_DEVIATION)] * k + [_logit(_LEAST_RATE)]
+    bounds = list(zip(low, [2.0 * np.log(GROSS_RANGE)] * k + [_logit(_MOST_RATE)], strict=True))
+    prepared = [_prepared(one) for one in observations]
     for _ in range(4 if constant else 1):
         best = minimize(_surprise, x, args=(prepared, c), jac=True, bounds=bounds, method="L-BFGS-B")
         x = np.asarray(best.x)
@@ -99,11 +99,11 @@ def learn_noise(shown: Sequence[Shown], start: Sequence[float], constant: bool) 
                 break
     ends = _intervals(x, prepared, c, *np.array(bounds).T)
     deviations = tuple(
-        Estimate(float(np.exp(x[i] / 2)), 0.0 if a <= low[i] else float(np.exp(a / 2)), float(np.exp(b / 2)))
+        EstimatedNumber(float(np.exp(x[i] / 2)), 0.0 if a <= low[i] else float(np.exp(a / 2)), float(np.exp(b / 2)))
         for i, (a, b) in enumerate(ends[:k])
     )
-    rate = Estimate(*(float(_expit(v)) for v in (x[k], *ends[k])))
-    return LearnedNoise(deviations, rate, c, C, -_surprise(x, prepared, c)[0], len(shown))
+    rate = EstimatedNumber(*(float(_expit(v)) for v in (x[k], *ends[k])))
+    return LearnedNoise(deviations, rate, c, C, -_surprise(x, prepared, c)[0], len(observations))
 
 
 class _Ready(NamedTuple):
@@ -124,16 +124,16 @@ class _Prepared(NamedTuple):
     n: int
 
 
-def _prepared(shown: Shown) -> _Prepared:
-    most = max((len(one.known) for one in shown.readings), default=0)
-    made = []
-    for one in shown.readings:
-        spread = [one.fixed @ F for F in shown.factors]
-        parts = np.array([f @ f.T for f in spread]).reshape(len(shown.factors), len(one.known), len(one.known))
+def _prepared(observation: Shown) -> _Prepared:
+    most = max((len(one.known) for one in observation.readings), default=0)
+    prepared = []
+    for one in observation.readings:
+        spans = [one.fixed @ F for F in observation.factors]
+        parts = np.array([f @ f.T for f in spans]).reshape(len(observation.factors), len(one.known), len(one.known))
         less = most - len(one.known)
-        gross = len(one.gross - shown.unseen)
-        made.append(_Ready(one.known, parts, one.play, one.fixed @ shown.constant, gross, less))
-    return _Prepared(tuple(made), shown.n - len(shown.unseen))
+        gross = len(one.gross - observation.unseen)
+        prepared.append(_Ready(one.known, parts, one.play, one.fixed @ observation.constant, gross, less))
+    return _Prepared(tuple(prepared), observation.n - len(observation.unseen))
 
 
 def _surprise(x: Array, prepared: Sequence[_Prepared], c: Array) -> tuple[float, Array]:
@@ -160,12 +160,14 @@ def _by_set(x: Array, one: _Prepared, c: Array) -> tuple[Array, Array]:
     slopes = np.zeros((len(one.readings), len(x) - 1))
     for j, ready in enumerate(one.readings):
         logs[j] = (
-            ready.gross * np.log(rate) + (one.n - ready.gross) * np.log1p(-rate) - ready.fixed_less * np.log(_RANGE)
+            ready.gross * np.log(rate)
+            + (one.n - ready.gross) * np.log1p(-rate)
+            - ready.fixed_less * np.log(GROSS_RANGE)
         )
         r = len(ready.known)
         if not r:
             continue
-        S = np.tensordot(variance, ready.parts, 1) + ready.play + SMALLEST**2 * np.eye(r)
+        S = np.tensordot(variance, ready.parts, 1) + ready.play + LEAST_DEVIATION**2 * np.eye(r)
         inverse = np.linalg.inv(S)
         off = ready.known - ready.constant @ c
         y = inverse @ off
@@ -176,13 +178,13 @@ def _by_set(x: Array, one: _Prepared, c: Array) -> tuple[Array, Array]:
 
 def _constant(prepared: Sequence[_Prepared], x: Array) -> tuple[Array, Array]:
     """The most likely constant error given the rest, (6,), and its covariance, (6, 6), each set by its weight."""
-    H = np.eye(6) / _RANGE**2
+    H = np.eye(6) / GROSS_RANGE**2
     g = np.zeros(6)
     variance = np.exp(x[:-1])
     for one in prepared:
         logs, _ = _by_set(x, one, np.zeros(6))
         ready = one.readings[int(np.argmax(logs))]
-        S = np.tensordot(variance, ready.parts, 1) + ready.play + SMALLEST**2 * np.eye(len(ready.known))
+        S = np.tensordot(variance, ready.parts, 1) + ready.play + LEAST_DEVIATION**2 * np.eye(len(ready.known))
         W = np.linalg.solve(S, ready.constant)
         H = H + ready.constant.T @ W
         g = g + W.T @ ready.known
@@ -204,11 +206,11 @@ def _intervals(x: Array, prepared: Sequence[_Prepared], c: Array, low: Array, hi
     wide = np.zeros(m)
     wide[inside] = _WIDE * np.sqrt(np.maximum(np.diag(C), 0.0))
     value = _surprise(x, prepared, c)[0]
-    found = list[tuple[float, float]]()
+    ends = list[tuple[float, float]]()
     for j in range(m):
         without = np.where(np.arange(m) == j, low, x)
         if inside[j] and _surprise(without, prepared, c)[0] - value > _DROP:
-            found.append((max(x[j] - wide[j], low[j]), min(x[j] + wide[j], high[j])))
+            ends.append((max(x[j] - wide[j], low[j]), min(x[j] + wide[j], high[j])))
             continue
         near = x[j]
         far = high[j]
@@ -216,8 +218,8 @@ def _intervals(x: Array, prepared: Sequence[_Prepared], c: Array, low: Array, hi
             at = x.copy()
             at[j] = (near + far) / 2
             near, far = (near, at[j]) if _surprise(at, prepared, c)[0] - value > _DROP else (at[j], far)
-        found.append((low[j], far))
-    return found
+        ends.append((low[j], far))
+    return ends
 
 
 def _logit(p: float) -> float:

@@ -77,7 +77,7 @@ def receive(of: socket.socket, wait: _Wait = lambda: None) -> CorrectorMessage:
 
 
 def _arrays(stated: Mapping[str, Any], numbers: bytes) -> Arrays:
-    found = {}
+    arrays = {}
     at = 0
     for name, (kind, shape) in stated.items():
         if kind not in _TYPES or not all(type(size) is int and size >= 0 for size in shape):
@@ -85,11 +85,11 @@ def _arrays(stated: Mapping[str, Any], numbers: bytes) -> Arrays:
         count = math.prod(shape)
         if count > _LARGEST_NUMBERS:
             raise GarbledMessage("an array that is too large")
-        found[name] = np.frombuffer(numbers, np.dtype(kind), count, at).reshape(shape)
-        at += found[name].nbytes
+        arrays[name] = np.frombuffer(numbers, np.dtype(kind), count, at).reshape(shape)
+        at += arrays[name].nbytes
     if at != len(numbers):
         raise GarbledMessage("numbers that belong to no array")
-    return found
+    return arrays
 
 
 def _read(of: socket.socket, size: int, wait: _Wait) -> bytes:

@@ -129,11 +129,11 @@ class _OwnCorrector:
             CorrectorMisbehaved: It raised an error or returned what it must not; or, as `CorrectorLost`, it ended its
                 process or took too long.
         """
-        said, numbers = self._asked("correct", *observation_message(observation), self._limit_s)
-        if "raised" in said:
-            raise CorrectorMisbehaved(_line(said["raised"]))
+        answer, numbers = self._asked("correct", *observation_message(observation), self._limit_s)
+        if "raised" in answer:
+            raise CorrectorMisbehaved(_line(answer["raised"]))
         try:
-            return parse_correction(said, numbers)
+            return parse_correction(answer, numbers)
         except GarbledMessage as error:
             raise CorrectorMisbehaved(f"the corrector '{self.__name__}' sent back what is no correction.") from error
 
@@ -144,12 +144,12 @@ class _OwnCorrector:
             InputError: It cannot be imported, or is no function.
         """
         try:
-            said, _ = self._asked("check", {}, {}, self._server.starting_s)
+            answer, _ = self._asked("check", {}, {}, self._server.starting_s)
         except CorrectorMisbehaved as error:
             raise InputError(f"{str(error).rstrip('.')} while it was imported; mend it, or use another.") from error
-        if "raised" in said:
-            raise InputError(_line(said["raised"]))
-        files = said.get("files")
+        if "raised" in answer:
+            raise InputError(_line(answer["raised"]))
+        files = answer.get("files")
         return [path for path in files if isinstance(path, str)] if isinstance(files, list) else []
 
     def _asked(self, what: str, form: MessageForm, arrays: Arrays, limit_s: float) -> CorrectorMessage:
@@ -172,6 +172,6 @@ def _how(error: BaseException) -> str:
     return f" with exit code {code}" if code >= 0 else f" by signal {-code}"
 
 
-def _line(said: Any) -> str:
+def _line(answer: Any) -> str:
     """One line that can be printed, whatever came."""
-    return "".join(c if c.isprintable() else " " for c in str(said)[:_LONGEST_SENTENCE])
+    return "".join(c if c.isprintable() else " " for c in str(answer)[:_LONGEST_SENTENCE])

@@ -21,7 +21,8 @@ _NOTICE_S = 2.0
 """How long a fork may be gone before that is said."""
 _START = (
     "import sys; fd, module, fork, folder, *sys.path = sys.argv[1:]; sys.argv[1:] = []; "
-    "from apo_bench.correction.own_code.server import serve; serve(int(fd), module, fork == 'True', folder)"
+    "from apo_bench.correction.own_code.server import answer_requests; "
+    "answer_requests(int(fd), module, fork == 'True', folder)"
 )
 
 
@@ -62,9 +63,9 @@ class Server:
                 with there:
                     socket.send_fds(control, [b"?"], [there.fileno()])
                 send(here, form, arrays, deadline)
-                said = receive(here, lambda: self._wait(here, deadline))
+                answer = receive(here, lambda: self._wait(here, deadline))
             whole = True
-            return said
+            return answer
         except (EOFError, ConnectionError) as error:
             code = self._exit_code()
             whole = code is not None

@@ -39,7 +39,7 @@ _IGNORED = ("SIGINT", "SIGTERM", "SIGHUP")
 """For the process that asks, which ends this one."""
 
 
-def serve(control: int, module: str, fork: bool, folder: str = "") -> None:
+def answer_requests(control: int, module: str, fork: bool, folder: str = "") -> None:
     """The life of the process.
 
     Args:
@@ -74,10 +74,10 @@ def _answer(request: socket.socket) -> None:
     """Read one request, do it, say what came of it."""
     form, arrays = receive(request)
     own = os.getpid()
-    said, numbers = _said(form, arrays)
+    answer, numbers = _said(form, arrays)
     flush()
     if os.getpid() == own:  # the corrector may have forked and come back from both
-        send(request, said, numbers)
+        send(request, answer, numbers)
 
 
 def _serve(asking: socket.socket, fork: bool) -> None:
@@ -94,7 +94,7 @@ def _serve(asking: socket.socket, fork: bool) -> None:
                     child = 0
             if not ready:
                 continue
-            word, given, _, _ = socket.recv_fds(asking, 1, 1)
+            word, descriptors, _, _ = socket.recv_fds(asking, 1, 1)
             if not word:
                 return
             number += 1
@@ -103,13 +103,13 @@ def _serve(asking: socket.socket, fork: bool) -> None:
                 if fork:
                     _prctl(_DEATH_SIGNAL, signal.SIGKILL)
                     asking.close()
-                _do(given[0])
-            os.close(given[0])
+                _do(descriptors[0])
+            os.close(descriptors[0])
 
 
-def _do(given: int) -> None:
+def _do(descriptor: int) -> None:
     """Do a request and end."""
-    with suppress(BaseException), socket.socket(fileno=given) as request:
+    with suppress(BaseException), socket.socket(fileno=descriptor) as request:
         _answer(request)
         os._exit(0)
     os._exit(1)
@@ -137,17 +137,17 @@ def _text(error: BaseException) -> str:
 
 def _files() -> list[str]:
     """The files of all modules that importing the corrector brought in."""
-    found = (getattr(module, "__file__", None) for module in list(sys.modules.values()))
-    return [path for path in found if isinstance(path, str)]
+    paths = (getattr(module, "__file__", None) for module in list(sys.modules.values()))
+    return [path for path in paths if isinstance(path, str)]
 
 
 def _ended() -> list[tuple[int, int]]:
     """Children that have ended, and how."""
-    found = []
+    ended = []
     with suppress(ChildProcessError):
-        while (one := os.waitpid(-1, os.WNOHANG))[0]:
-            found.append(one)
-    return found
+        while (pair := os.waitpid(-1, os.WNOHANG))[0]:
+            ended.append(pair)
+    return ended
 
 
 def _prctl(what: int, value: int) -> None:

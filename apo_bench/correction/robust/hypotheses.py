@@ -18,15 +18,15 @@ from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.assembly.pattern import looking_away, pattern
-from apo_bench.correction.consistency import SOFT_M, fit_deviation
+from apo_bench.correction.consistency import CONTRADICTION_M, fit_deviation
 from apo_bench.correction.contact import ContactCorrector, contact_apply
 from apo_bench.correction.inferred import inferred_goals
 from apo_bench.correction.problem import seen_system
-from apo_bench.correction.robust.views import GROSS, INLIER, ROOM, State, Views, merged
+from apo_bench.correction.robust.views import GROSS, INLIER, ROOM, Sightings, State, merged
 from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.whitened import noise_factor
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.twist import right_jacobian
 
 _as_begun = ContactCorrector("apply", elsewhere=False)
@@ -35,9 +35,8 @@ _FAR_RAD = np.radians(10.0)
 start is tried, and what is far nevertheless is an outlier."""
 States = tuple[State, ...]
 """Those of the views of each operation."""
-UNKNOWN = np.diag(np.repeat([0.05, 0.5], 3) ** 2)
+UNKNOWN = frozen(np.diag(np.repeat([0.05, 0.5], 3) ** 2))
 """(6, 6): how far the goal of an operation that was left out may be from what its contacts say of it, [m, rad]."""
-UNKNOWN.flags.writeable = False
 _WRONG_M = 0.05
 """Faces that a wrong relation names may be so far apart."""
 
@@ -49,7 +48,7 @@ class Case:
 
     observation: Observation
     """The first look: assembly, start poses and play are those of all."""
-    views: Views
+    views: Sightings
     model: OutlierModel
 
 
@@ -74,30 +73,34 @@ class Hypothesis:
     @property
     def doubts(self) -> bool:
         """Whether anything is not believed as it was stated."""
-        return bool(self.dropped) or any(one != INLIER for state in self.states for one in state) or () in self.states
+        return (
+            bool(self.dropped)
+            or any(belief != INLIER for state in self.states for belief in state)
+            or () in self.states
+        )
 
     @cached_property
     def badness(self) -> float:
         """-2 log of how likely states and views are together, but for a constant; infinite if there is no solution."""
-        made = self.correction
+        correction = self.correction
         observation = self.observation
-        if not made.ok or made.test is None or not self._faces_oppose():
+        if not correction.ok or correction.test is None or not self._faces_oppose():
             return np.inf
         wide = np.array(observation.covariance)
         wide[list(self.left_out)] = ROOM
         system = seen_system(observation)
-        xi = pose.log(pose.inverse(observation.goals) @ made.goals)
+        xi = pose.log(pose.inverse(observation.goals) @ correction.goals)
         L = noise_factor(replace(observation, covariance=wide))
-        _, Jt = linearised_by(system, made.goals, right_jacobian(xi) @ L)
+        _, Jt = linearised_by(system, correction.goals, right_jacobian(xi) @ L)
         soft = soft_deviation(observation)
         false = np.zeros(Jt.shape[1])
         if self.dropped:
             wrong = np.repeat(~observation.assembly.without(self.dropped), 3)
             each = np.repeat(np.sqrt(np.diff(pattern(observation.assembly).begin)), 3) * _WRONG_M
             soft = np.where(wrong, each, soft)
-            false = np.where(wrong, system.residual(made.goals) / each, 0.0)
+            false = np.where(wrong, system.residual(correction.goals) / each, 0.0)
         S = Jt.T @ Jt + np.diag(soft * soft)
-        unlikely = made.test.chi_square + false @ false + np.linalg.slogdet(S)[1]
+        unlikely = correction.test.chi_square + false @ false + np.linalg.slogdet(S)[1]
         model = self.case.model
         states = zip(self.case.views, self.states, strict=True)
         surprise = sum(merged(views, state, model).surprise for views, state in states)
@@ -127,15 +130,15 @@ class Hypothesis:
 
 def unbelieved(states: States) -> tuple[int, ...]:
     """Operations of which no view is believed."""
-    return tuple(k for k, state in enumerate(states) if all(one == GROSS for one in state))
+    return tuple(k for k, state in enumerate(states) if all(belief == GROSS for belief in state))
 
 
 def hypothesis(case: Case, states: States, dropped: tuple[str, ...] = ()) -> Hypothesis:
     """Solve for the goals that are most likely with these states, and without these relations."""
     believed = believed_observation(case, states)
     trusted = all(state and set(state) == {INLIER} for state in states) and not dropped
-    made = as_stated(believed) if trusted else _corrected(believed, dropped)
-    return Hypothesis(case, states, dropped, believed, made)
+    correction = as_stated(believed) if trusted else _corrected(believed, dropped)
+    return Hypothesis(case, states, dropped, believed, correction)
 
 
 def as_stated(observation: Observation) -> Correction:
@@ -151,13 +154,13 @@ def believed_observation(case: Case, states: States) -> Observation:
     covariance = np.array(first.covariance)
     unknown = list[int]()
     for k, (views, state) in enumerate(zip(case.views, states, strict=True)):
-        found = merged(views, state, case.model)
-        if found.goal is None:
+        together = merged(views, state, case.model)
+        if together.goal is None:
             unknown.append(k)
             covariance[k] = UNKNOWN
         else:
-            goals[k] = found.goal
-            covariance[k] = found.covariance
+            goals[k] = together.goal
+            covariance[k] = together.covariance
     seen = np.ones(len(states), dtype=np.bool_)
     believed = replace(first, goals=goals, covariance=covariance, seen=seen)
     if any(len(views) > 1 for views in case.views):
@@ -167,7 +170,7 @@ def believed_observation(case: Case, states: States) -> Observation:
 
 def soft_deviation(observation: Observation) -> Array:
     """How far each equation may be from nominal, (3 c,), [m]."""
-    return np.hypot(fit_deviation(observation.assembly, observation.play_m), SOFT_M)
+    return np.hypot(fit_deviation(observation.assembly, observation.play_m), CONTRADICTION_M)
 
 
 def _corrected(observation: Observation, dropped: tuple[str, ...]) -> Correction:

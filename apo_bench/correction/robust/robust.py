@@ -12,7 +12,6 @@ import numpy as np
 from apo_bench.assembly.correction_record import Correction, Look
 from apo_bench.assembly.equations import largest_gap
 from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.correction.consistency import TEST_LEVEL
 from apo_bench.correction.contact import contact_apply
@@ -20,7 +19,7 @@ from apo_bench.correction.inferred import inferred_goals
 from apo_bench.correction.robust.hypotheses import Case, Hypothesis, as_stated
 from apo_bench.correction.robust.room import least_crowded
 from apo_bench.correction.robust.search import Search
-from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, Views, looked_again, views_of
+from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, Sightings, looked_again, views_of
 from apo_bench.correction.status import refused_correction
 from apo_bench.geometry.arrays import Array
 
@@ -54,14 +53,12 @@ class RobustCorrector:
 
     def looking(self, observation: Observation, look: Look | None) -> Correction:
         """Correct an observation, with looks at what is in doubt for as long as there is any and one is left."""
-        given = observation
-        observation = lowered_observation(observation)
         model = self.outliers or observation.outliers or OutlierModel()
         if look is None and observation.seen.all() and model.surprises[INLIER] < model.surprises[GROSS]:
             # One view of each operation, an inlier more likely than not: nothing is searched while the test holds.
-            made = as_stated(observation)
-            if made.ok and made.test is not None and made.test.p_value >= self.level:
-                return replace(made, sentence=made.sentence + _unexplained(made))
+            correction = as_stated(observation)
+            if correction.ok and correction.test is not None and correction.test.p_value >= self.level:
+                return replace(correction, sentence=correction.sentence + _unexplained(correction))
         views = views_of(observation)
         again = list[int]()
         first = None
@@ -69,95 +66,93 @@ class RobustCorrector:
             case = Case(observation, views, model)
             search = Search(case, self.level)
             baseless = _baseless(observation, views)
-            found = None if baseless else search.likeliest()
+            best = None if baseless else search.likeliest()
             first = first or search.first
-            asked = baseless or unsure(search, found)
-            if look is None or not look.left or not asked:
+            doubted = baseless or unsure(search, best)
+            if look is None or not look.left or not doubted:
                 break
-            views = looked_again(views, look(asked))
-            again += asked
-        if found is None:
+            views = looked_again(views, look(doubted))
+            again += doubted
+        if best is None:
             return contact_apply(observation) if observation.seen.all() else refused_correction(observation)
-        made = _report(observation, first or found, search, with_room(found), again)
-        if made.believed is None:
-            return made
-        return replace(made, believed=replace(made.believed, assembly=given.assembly))
+        return _report(observation, first or best, search, with_room(best), again)
 
 
 contact_robust = RobustCorrector()
 
 
-def unsure(search: Search, found: Hypothesis | None) -> tuple[int, ...]:
+def unsure(search: Search, best: Hypothesis | None) -> tuple[int, ...]:
     """Operations that are worth another look: of which nothing is believed as it was stated, or not surely."""
-    if found is None:
+    if best is None:
         return tuple(range(search.operations))
-    asked = []
-    for k, state in enumerate(found.states):
-        C = found.correction.covariance
+    doubted = []
+    for k, state in enumerate(best.states):
+        C = best.correction.covariance
         wide = C is not None and bool((np.sqrt(np.diag(C[k])) > _SURE_DEVIATION).any())
-        if all(one != INLIER for one in state) or wide or search.share(found, k) > _SURE:
-            asked.append(k)
-    return tuple(asked)
+        if all(belief != INLIER for belief in state) or wide or search.share(best, k) > _SURE:
+            doubted.append(k)
+    return tuple(doubted)
 
 
-def with_room(found: Hypothesis) -> Hypothesis:
+def with_room(hypothesis: Hypothesis) -> Hypothesis:
     """A hypothesis whose left-out operations lead to where there is room for their parts."""
-    unknown = found.left_out
-    covariance = found.correction.covariance
-    if not unknown or covariance is None or not np.isfinite(found.badness):
-        return found
+    unknown = hypothesis.left_out
+    covariance = hypothesis.correction.covariance
+    if not unknown or covariance is None or not np.isfinite(hypothesis.badness):
+        return hypothesis
 
     def solve(goals: Array) -> Array | None:
-        made = found.at(goals, unknown).correction
-        return made.goals if made.ok and found.stands_at(made.goals) else None
+        correction = hypothesis.at(goals, unknown).correction
+        return correction.goals if correction.ok and hypothesis.stands_at(correction.goals) else None
 
-    better = least_crowded(found.observation, found.correction.goals, covariance, unknown, solve)
-    return found if better is None else found.at(better, unknown)
+    better = least_crowded(hypothesis.observation, hypothesis.correction.goals, covariance, unknown, solve)
+    return hypothesis if better is None else hypothesis.at(better, unknown)
 
 
-def _baseless(observation: Observation, views: Views) -> tuple[int, ...]:
+def _baseless(observation: Observation, views: Sightings) -> tuple[int, ...]:
     """Operations that were never seen and of which no contact says anything."""
     return inferred_goals(observation, [k for k, own in enumerate(views) if not own]).baseless
 
 
 def _report(
-    observation: Observation, first: Hypothesis, search: Search, found: Hypothesis, again: list[int]
+    observation: Observation, first: Hypothesis, search: Search, best: Hypothesis, again: list[int]
 ) -> Correction:
     """The correction of what is believed, with what was seen at first."""
-    made = found.correction
-    if not found.doubts and not again:
-        return replace(made, sentence=made.sentence + _unexplained(made))
+    correction = best.correction
+    if not best.doubts and not again:
+        return replace(correction, sentence=correction.sentence + _unexplained(correction))
     before = largest_gap(observation.assembly, observation.start, observation.goals)
     return replace(
-        made,
-        sentence=made.sentence + _unexplained(made) + _doubts(search, found) + _looks(again),
+        correction,
+        sentence=correction.sentence + _unexplained(correction) + _doubts(search, best) + _looks(again),
         gap_before_m=before if observation.seen.all() else np.nan,
-        test=first.correction.test or made.test,
-        test_after=made.test,
-        left_out=found.left_out,
-        believed=found.observation,
+        test=first.correction.test or correction.test,
+        test_after=correction.test,
+        left_out=best.left_out,
+        believed=best.observation,
     )
 
 
-def _unexplained(made: Correction) -> str:
+def _unexplained(correction: Correction) -> str:
     """What the test says that no outlier explains better."""
-    if made.test is None or made.test.passes:
+    if correction.test is None or correction.test.passes:
         return ""
-    return f"; the correction is longer than the stated noise explains (p = {made.test.p_value:.2g}), no outlier does"
+    p = correction.test.p_value
+    return f"; the correction is longer than the stated noise explains (p = {p:.2g}), no outlier does"
 
 
-def _doubts(search: Search, found: Hypothesis) -> str:
+def _doubts(search: Search, best: Hypothesis) -> str:
     """What is not believed, and how likely it is that a relation is wrong in place of an observation."""
-    broad = tuple(k for k, state in enumerate(found.states) if BROAD in state and k not in found.left_out)
-    lists = (("left out what was seen of", found.left_out), ("seen badly:", broad))
-    said = "".join(f"; {what} {_operations(those)}" for what, those in lists if those)
-    said += "".join(f"; left out {relation}" for relation in found.dropped)
-    rival = search.rival(found)
+    broad = tuple(k for k, state in enumerate(best.states) if BROAD in state and k not in best.left_out)
+    lists = (("left out what was seen of", best.left_out), ("seen badly:", broad))
+    words = "".join(f"; {what} {_operations(those)}" for what, those in lists if those)
+    words += "".join(f"; left out {relation}" for relation in best.dropped)
+    rival = search.rival(best)
     if rival is None:
-        return said
-    wrong = search.weight(found, lambda one: bool(one.dropped))
-    named = (found if found.dropped else rival).dropped[0]
-    return f"{said}; an observation is to blame with {_share(1.0 - wrong)}, a relation ({named}) with {_share(wrong)}"
+        return words
+    wrong = search.weight(best, lambda one: bool(one.dropped))
+    named = (best if best.dropped else rival).dropped[0]
+    return f"{words}; an observation is to blame with {_share(1.0 - wrong)}, a relation ({named}) with {_share(wrong)}"
 
 
 def _looks(again: list[int]) -> str:

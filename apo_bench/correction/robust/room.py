@@ -19,8 +19,8 @@ from apo_bench.geometry.overlap import face_area, overlap_area
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face
 
-TRIED = 24
-LEAST_TRIED = 8
+PLACES_TRIED = 24
+LEAST_PLACES = 8
 """Places that are tried for all operations together, and for each at least."""
 _COVERED = 0.02
 """Faces that touch cover at least this part of the smaller one."""
@@ -105,16 +105,16 @@ def least_crowded(
         None if the given goals are as good as any that were tried, or nothing is wrong with them.
     """
     best = crowding(observation, goals)
-    found = None
+    roomiest = None
     for k in doubted:
         if best.missed == 0 and best.depth == 0.0:
             break
-        base = goals if found is None else found
-        for T in places(base[k], covariance[k], max(LEAST_TRIED, TRIED // len(doubted))):
+        base = goals if roomiest is None else roomiest
+        for T in places(base[k], covariance[k], max(LEAST_PLACES, PLACES_TRIED // len(doubted))):
             moved = np.array(base)
             moved[k] = T
-            made = solve(moved)
-            if made is not None and (now := crowding(observation, made)) < best:
+            consistent = solve(moved)
+            if consistent is not None and (now := crowding(observation, consistent)) < best:
                 best = now
-                found = made
-    return found
+                roomiest = consistent
+    return roomiest

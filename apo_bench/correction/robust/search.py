@@ -67,28 +67,28 @@ class Search:
         self.first = self._try(start)
         if self.first.p_value >= self._level:
             return self.first
-        found = self._smallest(start)
-        if found is not None:
-            self._refined(found)
+        best = self._smallest(start)
+        if best is not None:
+            self._refined(best)
         return min(self._known(), key=_badness, default=None)
 
-    def share(self, found: Hypothesis, k: int) -> float:
+    def share(self, best: Hypothesis, k: int) -> float:
         """How likely it is, of all hypotheses that were solved, that operation k is not in the state that was found."""
-        return self.weight(found, lambda one: one.states[k] != found.states[k])
+        return self.weight(best, lambda other: other.states[k] != best.states[k])
 
-    def rival(self, found: Hypothesis) -> Hypothesis | None:
+    def rival(self, best: Hypothesis) -> Hypothesis | None:
         """The likeliest explanation of the other kind: with a wrong relation, or without one."""
-        others = [one for one in self._known() if bool(one.dropped) != bool(found.dropped)]
+        others = [other for other in self._known() if bool(other.dropped) != bool(best.dropped)]
         return min(others, key=_badness, default=None)
 
-    def weight(self, found: Hypothesis, which: Callable[[Hypothesis], bool]) -> float:
+    def weight(self, best: Hypothesis, which: Callable[[Hypothesis], bool]) -> float:
         """How likely some of the hypotheses are together."""
         known = self._known()
-        weights = np.exp([-0.5 * (one.badness - found.badness) for one in known])
-        return float(weights @ [which(one) for one in known] / weights.sum())
+        weights = np.exp([-0.5 * (other.badness - best.badness) for other in known])
+        return float(weights @ [which(other) for other in known] / weights.sum())
 
     def _known(self) -> list[Hypothesis]:
-        return [one for one in self._solved.values() if np.isfinite(one.badness)]
+        return [solved for solved in self._solved.values() if np.isfinite(solved.badness)]
 
     def _try(self, states: States, dropped: tuple[str, ...] = ()) -> Hypothesis:
         key = states, dropped
@@ -102,31 +102,31 @@ class Search:
         several = [one for _, one in zip(range(_MOST_STARTS), product(*likeliest), strict=False)]
         if len(several) == 1:
             return several[0]
-        return min(several, key=lambda states: Rest(self._case, states).disagreement())
+        return min(several, key=lambda states: ContactAgreement(self._case, states).disagreement())
 
     def _smallest(self, start: States) -> Hypothesis | None:
         """The likeliest of the smallest sets, or single relations, whose test holds; else of all that were solved."""
         tried = [self._try(start, (relation,)) for relation in self._relations(start)]
         for sets in self._sets(start):
             tried += [self._try(states) for states in sets]
-            held = [one for one in tried if one.p_value >= self._level]
+            held = [solved for solved in tried if solved.p_value >= self._level]
             if held:
                 return min(held, key=_badness)
         return min(self._known(), key=_badness, default=None)
 
     def _sets(self, start: States) -> Iterator[list[States]]:
         """States in which some operations are in another than at the start, size by size, the best agreeing first."""
-        rest = Rest(self._case, start)
+        rest = ContactAgreement(self._case, start)
         seen = [k for k, views in enumerate(self._case.views) if views]
         other = {k: [state for _, state in self._beliefs[k] if state != start[k]] for k in seen}
         size = {k: self._size(k, start[k]) for k in other}
         for some in self._grown(size, rest):
-            rated = sorted(((rest.agreement(s), s) for s in some), key=lambda one: (-one[0], one[1]))
+            rated = sorted(((rest.agreement(s), s) for s in some), key=lambda set_: (-set_[0], set_[1]))
             agreeing = [s for p, s in rated if p >= _LENIENT]
             every = (changed(start, s, to) for s in agreeing for to in product(*(other[k] for k in s)))
             yield [states for _, states in zip(range(_MOST_SOLVED), every, strict=False)]
 
-    def _grown(self, size: dict[int, int], rest: Rest) -> Iterator[list[tuple[int, ...]]]:
+    def _grown(self, size: dict[int, int], rest: ContactAgreement) -> Iterator[list[tuple[int, ...]]]:
         """Sets of operations by size; not all of them together."""
         if len(size) <= MOST_EXACT:
             every = [s for m in range(1, len(size)) for s in combinations(size, m)]
@@ -149,27 +149,27 @@ class Search:
         """The likeliest state of an operation in which a view is believed."""
         return next(state for _, state in self._beliefs[k] if set(state) != {GROSS})
 
-    def _refined(self, found: Hypothesis) -> None:
+    def _refined(self, best: Hypothesis) -> None:
         """One state after the other changed for the better, until none is; or relations in place of observations."""
         while True:
-            near = [self._try(states, found.dropped) for states in _near(found.states)]
-            near += [self._try(states, (relation,)) for states, relation in self._instead(found)]
-            best = min(near, key=_badness, default=found)
-            if not best.badness < found.badness:
+            near = [self._try(states, best.dropped) for states in _near(best.states)]
+            near += [self._try(states, (relation,)) for states, relation in self._instead(best)]
+            best = min(near, key=_badness, default=best)
+            if not best.badness < best.badness:
                 return
-            found = best
+            best = best
 
-    def _instead(self, found: Hypothesis) -> Iterator[tuple[States, str]]:
+    def _instead(self, best: Hypothesis) -> Iterator[tuple[States, str]]:
         """A relation in place of an operation that is in doubt and that it depends on."""
-        doubted = [k for k, state in enumerate(found.states) if any(one != INLIER for one in state)]
-        for k in () if found.dropped else doubted:
-            states = changed(found.states, (k,), (self._believed(k),))
+        doubted = [k for k, state in enumerate(best.states) if any(belief != INLIER for belief in state)]
+        for k in () if best.dropped else doubted:
+            states = changed(best.states, (k,), (self._believed(k),))
             yield from ((states, relation) for relation in self._relations(states, k))
 
     def _relations(self, states: States, of: int | None = None) -> Iterator[str]:
         """Relations, or those that depend on an operation, without which the rest agrees."""
         assembly = self._case.observation.assembly
-        rest = Rest(self._case, states)
+        rest = ContactAgreement(self._case, states)
         letters = pattern(assembly).letters - len(assembly.solids)
         for i, arc in enumerate(assembly.arcs()):
             if (of is None or (letters[list(arc)] == of).any()) and rest.agreement((), arc) >= _LENIENT:
@@ -186,16 +186,16 @@ def _near(states: States) -> Iterator[States]:
     """With one view, that is no inlier, in another state."""
     for k, state in enumerate(states):
         for i, now in enumerate(state):
-            others = [one for one in (INLIER, BROAD, GROSS) if one != now] if now != INLIER else []
-            yield from (changed(states, (k,), ((*state[:i], one, *state[i + 1 :]),)) for one in others)
+            others = [belief for belief in (INLIER, BROAD, GROSS) if belief != now] if now != INLIER else []
+            yield from (changed(states, (k,), ((*state[:i], belief, *state[i + 1 :]),)) for belief in others)
 
 
-def _badness(one: Hypothesis) -> float:
-    return one.badness
+def _badness(solved: Hypothesis) -> float:
+    return solved.badness
 
 
 @final
-class Rest:
+class ContactAgreement:
     """How well contacts agree that none of some operations has a part in, linearised once at what was seen."""
 
     def __init__(self, case: Case, states: States) -> None:

@@ -14,16 +14,15 @@ import numpy as np
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, frozen
 
 INLIER = 0
 BROAD = 1
 GROSS = 2
 State = tuple[int, ...]
 """One of these for each view of an operation; empty if it was never seen."""
-ROOM = np.diag(np.repeat([0.5, (8.0 * np.pi**2) ** (1 / 3)], 3) ** 2 / (2.0 * np.pi))
+ROOM = frozen(np.diag(np.repeat([0.5, (8.0 * np.pi**2) ** (1 / 3)], 3) ** 2 / (2.0 * np.pi)))
 """(6, 6): a Gaussian as dense in its middle as poses anywhere in half a metre, turned anyhow, are; [m, rad]."""
-ROOM.flags.writeable = False
 _MOST_TOGETHER = 4
 """Of more views than this only those that agree are believed together."""
 _AGREE = 50.0
@@ -33,7 +32,7 @@ _IMPOSSIBLE = 100.0
 _TURNS = 5
 
 
-class View(NamedTuple):
+class Sighting(NamedTuple):
     """An operation as it was seen once."""
 
     goal: Array
@@ -52,29 +51,29 @@ class Merged(NamedTuple):
     """-2 log of how likely such states and views are, beside one inlier, whatever contacts say."""
 
 
-Views = tuple[tuple[View, ...], ...]
+Sightings = tuple[tuple[Sighting, ...], ...]
 """Those of each operation."""
 
 
-def views_of(observation: Observation) -> Views:
+def views_of(observation: Observation) -> Sightings:
     """What was seen, once at most."""
     return looked_again(((),) * len(observation.goals), observation)
 
 
-def looked_again(views: Views, observation: Observation) -> Views:
+def looked_again(views: Sightings, observation: Observation) -> Sightings:
     """With what was seen this time."""
     new = zip(views, observation.seen, observation.goals, observation.covariance, strict=True)
-    return tuple((*old, View(goal, C)) if seen else old for old, seen, goal, C in new)
+    return tuple((*old, Sighting(goal, C)) if seen else old for old, seen, goal, C in new)
 
 
-def merged(views: Sequence[View], state: State, model: OutlierModel) -> Merged:
+def merged(views: Sequence[Sighting], state: State, model: OutlierModel) -> Merged:
     """What the views of one operation say together."""
     believed = [
-        view if one == INLIER else View(view.goal, view.covariance * model.times**2)
-        for view, one in zip(views, state, strict=True)
-        if one != GROSS
+        view if belief == INLIER else Sighting(view.goal, view.covariance * model.times**2)
+        for view, belief in zip(views, state, strict=True)
+        if belief != GROSS
     ]
-    surprise = sum(model.surprises[one] for one in state)
+    surprise = sum(model.surprises[belief] for belief in state)
     anywhere = _log_volume(ROOM)
     if not believed:
         return Merged(None, ROOM, surprise + anywhere * max(0, len(views) - 1))
@@ -86,7 +85,7 @@ def merged(views: Sequence[View], state: State, model: OutlierModel) -> Merged:
     return Merged(goal, covariance, surprise + length + apart)
 
 
-def beliefs(views: Sequence[View], model: OutlierModel) -> list[tuple[float, State]]:
+def beliefs(views: Sequence[Sighting], model: OutlierModel) -> list[tuple[float, State]]:
     """States of the views of one operation without broad ones, each with its surprise, the likeliest first;
     those that are out of the question are left out.
 
@@ -98,20 +97,20 @@ def beliefs(views: Sequence[View], model: OutlierModel) -> list[tuple[float, Sta
         groups.update(g for size in range(1, m + 1) for g in combinations(range(m), size))
     else:
         groups.update(tuple(j for j in range(m) if i == j or _agree(views[i], views[j])) for i in range(m))
-    found = []
+    rated = []
     for group in groups:
         state = tuple(INLIER if i in group else GROSS for i in range(m))
-        found.append((round(merged(views, state, model).surprise, 6), tuple(-i for i in group[::-1]), state))
-    likely = min(found)[0] + _IMPOSSIBLE
-    return [(surprise, state) for surprise, _, state in sorted(found) if surprise < likely or set(state) == {GROSS}]
+        rated.append((round(merged(views, state, model).surprise, 6), tuple(-i for i in group[::-1]), state))
+    likely = min(rated)[0] + _IMPOSSIBLE
+    return [(surprise, state) for surprise, _, state in sorted(rated) if surprise < likely or set(state) == {GROSS}]
 
 
-def _agree(a: View, b: View) -> bool:
+def _agree(a: Sighting, b: Sighting) -> bool:
     xi = pose.log(pose.inverse(a.goal) @ b.goal)
     return float(xi @ np.linalg.solve(a.covariance + b.covariance, xi)) < _AGREE
 
 
-def _mean(views: Sequence[View]) -> tuple[Array, Array, float]:
+def _mean(views: Sequence[Sighting]) -> tuple[Array, Array, float]:
     """The most likely pose, its covariance, and the squared length of all deviations from it."""
     goals = np.array([view.goal for view in views])
     W = np.linalg.inv([view.covariance for view in views])

@@ -19,9 +19,9 @@ from apo_bench.assembly.lowering import lowered
 from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
 from apo_bench.correction.solvers.gauss_newton import FALL, NearestGoals, damping, settles, shortened_step
-from apo_bench.correction.solvers.linear_step import shortest
+from apo_bench.correction.solvers.linear_step import shortest_z
 from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR, jacobian_rank
-from apo_bench.correction.solvers.whitened import pulled, spread
+from apo_bench.correction.solvers.whitened import pulled, twists_of
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.twist import exp_and_jacobian
@@ -143,7 +143,7 @@ def nearest_between(
         pace = _paced(pace, step, last)
         last = step if rest else shortened_step(step, L)
         z = z + (step if rest else pace * last)
-        D, Jr = exp_and_jacobian(spread(L, z))
+        D, Jr = exp_and_jacobian(twists_of(L, z))
         T = observed @ D
         B = Jr @ L
         before = length
@@ -159,18 +159,18 @@ def _settled(e: Array, Jt: Array, z: Array) -> Array:
     J = Jt.T[None]
     m = len(e)
     mu = damping(float(np.square(J).sum()) / m, float(e @ e) / m, _SETTLED)
-    return np.asarray(shortest(J, e[None], z[None], np.full((1, m), mu))[0])
+    return np.asarray(shortest_z(J, e[None], z[None], np.full((1, m), mu))[0])
 
 
-def active_rank(Jt: Array, inequalities: Inequalities, found: NearestGoals) -> int:
+def active_rank(Jt: Array, inequalities: Inequalities, nearest: NearestGoals) -> int:
     """How many directions the active inequalities fix beyond the equations.
 
     Args:
         Jt: (6 n, 3 c), the transposed Jacobian of the equations.
     """
-    e, J = inequalities.system.linearised(found.goals)
+    e, J = inequalities.system.linearised(nearest.goals)
     at = (e <= inequalities.low + _TOUCH_M) | (e >= inequalities.high - _TOUCH_M)
-    J = pulled(J[at].reshape(int(at.sum()), len(found.z)), found.B)
+    J = pulled(J[at].reshape(int(at.sum()), len(nearest.z)), nearest.B)
     return jacobian_rank(np.concatenate([Jt, J.T], axis=1)) - jacobian_rank(Jt) if at.any() else 0
 
 

@@ -103,13 +103,9 @@ class DenseStep:
             out = self.T, self.B, self.e, self._J, self._forms, self.sizes
             self._kernels.linearised(*seen, z, rows, SERIES, ADJOINTS, *self._scratch, *out)
             return
-        # T = T_seen exp(xi) and B = J_r(xi) L, with xi = L z.
         some = self._views(rows)
         m = max(self.e.shape[1], 1)
-        L = self._L[some]
-        D, Jr = exp_and_jacobian(twists(z[some], L))
-        T = self._observed[some] @ D
-        B = Jr @ L
+        T, B = goals_at(self._observed[some], self._L[some], z[some])
         e, Jt = linearised_by(self._system.only(some), T, B)
         self.T[some] = T
         self.B[some] = B
@@ -129,7 +125,7 @@ class DenseStep:
             return step, length, turned
         some = self._views(rows)
         now = z[some]
-        step = shortest(self._J[some], self.e[some], now, mu[:, None] + self._soft2) - now
+        step = shortest_z(self._J[some], self.e[some], now, mu[:, None] + self._soft2) - now
         return step, np.abs(step).max(axis=1, initial=0.0), turn_of(step, self._L[some])
 
     def _views(self, rows: Rows) -> Any:
@@ -145,7 +141,7 @@ class DenseStep:
             self._forms[which] = self._system.forms(self.T[which])
 
 
-def shortest(J: Array, e: Array, z: Array, added: Array) -> Array:
+def shortest_z(J: Array, e: Array, z: Array, added: Array) -> Array:
     """J^t (J J^t + added)^-1 (J z - e), (b, 6 n): the shortest z that satisfies the linearised equations.
 
     Args:
@@ -158,6 +154,16 @@ def shortest(J: Array, e: Array, z: Array, added: Array) -> Array:
     A.reshape(b, m * m)[:, :: m + 1] += added
     wanted = J @ z[..., None] - e[..., None]
     return np.asarray((Jt @ np.linalg.solve(A, wanted))[..., 0])
+
+
+def goals_at(observed: Array, L: Array, z: Array) -> tuple[Array, Array]:
+    """Goals T = T_seen exp(xi) at xi = L z, (b, n, 4, 4), and B = J_r(xi) L: T(z + d) = T exp(B d + O(d^2)).
+
+    Args:
+        observed: (n, 4, 4) or (b, n, 4, 4); L is (b, n, 6, 6) or (b, n, 6, 6 n), and z (b, 6 n).
+    """
+    D, Jr = exp_and_jacobian(twists(z, L))
+    return observed @ D, Jr @ L
 
 
 def twists(z: Array, L: Array) -> Array:

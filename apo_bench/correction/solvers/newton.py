@@ -65,12 +65,12 @@ def solve_newton(
         goals: (n, 4, 4), where to begin, world frame, [m].
         free: Operations whose motion parameters may change, counted from 0.
     """
-    found = descend(equations, goals, free, cut_off=cut_off, length_m=length_m, turns=turns)
-    if found.at_rest and any(turn.rank > found.rank for turn in found.trace):
-        again = descend(equations, goals, free, cut_off=cut_off, length_m=length_m, turns=turns, at_most=found.rank)
-        if again.at_rest and again.gap_m <= found.gap_m + REST_M:
+    solution = descend(equations, goals, free, cut_off=cut_off, length_m=length_m, turns=turns)
+    if solution.at_rest and any(turn.rank > solution.rank for turn in solution.trace):
+        again = descend(equations, goals, free, cut_off=cut_off, length_m=length_m, turns=turns, at_most=solution.rank)
+        if again.at_rest and again.gap_m <= solution.gap_m + REST_M:
             return again
-    return found
+    return solution
 
 
 def descend(

@@ -69,9 +69,9 @@ def jacobian_rank(Jt: Any) -> int:
     largest = G.diagonal().max()
     if not largest > 0.0:
         return 0
-    R, _, found, _ = dpstrf(G, tol=UNCLEAR[0] * largest)
-    if R[found - 1, found - 1] ** 2 > UNCLEAR[1] * largest:
-        return int(found)
+    R, _, rank, _ = dpstrf(G, tol=UNCLEAR[0] * largest)
+    if R[rank - 1, rank - 1] ** 2 > UNCLEAR[1] * largest:
+        return int(rank)
     w = np.linalg.svd(Jt, compute_uv=False)
     return int(np.count_nonzero(w > RANK_CUT_OFF * w[0]))
 
@@ -90,7 +90,7 @@ def projections(Jt: Any) -> tuple[list[int], Array | None]:
     """
     unknowns = Jt[0].shape[0]
     if unknowns > LARGEST_POSTERIOR:
-        return [jacobian_rank(one) for one in Jt], None
+        return [jacobian_rank(matrix) for matrix in Jt], None
     rank = []
     P = np.empty((len(Jt), unknowns, unknowns))
     for i, each in enumerate(Jt):

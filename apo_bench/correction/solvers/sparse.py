@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.correction.solvers.compact import CompactEquations
-from apo_bench.correction.solvers.linear_step import turn_of, twists
+from apo_bench.correction.solvers.linear_step import goals_at, turn_of
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.twist import exp_and_jacobian
 
 WIDE = 240
 """Rows of a band above which it is no longer worth it."""
@@ -115,10 +114,7 @@ class SparseStep:
         return self._system.forms(self.T)
 
     def linearise(self, z: Array, rows: NDArray[np.intp]) -> None:
-        # T = T_seen exp(xi) and B = J_r(xi) L, with xi = L z.
-        D, Jr = exp_and_jacobian(twists(z, self._L))
-        self.T = self._observed @ D
-        self.B = Jr @ self._L
+        self.T, self.B = goals_at(self._observed, self._L, z)
         e, every = self._system.blocks(self.T[0], self.B[0])
         self.e = e[None]
         self._blocks = every[self._where.contact, self._where.letter]

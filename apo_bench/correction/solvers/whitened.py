@@ -29,11 +29,11 @@ class Whitened:
 
     def goals(self, z: Array) -> Array:
         """T_seen exp(L z), (n, 4, 4)."""
-        return np.asarray(self.observed @ pose.exp(spread(self.factor, z)))
+        return np.asarray(self.observed @ pose.exp(twists_of(self.factor, z)))
 
     def pulled(self, z: Array, J: Array) -> Array:
         """A derivative by the body twists of the goals at z, (m, 6 n), as the derivative by z."""
-        return pulled(J, right_jacobian(spread(self.factor, z)) @ self.factor)
+        return pulled(J, right_jacobian(twists_of(self.factor, z)) @ self.factor)
 
 
 def whitened(observation: Observation) -> Whitened:
@@ -45,7 +45,7 @@ def whitened(observation: Observation) -> Whitened:
     return Whitened(observation.goals, noise_factor(observation))
 
 
-def spread(L: Array, z: Array) -> Array:
+def twists_of(L: Array, z: Array) -> Array:
     """L z by operation: z (6 n,) -> (n, 6), or (6 n, f) -> (n, 6, f)."""
     n = len(L)
     columns = z.shape[1:]
@@ -54,7 +54,7 @@ def spread(L: Array, z: Array) -> Array:
     return np.asarray((L @ z.reshape(n, 6, *(columns or (1,)))).reshape(n, 6, *columns))
 
 
-def unspread(L: Array, xi: Array) -> Array:
+def coordinates_of(L: Array, xi: Array) -> Array:
     """z of body twists xi = L z, (*, n, 6) -> (*, 6 n)."""
     flat = (*xi.shape[:-2], 6 * len(L))
     if L.shape[2] != 6:
@@ -94,7 +94,7 @@ def noise_factor(observation: Observation) -> Array:
 
 def correction_to(observed: Array, L: Array, goals: Array) -> Array:
     """z of goals (*, n, 4, 4), the shortest that leads there from what was seen, (n, 4, 4): (*, 6 n)."""
-    return unspread(L, pose.log(pose.inverse(observed) @ goals))
+    return coordinates_of(L, pose.log(pose.inverse(observed) @ goals))
 
 
 def scales(covariance: Array) -> Array:

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.correction.correctors import correct
-from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, View, beliefs, merged, views_of
+from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, Sighting, beliefs, merged, views_of
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from tests.correction.robust.test_robust import astray, fixed_error_mm, look, shown
@@ -114,7 +114,7 @@ def test_views_that_agree_are_merged_and_believed():
 
 def test_of_views_that_do_not_agree_one_is_believed_the_latest_first():
     one = views_of(look("carried_bridge", 4))[0][0]
-    other = View(one.goal @ pose.exp([0.1, 0.0, 0.0, 0.0, 0.0, 1.0]), one.covariance)
+    other = Sighting(one.goal @ pose.exp([0.1, 0.0, 0.0, 0.0, 0.0, 1.0]), one.covariance)
     assert [state for _, state in beliefs((one, other), MODEL)[:2]] == [(GROSS, INLIER), (INLIER, GROSS)]
     many = beliefs((one, other, one, one, other, one), MODEL)
     assert many[0][1] == (INLIER, GROSS, INLIER, INLIER, GROSS, INLIER)

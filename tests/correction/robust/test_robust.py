@@ -20,7 +20,7 @@ from apo_bench.correction.region import contains_truth
 from apo_bench.correction.robust.hypotheses import Case, hypothesis, soft_deviation
 from apo_bench.correction.robust.robust import RobustCorrector, contact_robust
 from apo_bench.correction.robust.room import crowding
-from apo_bench.correction.robust.search import Rest
+from apo_bench.correction.robust.search import ContactAgreement
 from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, views_of
 from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.posterior import jacobian_rank
@@ -233,7 +233,7 @@ def test_sets_are_scored_as_if_each_were_looked_at_alone(name):
     observation = astray(look(name, 2), 1)
     n = len(observation.goals)
     p = len(observation.assembly.solids)
-    rest = Rest(Case(observation, views_of(observation), OutlierModel()), ((INLIER,),) * n)
+    rest = ContactAgreement(Case(observation, views_of(observation), OutlierModel()), ((INLIER,),) * n)
     e, Jt = linearised_by(seen_system(observation), observation.goals, noise_factor(observation))
     soft = np.hypot(soft_deviation(observation), 3.0 * np.radians(1.0) ** 2 * 0.1)
     found = []
