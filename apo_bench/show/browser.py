@@ -91,7 +91,7 @@ class Page:
             return
         show_moment(self._scene, self._data, still.chapter, still.moment)
         with self._server.atomic():
-            for body, at in zip(self._bodies, body_poses(self._scene, self._data), strict=True):
+            for body, at in zip(self._bodies, body_poses(self._data), strict=True):
                 body.position = at[:3]
                 body.wxyz = at[3:]
             for mesh in self._arm:

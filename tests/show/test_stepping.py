@@ -93,7 +93,7 @@ def test_shapes_are_as_large_as_what_they_stand_for(tower: Scene) -> None:
     chapter = scenario_story(tower).chapters[0]
     data = initial_state(tower.work, chapter.start)
     show_moment(tower, data, chapter, chapter.moments[-1])
-    poses = body_poses(tower, data)
+    poses = body_poses(data)
     found = body_meshes(tower.work)
     assert len(poses) == tower.work.model.nbody
     assert {shape.part for shape in found} == {None, *tower.scenario.assembly.solids}

@@ -1,10 +1,13 @@
 """The human demonstrates, the robot replays, physics decides."""
 
+import re
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from apo_bench import simulation
 from apo_bench.assembly.goals import Demonstration, Layout, Plan, Step
 from apo_bench.assembly.reached import ReplayResult
 from apo_bench.geometry import pose
@@ -189,3 +192,12 @@ def test_the_controller_follows_a_line_without_turning_the_part(tower: Scene) ->
     robot.follow(smooth(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), 0.2), 0.2))
     assert worst[0] < 0.3
     assert worst[1] < 0.05
+
+
+def test_the_room_says_by_which_files_a_plan_goes_and_steps_are_taken_where_it_says() -> None:
+    folder = Path(simulation.__file__).parent
+    named = re.findall(r"`([a-z_/]+\.py)`", simulation.__doc__ or "")
+    assert all((folder / each).is_file() for each in named)
+    stepping = {str(each.relative_to(folder)) for each in folder.rglob("*.py") if "mujoco.mj_step(" in each.read_text()}
+    assert stepping == {"robot/robot.py", "human/hands.py", "arms/rig.py", "settling.py"}
+    assert stepping & set(named) == {"robot/robot.py", "human/hands.py"}

@@ -181,4 +181,4 @@ def test_a_human_puts_a_peg_into_a_bore_and_the_robot_repeats_it(scene: Scene, m
     assert inside[:3, 2] == pytest.approx([0.0, 0.0, 1.0], abs=1e-3)
     assert inside[2, 3] == pytest.approx(0.025, abs=1e-5)
     lifted, brought = held[-2:]
-    assert np.linalg.norm((brought - lifted)[:3, 3]) < 2e-5  # see test_steadying.py
+    assert np.linalg.norm((brought - lifted)[:3, 3]) < 2e-5  # see test_in_hand.py

@@ -26,8 +26,8 @@ _Refused = Literal["unreachable_start", "unreachable"]
 def arm_moves(plan: Plan, scene: Scene, searches: bool = False) -> tuple[ArmMove, ...]:
     """Every transfer of a plan as the arm of a scene would do it.
 
-    Of the usual arm, and of an `Arm` that was made without a description, only reach is looked at: what is foretold
-    without an arm was found with that one.
+    Of the usual arm, and of an `Arm` that was made without a description, only reach is looked at: predictions
+    without an arm were tuned with that one.
 
     Args:
         searches: As in `moves`.

@@ -38,7 +38,7 @@ _COLORS = {True: (20, 120, 50), False: (180, 30, 25), None: _INK}
 _WIDTH = 720
 _HEIGHT = 480
 _INSET = (192, 128)
-SPEED = 2.0
+_SPEED = 2.0
 _FPS = 20.0
 _GIF_FPS = 8.0
 _ENDING_S = 2.5
@@ -104,27 +104,29 @@ def _font() -> Any:
     return ImageFont.truetype(str(fonts / "DejaVuSans.ttf"), _TEXT_PX)
 
 
-def write_film(
-    assembly: Assembly, assembled: Poses, chapters: Sequence[Chapter], path: str | Path, speed: float = SPEED
-) -> None:
+def write_film(assembly: Assembly, assembled: Poses, chapters: Sequence[Chapter], path: str | Path) -> None:
     """Write chapters one after the other as MP4 or GIF, by the ending of `path`.
 
     Args:
         assembled: Where the parts are when all is done: the camera looks at them.
-        speed: How many times as fast as it was it is shown; stated in the picture.
 
     Raises:
         InputError: Another ending, a place that cannot be written, or there is nothing to draw with.
     """
     fps = _GIF_FPS if Path(path).suffix.lower() == ".gif" else _FPS
-    timed = frames(assembly, assembled, chapters, speed, fps)
+    timed = frames(assembly, assembled, chapters, fps=fps)
     save_film((picture for picture, seconds in timed for _ in range(round(seconds * fps))), path, fps)
 
 
 def frames(
-    assembly: Assembly, assembled: Poses, chapters: Sequence[Chapter], speed: float = SPEED, fps: float = _FPS
+    assembly: Assembly, assembled: Poses, chapters: Sequence[Chapter], speed: float = _SPEED, fps: float = _FPS
 ) -> Iterator[tuple[NDArray[np.uint8], float]]:
-    """The pictures of a film one after the other, and how long each is shown, [s]."""
+    """The pictures of a film one after the other, and how long each is shown, [s].
+
+    Args:
+        assembled: Where the parts are when all is done: the camera looks at them.
+        speed: How many times as fast as it was it is shown; stated in the picture.
+    """
     near = _looks_at(assembly, [assembled])
     for chapter in chapters:
         wide = _looks_at(assembly, [assembled, chapter.start])

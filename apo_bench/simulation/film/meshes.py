@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import World
 
 _AROUND = 32
@@ -49,8 +48,8 @@ def body_meshes(world: World) -> tuple[BodyMesh, ...]:
     return tuple(BodyMesh(body, part, *_joined(each), rgba) for (body, part, rgba), each in meshes.items())
 
 
-def body_poses(scene: Scene, data: Any) -> Array:
-    """Where every body of the world of the robot is, (bodies, 7): x, y, z [m], then a quaternion, w first."""
+def body_poses(data: Any) -> Array:
+    """Where every body of a world is, (bodies, 7): x, y, z [m], then a quaternion, w first."""
     return np.hstack([data.xpos, data.xquat])
 
 

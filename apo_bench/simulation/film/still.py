@@ -128,7 +128,7 @@ def show_moment(scene: Scene, data: Any, chapter: Chapter, moment: FilmMoment) -
 def draw_over(scene: Scene, still: Still, drawn: Any) -> None:
     """Draw ghosts, hands and names of faces into an abstract scene of MuJoCo (`mjvScene`), after what it holds."""
     for ghost in still.ghosts:
-        _draw_ghost(scene, still.chapter.start, ghost, drawn)
+        _draw_ghost(scene, ghost, drawn)
     for hand in still.moment.hands:
         _geom(drawn, mujoco.mjtGeom.mjGEOM_SPHERE, HAND_M, hand, (*HAND_COLOR, 0.8))
     poses = part_poses(still.chapter, still.moment)
@@ -147,7 +147,7 @@ def label_place(scene: Scene, of: PartFace) -> Array:
     return np.asarray(face.ends.mean(axis=0) + float(np.mean(face.radii)) * face.frame[:3, 0])
 
 
-def _draw_ghost(scene: Scene, start: Poses, ghost: Ghost, drawn: Any) -> None:
+def _draw_ghost(scene: Scene, ghost: Ghost, drawn: Any) -> None:
     world = scene.work
     model = scene.work.model
     data = mujoco.MjData(model)

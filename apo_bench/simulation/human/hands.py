@@ -88,7 +88,7 @@ class Hands:
         done = 0
         for begin, end in [(0, max(counts))] if len(moves) > 1 else self._spans(*moves[0], counts[0]):
             if begin > done:
-                self._pass(begin - done, partial(self._leap, *moves[0], counts[0], done))
+                self._pass(begin - done, partial(self._fast_forward, *moves[0], counts[0], done))
             self._run(moves, counts, np.arange(begin + 1, end + 1))
             done = end
         for hand, line in moves:
@@ -117,7 +117,7 @@ class Hands:
         spans = near_spans(self.scene, self.data, moving, held, line, s, self.world, _RUN_UP_S, _NEAR_M)
         return spans if spans and spans[-1][1] == n else [*spans, (n, n)]
 
-    def _leap(self, hand: int, line: Trajectory, n: int, begin: int, data: Any, steps: int) -> None:
+    def _fast_forward(self, hand: int, line: Trajectory, n: int, begin: int, data: Any, steps: int) -> None:
         """Be so many steps further on a line at once, with what is held."""
         at = begin + steps + np.array([0.0, TINY_S / self._step_s])  # then, and a little later, in steps
         after, later = line.poses(line.progress(_trailing(at, n, self._step_s)))

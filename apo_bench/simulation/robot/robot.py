@@ -251,7 +251,7 @@ class Robot:
         return np.asarray(pose.inverse(self.tip()) @ part_pose(self.scene.work, self.data, self.forces.held[0]))
 
     def slip(self, operation: int) -> None:
-        """What is in the hand moves along the pads, if the robot's errors have it so; nobody is told."""
+        """What is in the hand moves along the pads, if the robot's errors have it so; nothing else learns of it."""
         held = self.forces.held
         if self._error is None or not held or not self._error.slips(operation):
             return

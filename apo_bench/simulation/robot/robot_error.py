@@ -1,6 +1,6 @@
 """What is wrong with one robot during one trial: drawn before, and met only by the physics.
 
-Whoever plans, foretells or corrects knows the robot as it should be. Guards still act on the forces that are felt.
+Whoever plans, predicts or corrects knows the robot as it should be. Guards still act on the forces that are felt.
 """
 
 from dataclasses import dataclass, replace

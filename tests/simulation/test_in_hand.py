@@ -1,4 +1,4 @@
-"""What is carried freely stays where it is in the hand, and nothing else is held there."""
+"""What is carried freely stays where it is in the hand, nothing else is held there, and what moves there is noted."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.robot import robot as module
-from apo_bench.simulation.robot.in_hand import SLIPS_M, Carried, steadied
+from apo_bench.simulation.robot.in_hand import SLIPS_M, Carried, HoldWatch, steadied
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.scene.world import World, initial_state, part_pose, place, touch_others
@@ -125,3 +125,23 @@ def test_the_ideal_gripper_needs_no_help(tower: Scene) -> None:
     robot.forces.hold("stick")
     robot.steady(True)
     assert robot._carried is None
+
+
+GRASPED = pose.at((0.01, 0.02, 0.03), (0.0, 90.0, 20.0))
+"""A part in the frame of the tip."""
+
+
+def test_a_shaft_that_rolls_between_the_pads_turns_about_the_point_between_them_and_slides_nowhere():
+    rolled = pose.at((0.0, 0.0, 0.0), (30.0, 0.0, 0.0)) @ GRASPED
+    (moved,) = HoldWatch().grasp(GRASPED).carry(GRASPED).release(rolled).finish(2).finished
+    assert (moved.operation, moved.carried_m, moved.carried_rad) == (2, 0.0, pytest.approx(0.0, abs=1e-7))
+    assert moved.moved_m == pytest.approx(0.0, abs=1e-12)
+    assert moved.moved_rad == pytest.approx(np.radians(30.0))
+
+
+def test_the_larger_one_counts_of_two_grips_and_what_was_never_held_is_left_out():
+    slid = pose.at((0.0, 0.0, 0.004)) @ GRASPED
+    watch = HoldWatch().finish(0).grasp(GRASPED).carry(slid).release(slid).grasp(slid).release(slid).finish(1)
+    (moved,) = watch.finished
+    assert (moved.operation, moved.carried_m, moved.moved_m) == (1, pytest.approx(0.004), pytest.approx(0.004))
+    assert watch.grasped is None
