@@ -13,7 +13,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench.assembly.goals import Demonstration, Layout, Observation, placements
-from apo_bench.envs.apo_replay import LARGEST_DEVIATION, ROOM_M, packed
+from apo_bench.envs.spaces import LARGEST_DEVIATION, ROOM_M, packed
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.models import anisotropic

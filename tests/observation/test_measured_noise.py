@@ -14,7 +14,7 @@ from scipy.stats import chi2
 
 from apo_bench.assembly.goals import Observation
 from apo_bench.cli.app import main
-from apo_bench.envs.apo_replay import LARGEST_DEVIATION
+from apo_bench.envs.spaces import LARGEST_DEVIATION
 from apo_bench.errors import InputError
 from apo_bench.files.bop import read_results
 from apo_bench.files.bop_truth import read_truth
