@@ -1,9 +1,9 @@
 """The only room that knows MuJoCo and mink: scenes, hands, the arm, replay, pictures.
 
 How a plan is carried out, to be read in this order: `execution/controller.py` (`replay`, one step of the schedule after
-the other), `execution/prepare.py` (a step becomes a `Transfer`: grips, lines, guards), `execution/carry_out.py` and
-`execution/attach.py` (one operation, as motions of the tip), `robot/robot.py` (a line of the tip becomes joint targets,
-one for each `mj_step`). Hands that demonstrate: `human/demonstration.py`, `human/perform.py`, `human/hands.py`.
+the other), `execution/prepare.py` (a step becomes a `Transfer`: grips, lines, guards), `execution/carry_out.py` (one
+operation, as motions of the tip), `robot/robot.py` (a line of the tip becomes joint targets, one for each `mj_step`).
+Hands that demonstrate: `human/demonstration.py`, `human/perform.py`, `human/hands.py`.
 """
 
 from apo_bench.simulation.scene.graphics import import_mujoco
