@@ -84,6 +84,7 @@ def _loops(raw: RawSolid, region: Region) -> Iterator[tuple[Any, set[int]]]:
     back = mine[k] & ~mine[i]
     edges = np.concatenate([mesh.edges[forth], mesh.edges[back][:, ::-1]]).tolist()
     others = np.concatenate([of[k[forth]], of[i[back]]]).tolist()
+    # From each corner to the next one, until a loop closes; a corner in which two loops touch has two ways on.
     after: dict[int, list[tuple[int, int]]] = {}
     for (a, b), other in zip(edges, others, strict=True):
         after.setdefault(a, []).append((b, other))

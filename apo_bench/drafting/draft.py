@@ -159,6 +159,7 @@ def _struck(
     hold: PadPlace, below_m: float, T: Array, solids: Mapping[str, Solid], poses: Poses, others: Sequence[str]
 ) -> bool:
     """Whether a finger beside a part at T would be in one of the others, or so far below it."""
+    # Two boxes beside the part, in a frame with x across the pads and z up, from below their tips to above the part.
     up = T[2, :3]
     out = hold.half_width + _FINGER_M[0] - _ROOM_M
     high = 0.025 - below_m / 2

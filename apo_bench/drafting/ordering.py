@@ -112,6 +112,7 @@ class OrderSearch:
             self.stuck[main] = f"'{main}' touches nothing that would be there before it"
             return None
         poses = self.poses
+        # A part that is put back must rest: something is below it, and its weight is over what carries it.
         falls = min(drop(self.solids[m], poses[m], self.solids[r], poses[r]) for m in moves for r in rest)
         if falls > _FALLS_M:
             self.stuck[main] = f"nothing is below '{main}' that would carry it"
@@ -120,6 +121,7 @@ class OrderSearch:
         if imbalance(assembly, Operation(main, closes, tuple(moves[1:])), poses) > BALANCED:
             self.stuck[main] = f"'{main}' would not keep its balance on what is there before it"
             return None
+        # It must come along a straight way, which the macros of its contacts give, with nothing in the way.
         arrival = arrive(assembly, moves, closes, poses)
         others = ", ".join(dict.fromkeys(of.part for contact in closes for of in contact if of.part in rest))
         if not arrival.free:

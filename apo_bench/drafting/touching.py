@@ -61,6 +61,7 @@ def closed(
         off = [_off(solids, solved, contact) for contact in kept]
         if not kept or max(off) <= 1.0:
             return solved, tuple(kept), tuple(dropped)
+        # Contacts contradict each other: the one that is left farthest open goes, and all are closed again.
         dropped.append(kept.pop(int(np.argmax(off))))
 
 

@@ -139,6 +139,8 @@ def _with_room(
     places: dict[str, Array] = {}
     taken = list[tuple[Array, Array]]()
     for part in sorted(boxes, key=lambda part: -float(np.prod(boxes[part][1] - boxes[part][0]))):
+        # The first place on the grid at which its box is clear of the others, and of the discs: of a disc, the point of
+        # the box that is nearest to its middle is.
         low, high = boxes[part]
         for middle in _grid():
             a = middle - (high - low) / 2

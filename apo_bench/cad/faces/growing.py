@@ -36,6 +36,7 @@ def walls_of(mesh: Mesh, facets: Facets) -> list[FoundWall]:
         if len(group) < _FEWEST:
             continue
         inside = np.isin(facets.smooth[:, 0], group)
+        # Most smooth surfaces are one wall, such as a hole: then one fit to all of it is enough.
         whole = _grown(mesh, facets, group, inside, _whole_starts(mesh, facets, group, inside))
         work -= 2 * len(group)
         if whole is not None and len(whole.members) == len(group):
@@ -58,6 +59,8 @@ def _add_from_edges(mesh: Mesh, facets: Facets, group: Any, inside: Any, walls: 
             continue
         if work < 0 or failed > _MOST_FAILED:
             break
+        # A cylinder is tried before a cone, as a cone fits to every cylinder, too; a start that does not even hold the
+        # pieces that it was made of is not worth a fit.
         best = None
         for cone in (False, True):
             start, near = (_seed_cone if cone else _seed_cylinder)(mesh, facets, row, around, taken)
@@ -105,6 +108,7 @@ def _seed_cylinder(
     near = np.unique(facets.smooth[rows])
     if length < 1e-9 * mesh.extent:
         return None, near
+    # Edges of a cylinder's strips are parallel to its axis, so all ends of those beside this one lie on the cylinder.
     axis = (b - a) / length
     ends = mesh.corners[facets.along[rows]]
     along = ends[:, 1] - ends[:, 0]
@@ -118,6 +122,7 @@ def _seed_cone(
     mesh: Mesh, facets: Facets, row: int, around: dict[int, list[int]], taken: Any
 ) -> tuple[Round | None, Any]:
     """The cone of the pieces that meet at one angle, one after the other; and these pieces."""
+    # Strips of one tessellated cone meet at one angle; from the first piece outwards over edges with nearly this angle.
     angle = facets.angle[row]
     members = {int(facets.smooth[row, 0])}
     rows = set()
@@ -171,6 +176,7 @@ def _grown(
                 break
             count = len(members)
             loose = 1.0
+            # Only corners of edges within the surface: those on its border may belong to a chamfer or a fillet.
             both = inside & np.isin(facets.smooth, members).all(axis=1)
             points = mesh.corners[np.unique(facets.along[both])]
             surface = refined(surface, points, cone) if len(points) >= 6 else None

@@ -68,6 +68,8 @@ def _cut(
             if body.volume() < least:
                 continue
             each = CutPart(body, along)
+            # The first of the best planes that leaves something on both sides; through a cavity if there is one, since
+            # no plane of a reflex edge may reach it.
             planes = _planes_to_cut(body, size, flats, only_flats) if cuts[0] > 0 else []
             for n, d in [*planes[:_TRIES], *_through_cavity(body, least)]:
                 halves = each.halves(n, d, _HAIR * size)
@@ -102,6 +104,7 @@ def _planes_to_cut(body: Any, size: float, flats: Array, only_flats: bool) -> li
     """Planes of reflex edges, as the flat face in them has it."""
     planes = []
     for plane in _reflex_planes(body, size):
+        # The side of a body is rounded by the cuts before; the plane of the face that it lies on is not.
         cosine = flats[:, :3] @ plane[:3]
         same = (np.abs(cosine) > 1.0 - 1e-6) & (np.abs(flats[:, 3] * np.sign(cosine) - plane[3]) < _HAIR * size)
         if same.any() or not only_flats:
@@ -125,6 +128,7 @@ def _halved(part: CutPart, size: float, volume: float) -> list[CutPart]:
     parts = [CutPart(each, part.planes) for each in body.decompose()]
     spare = [_spare(each) for each in parts]
     while parts and len(parts) < _MOST_BISECTED and max(spare) > _ROUGH * volume / len(parts):
+        # The part whose hull fills most beyond it; one that no cut makes better counts as done.
         k = int(np.argmax(spare))
         halves = _best_halves(parts[k])
         parts[k : k + 1] = halves

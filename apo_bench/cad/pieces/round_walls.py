@@ -69,6 +69,7 @@ def _between(a: Region, b: Region) -> Array | None:
     off = b.point - a.point
     off = off - off @ a.direction * a.direction
     gap = float(np.linalg.norm(off))
+    # Parallel axes: the plane is square to the shortest way between them, in the middle of what is left between walls.
     room = gap - max(a.radii) - max(b.radii)
     if room <= 0.0:
         return None
@@ -89,6 +90,7 @@ def _meets(part: Any, bore: Region) -> bool:
     height, _, _ = bore.polar(corners)
     if height.max() < bore.span[0] + SAME_CORNER_MM or height.min() > bore.span[1] - SAME_CORNER_MM:
         return False
+    # Seen along the axis a convex part is the hull of its corners, and the axis is the origin.
     flat = (corners - bore.point) @ np.column_stack(bore.across)
     return bool(MultiPoint(flat).convex_hull.distance(Point(0.0, 0.0)) < max(bore.radii) - SAME_CORNER_MM)
 
@@ -128,6 +130,8 @@ def with_round_shafts(corners: Array, shafts: Sequence[Region]) -> Array:
         on = _on_wall(corners, shaft) & ~dropped
         if on.sum() < 3:
             continue
+        # Rings of corners, level by level. New ones lie on the true circle: between two sides more of them bring the
+        # sides nearer to the wall.
         count = sides_of(1e-3 * max(shaft.radii))
         for h in np.unique(np.round(height[on], 3)):
             mine = on & (np.abs(height - h) < 2e-3)
@@ -181,6 +185,7 @@ def _as_cylinder(piece: Hull, shaft: Region) -> Hull | None:
     high = float(height.max())
     if len(corners) < 16 or 5e-4 * (high - low) < THINNEST_M:
         return None
+    # Every corner is on one of two level circles of the wall: the hull is a prism that stands for the cylinder.
     level = np.minimum(height - low, high - height) < SAME_CORNER_MM
     if not (level & (np.abs(distance - radius) < 1e-5 * radius + 1e-5)).all():
         return None
