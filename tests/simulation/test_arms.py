@@ -78,8 +78,8 @@ def test_the_primitive_arms_have_the_published_kinematics() -> None:
 def six_axis_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Today's arm, as a stranger would describe it."""
     path = tmp_path_factory.mktemp("arm") / "mine.toml"
-    said = ('schema = "apo-bench/arm/1"', f'mjcf = "{ARMS / "six_axis.xml"}"', 'flange = "gripper"')
-    path.write_text("\n".join((*said, "home_deg = [0, 11.46, 51.57, 0, 26.93, 0]", "base = {at_mm = [-420, 0, 0]}")))
+    lines = ('schema = "apo-bench/arm/1"', f'mjcf = "{ARMS / "six_axis.xml"}"', 'flange = "gripper"')
+    path.write_text("\n".join((*lines, "home_deg = [0, 11.46, 51.57, 0, 26.93, 0]", "base = {at_mm = [-420, 0, 0]}")))
     return path
 
 
@@ -127,10 +127,10 @@ def test_inverse_kinematics_brings_the_tip_there_and_keeps_the_elbow(name: str) 
     for shift in (0.1, -0.1, 0.0):
         T = np.array(home)
         T[1, 3] += shift
-        found = kinematics.inverse(T, q)
-        assert found is not None
-        np.testing.assert_allclose(kinematics.forward(found), T, atol=2e-5)
-        q = found
+        reached = kinematics.inverse(T, q)
+        assert reached is not None
+        np.testing.assert_allclose(kinematics.forward(reached), T, atol=2e-5)
+        q = reached
     np.testing.assert_allclose(q, arm.home, atol=1e-3)
 
 
@@ -219,15 +219,15 @@ def test_what_is_wrong_in_a_file_is_said_in_one_sentence(tmp_path: Path, text: s
 
 def test_arm_check_says_in_numbers_what_the_arm_can_do() -> None:
     """Of the arm with a linkage: all three layouts are reached, its tip keeps within half of the clearance."""
-    found = check_arm(find_arm("ur5e_primitive"), load_scenario("block_on_block"), layouts=3)
-    assert found.layouts_reached == 3
-    assert found.opening_mm == pytest.approx(85.6, abs=0.5)
-    assert [error.speed for error in found.tip_errors] == [0.01, 0.06, 0.5]
-    assert found.tip_errors[1].across_mm < found.clearance_mm / 2
-    assert found.rest_error_mm < 0.01
-    assert (found.margins_deg > 5.0).all()
-    assert found.missing == ()
-    assert len(list(check_lines(found))) == 12
+    report = check_arm(find_arm("ur5e_primitive"), load_scenario("block_on_block"), layouts=3)
+    assert report.layouts_reached == 3
+    assert report.opening_mm == pytest.approx(85.6, abs=0.5)
+    assert [error.speed for error in report.tip_errors] == [0.01, 0.06, 0.5]
+    assert report.tip_errors[1].across_mm < report.clearance_mm / 2
+    assert report.rest_error_mm < 0.01
+    assert (report.margins_deg > 5.0).all()
+    assert report.missing == ()
+    assert len(list(check_lines(report))) == 12
 
 
 def test_arms_of_collections_are_looked_up_and_never_fetched(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -258,9 +258,9 @@ def test_a_gripper_that_hardly_pushes_is_made_stronger_and_this_is_said(
     arm = read_arm(described(tmp_path, said))
     assert arm.hand is not None
     assert arm.hand.force_n == pytest.approx(force_n, rel=0.02)
-    found = re.search("made from the model, gripper drive (.*) times as strong as in the model", arm.control)
-    assert found is not None
-    assert float(found[1]) == pytest.approx(times, rel=0.04)
+    match = re.search("made from the model, gripper drive (.*) times as strong as in the model", arm.control)
+    assert match is not None
+    assert float(match[1]) == pytest.approx(times, rel=0.04)
 
 
 def test_fingers_that_turn_on_hinges_hold_by_their_edges_and_this_is_said(tmp_path: Path) -> None:

@@ -284,8 +284,8 @@ class Restless:
 def test_what_rocks_on_is_followed_in_parts_of_a_step_with_bounded_patience():
     forever = Restless(np.inf)
     soon = Restless(3)
-    for one in (forever, soon):
-        _until_rest(one)
+    for case in (forever, soon):
+        _until_rest(case)
     assert len(forever.parts) == round(PATIENCE_S / LOOK_S)
     lengths = [parts for parts, _ in groupby(forever.parts)]
     assert lengths == [1, 4, 8, 2, 3]

@@ -16,13 +16,13 @@ from apo_bench.simulation.scene.scene import build_scene
 def moments(*forces: float) -> list[FilmMoment]:
     """Moments of operations 1, 1, .., 2, 20 ms apart."""
     operations = [0] * (len(forces) - 1) + [1]
-    made = zip(operations, forces, strict=True)
-    return [FilmMoment(0.02 * i, np.zeros(1), Doing(k, "carry", f), np.zeros((0, 3))) for i, (k, f) in enumerate(made)]
+    pairs = zip(operations, forces, strict=True)
+    return [FilmMoment(0.02 * i, np.zeros(1), Doing(k, "carry", f), np.zeros((0, 3))) for i, (k, f) in enumerate(pairs)]
 
 
 def test_a_force_between_two_pictures_is_said_with_the_next() -> None:
-    found = [(round(m.time_s / 0.02), f, most) for m, f, most in sampled(moments(0, 1, 7, 2, 1, 0, 0.5), 0.08)]
-    assert found == [(0, 0, 0), (4, 7, 7), (6, 0.5, 0.5)]
+    samples = [(round(m.time_s / 0.02), f, most) for m, f, most in sampled(moments(0, 1, 7, 2, 1, 0, 0.5), 0.08)]
+    assert samples == [(0, 0, 0), (4, 7, 7), (6, 0.5, 0.5)]
 
 
 def test_a_trial_is_told_operation_by_operation_and_shown() -> None:

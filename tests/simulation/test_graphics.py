@@ -43,9 +43,14 @@ def python(code: str, backend: str | None) -> subprocess.CompletedProcess[str]:
     """Run it in a process without a display, MUJOCO_GL as given."""
     kept = {k: v for k, v in os.environ.items() if k not in ("MUJOCO_GL", "PYOPENGL_PLATFORM", "DISPLAY")}
     kept.pop("WAYLAND_DISPLAY", None)
-    given = {} if backend is None else {"MUJOCO_GL": backend}
+    variables = {} if backend is None else {"MUJOCO_GL": backend}
     return subprocess.run(
-        [sys.executable, "-c", code], env={**kept, **given}, capture_output=True, text=True, timeout=120, check=False
+        [sys.executable, "-c", code],
+        env={**kept, **variables},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
     )
 
 

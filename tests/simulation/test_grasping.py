@@ -98,8 +98,8 @@ def test_a_part_beside_another_is_taken_where_there_is_room_for_the_fingers(fixt
     plan = nominal(fixture)
     poses = placements(plan.assembly, plan.start, plan.goals)[2]
     place = RestingPart(poses["cube"], obstacles(plan.assembly.solids, poses, ("cube",)))
-    found = grasp_at(fixture, "cube", Grasp(np.array([0.0, 0.0, 0.008]), np.array([0.0, 1.0, 0.0])), [place])
-    assert abs(found.across[0]) == 1.0
+    grasp = grasp_at(fixture, "cube", Grasp(np.array([0.0, 0.0, 0.008]), np.array([0.0, 1.0, 0.0])), [place])
+    assert abs(grasp.across[0]) == 1.0
 
 
 def test_a_clear_preferred_grasp_is_kept(fixture: Scene) -> None:
@@ -214,9 +214,9 @@ def test_where_a_wall_stands_a_bracket_is_held_by_its_other_sides(tmp_path: Path
     around = obstacles(scene.scenario.assembly.solids, scene.scenario.start, ("part",))
     wall = obstacle((Box("wall", np.array([0.018, 0.03, 0.03]), np.array([0.03, 0.005, 0.03])),), T)
     assert grasp_at(scene, "part", SIDEWAYS, [RestingPart(T, around)]) is SIDEWAYS
-    found = grasp_at(scene, "part", SIDEWAYS, [RestingPart(T, (*around, wall))])
-    assert abs(found.across[0]) == 1.0
-    assert half_width(scene.pieces["part"], found, T) == pytest.approx(0.005)
+    grasp = grasp_at(scene, "part", SIDEWAYS, [RestingPart(T, (*around, wall))])
+    assert abs(grasp.across[0]) == 1.0
+    assert half_width(scene.pieces["part"], grasp, T) == pytest.approx(0.005)
 
 
 def test_no_part_is_centred_where_fingers_would_close_flush_with_a_wall(tmp_path: Path) -> None:
@@ -226,8 +226,8 @@ def test_no_part_is_centred_where_fingers_would_close_flush_with_a_wall(tmp_path
     for half, clear in ((0.005, False), (0.002, True)):
         size = np.array([half, 0.01, 0.02])
         walls = [Box(f"wall{side}", np.array([0.005, side * 0.0205, 0.02]), size) for side in (-1, 1)]
-        found = clear_across(scene, "part", T[:3, 0], RestingPart(T, (*around, obstacle(tuple(walls), T))))
-        assert (found is not None) == clear
+        grasp = clear_across(scene, "part", T[:3, 0], RestingPart(T, (*around, obstacle(tuple(walls), T))))
+        assert (grasp is not None) == clear
 
 
 def test_the_robot_carries_an_l_shaped_bracket_by_its_arm(tmp_path: Path) -> None:

@@ -34,12 +34,12 @@ def scene(tmp_path_factory: pytest.TempPathFactory) -> Scene:
 
 def corners_in(world: World, data: mujoco.MjData, geom: str) -> np.ndarray:
     """The corners of a mesh as it collides, (k, 3), world."""
-    found = world.model.geom(geom)
-    k = int(found.dataid[0])
+    geom_of_model = world.model.geom(geom)
+    k = int(geom_of_model.dataid[0])
     first = int(world.model.mesh_vertadr[k])
     count = int(world.model.mesh_vertnum[k])
-    R = data.geom_xmat[found.id].reshape(3, 3)
-    p = data.geom_xpos[found.id]
+    R = data.geom_xmat[geom_of_model.id].reshape(3, 3)
+    p = data.geom_xpos[geom_of_model.id]
     return np.asarray(world.model.mesh_vert[first : first + count] @ R.T + p)
 
 

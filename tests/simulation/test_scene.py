@@ -86,9 +86,9 @@ def test_inverse_kinematics_inverts_the_forward() -> None:
     for _ in range(50):
         q = home + rng.uniform(-0.4, 0.4, 6)
         T = kinematics.forward(q)
-        found = kinematics.inverse(T, home)
-        assert found is not None
-        np.testing.assert_allclose(kinematics.forward(found), T, atol=2e-5)
+        q = kinematics.inverse(T, home)
+        assert q is not None
+        np.testing.assert_allclose(kinematics.forward(q), T, atol=2e-5)
 
 
 def test_what_is_out_of_reach_has_no_joint_angles() -> None:

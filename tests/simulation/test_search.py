@@ -78,10 +78,10 @@ def test_a_peg_off_by_more_than_the_play_finds_its_hole_only_by_searching():
 
 def test_what_is_farther_off_than_the_spiral_is_not_found():
     plan = aside("stick_in_tower", 5.0)
-    found = carried_out(plan, "stick_in_tower", True)
-    assert (found.result.outcome.stage, found.result.outcome.code) == ("attach", "force_stop")
-    assert not found.verdict.success
-    assert found.result.sim_seconds < carried_out(plan, "stick_in_tower", False).result.sim_seconds + 30.0
+    attempt = carried_out(plan, "stick_in_tower", True)
+    assert (attempt.result.outcome.stage, attempt.result.outcome.code) == ("attach", "force_stop")
+    assert not attempt.verdict.success
+    assert attempt.result.sim_seconds < carried_out(plan, "stick_in_tower", False).result.sim_seconds + 30.0
 
 
 def row(method, level, cache=None):
@@ -98,10 +98,10 @@ def test_where_no_hole_is_missed_nothing_changes():
 
 
 def test_shared_beginnings_change_no_byte():
-    asked = [("none", 0.1), ("search", 0.1), ("contact+search", 0.1), ("contact", 0.1), ("search", 0.1), ("none", 0.1)]
+    cases = [("none", 0.1), ("search", 0.1), ("contact+search", 0.1), ("contact", 0.1), ("search", 0.1), ("none", 0.1)]
     cache = ReplayCache()
-    shared = [json.dumps(row(*each, cache)) for each in asked]
-    alone = [json.dumps(row(*each)) for each in asked[:4]]
+    shared = [json.dumps(row(*each, cache)) for each in cases]
+    alone = [json.dumps(row(*each)) for each in cases[:4]]
     assert shared == [*alone, alone[1], alone[0]]
     none, search = (json.loads(each) for each in alone[:2])
     assert (none["failure_code"], none["spec_hash"]) == ("force_stop", search["spec_hash"])
@@ -171,8 +171,8 @@ def test_the_tip_goes_where_a_law_says():
     its = scene("stick_in_tower")
     robot = Robot(its, layout("stick_in_tower").start)
     before = robot.T
-    asked = iter([np.array([1e-3, -1e-3, 1e-3]) * s for s in np.linspace(0.0, 1.0, 200)])
-    robot.servo(lambda _: next(asked, None))
+    offsets = iter([np.array([1e-3, -1e-3, 1e-3]) * s for s in np.linspace(0.0, 1.0, 200)])
+    robot.servo(lambda _: next(offsets, None))
     assert robot.T[:3, 3] - before[:3, 3] == pytest.approx([1e-3, -1e-3, 1e-3])
     reached = its.kinematics.forward(robot.q)
     assert reached == pytest.approx(robot.T, abs=2e-5), "straight joint motions leave the line by some micrometres"
