@@ -31,8 +31,8 @@ from apo_bench.report.figures.sheet import draw
 from apo_bench.report.tables.forecasts import recognition_table
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.statistics.contacts import Recognition, recognitions
 from apo_bench.statistics.forecasts import ALL
-from apo_bench.statistics.recognition import Recognition, recognitions
 from apo_bench.trial.recognised_contacts import count_contacts, recognise_by
 from apo_bench.trial.stages import observe_demonstration, simulate_demonstration
 

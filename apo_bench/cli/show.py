@@ -75,8 +75,7 @@ def view_command(
     """Look at a scenario, or at a finished trial, which is run again, and step through it; `show` draws files."""
     from apo_bench.cli.terminal import print_row
     from apo_bench.scenario.file import load_scenario
-    from apo_bench.show.trial_again import trial_again
-    from apo_bench.show.viewing import choose_viewer, view
+    from apo_bench.show.viewing import choose_viewer, trial_again, view
     from apo_bench.simulation.scene.scene import build_scene
     from apo_bench.trial.story import scenario_story
 

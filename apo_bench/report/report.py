@@ -1,6 +1,7 @@
 """The report of a sweep: one page that answers, tables and figures beside it."""
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from operator import itemgetter
 from pathlib import Path
 from typing import NamedTuple
@@ -17,20 +18,23 @@ from apo_bench.report.answer import answer
 from apo_bench.report.figures.every import figures
 from apo_bench.report.page.report_page import report_page
 from apo_bench.report.run.facts import scenario_files
-from apo_bench.report.run.trials import Draw, Failures
-from apo_bench.report.tables.cells import cell_table
-from apo_bench.report.tables.effort import effort_table, time_table, work_table
+from apo_bench.report.run.trials import Draw, draw_failures
+from apo_bench.report.tables.cells import cell_table, gap_table, pair_table
 from apo_bench.report.tables.forecasts import calibration_table, confusion_table, recognition_table
-from apo_bench.report.tables.gaps import gap_table
-from apo_bench.report.tables.half_levels import area_difference_table, area_table, half_table
-from apo_bench.report.tables.pairs import pair_table
+from apo_bench.report.tables.methods import (
+    area_difference_table,
+    area_table,
+    effort_table,
+    half_table,
+    time_table,
+    work_table,
+)
 from apo_bench.report.tables.table import Table
+from apo_bench.statistics.contacts import gaps, recognitions
 from apo_bench.statistics.effort import efforts, read_timing, trial_times, work
 from apo_bench.statistics.forecasts import Confusion, calibrations, confusions
-from apo_bench.statistics.gaps import gaps
 from apo_bench.statistics.levels.summary import Summary, summary
 from apo_bench.statistics.rates import Cell
-from apo_bench.statistics.recognition import recognitions
 from apo_bench.statistics.settings import members, settings
 
 MOST_PANELS = 16
@@ -105,12 +109,13 @@ def report(
             (folder / name).mkdir(exist_ok=True)
         _remove_older(folder)
         _write_rows(rows, folder / TABLES / ROWS)
-        return _written(folder, rows, numbers, Failures(pictures if draw else 0, draw, salt, trust_code))
+        draw_own = partial(draw_failures, most=pictures, draw=draw, salt=salt, trust_code=trust_code)
+        return _written(folder, rows, numbers, draw_own)
     except OSError as error:
         raise InputError(f"'{folder}' cannot be written ({error.strerror}); copy it to a place that can.") from error
 
 
-def _written(folder: Path, rows: Sequence[Row], numbers: Summary, failed: Failures) -> Report:
+def _written(folder: Path, rows: Sequence[Row], numbers: Summary, draw_own: Draw) -> Report:
     run = read_run(folder)
     timing = read_timing(folder)
     workers = work(timing)
@@ -139,7 +144,7 @@ def _written(folder: Path, rows: Sequence[Row], numbers: Summary, failed: Failur
     for name in PNG:
         if name in drawn and len(drawn[name].panels) <= MOST_PANELS:
             paths.append(drawn[name].write(folder / FIGURES / f"{name}.png"))
-    pictures, no_pictures = failed.drawn(rows, folder, scenario_files(run))
+    pictures, no_pictures = draw_own(rows, folder, scenario_files(run))
     beside = [path for table in kept.values() for path in (table, table.with_suffix(".parquet"))]
     sentences = answer(rows, numbers)
     html = report_page(

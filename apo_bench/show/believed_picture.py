@@ -1,7 +1,7 @@
 """What is believed after a step, drawn: the parts where the motion parameters put them (Fig. 9, 13 and 16)."""
 
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -9,14 +9,11 @@ import numpy as np
 
 from apo_bench.assembly.goals import Observation, Poses, placements
 from apo_bench.assembly.graph import arc_residuals, relation_graph
-from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.mate import mate
-from apo_bench.geometry.overlap import Overlap, overlap
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Face, world_bounds
+from apo_bench.geometry.solid import world_bounds
 from apo_bench.io.figures import default_looks, save_figure
 from apo_bench.io.words import listed_words
+from apo_bench.judging.contacts import face_overlap
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.axes import axis_marks
 
@@ -57,21 +54,12 @@ def belief_panel(title: str, observation: Observation, goals: Array, step: int, 
     )
     poses = placements(observation.assembly.first(step), observation.start, goals[:step])[-1]
     standing = [arc for arc in graph.arcs if arc.lost is None]
-    beside = tuple(f"{arc}: beside it" for arc in standing if not _covered(observation.assembly, arc.contacts, poses))
+    beside = tuple(
+        f"{arc}: beside it"
+        for arc in standing
+        if any(face_overlap(observation.assembly, contact, poses).area <= 0.0 for contact in arc.contacts)
+    )
     return BeliefPanel(title, poses, max(residuals, default=0.0), (*wrong, *beside), warning)
-
-
-def _covered(assembly: Assembly, contacts: Iterable[Contact], poses: Poses) -> bool:
-    """Whether the faces of every contact lie over each other somewhere."""
-    ends = [[(assembly.face_of(end), poses[end.part]) for end in contact] for contact in contacts]
-    return all(_common(*a, *b).area > 0.0 for a, b in ends)
-
-
-def _common(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -> Overlap:
-    """What two faces have in common; of a shaft and its hole the wall of the common length."""
-    if isinstance(a, Face) and isinstance(b, Face):
-        return overlap(a, T_a, b, T_b)
-    return mate(a, T_a, b, T_b).common
 
 
 def belief_lines(beliefs: Sequence[BeliefPanel]) -> list[str]:

@@ -1,13 +1,28 @@
-"""Something to be looked at, in MuJoCo's window where there is a display, else in a browser."""
+"""Something to be looked at, in MuJoCo's window where there is a display, else in a browser; also a finished trial of a
+sweep, which is run again for it."""
 
 from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
 from typing import Literal
 
 from apo_bench.errors import InputError
+from apo_bench.io.reading import each_line
+from apo_bench.records.row import Row
+from apo_bench.records.run.checked import row_of
+from apo_bench.records.run.own_code import own_code
+from apo_bench.records.run.run_file import read_run
+from apo_bench.records.salt import read_salt
+from apo_bench.records.setting_columns import settings_of
+from apo_bench.report.run.facts import scenario_files
 from apo_bench.show.browser import PORT, no_browser, serve_story
 from apo_bench.show.stepping import Cursor
+from apo_bench.simulation.film.still import FilmTrack
 from apo_bench.simulation.film.window import no_window, step_in_window
-from apo_bench.trial.story import Story
+from apo_bench.trial.fingerprint import content_hash, spec_hash
+from apo_bench.trial.stages import observe_demonstration, scene_of, simulate_demonstration
+from apo_bench.trial.story import Story, trial_story
+from apo_bench.trial.trial import noise_of, run_trial
 
 Viewer = Literal["window", "browser"]
 
@@ -47,3 +62,55 @@ def view(story: Story, viewer: Viewer, port: int | None, say: Callable[[str], No
             step_in_window(story.scene, story.assembled, cursor.still, cursor.press, cursor.pass_time)
     except KeyboardInterrupt:
         say("")
+
+
+def trial_again(folder: Path, number: int | None, salt_file: Path | None = None) -> tuple[Row, Story]:
+    """A trial of a sweep and its row.
+
+    Args:
+        number: Of its line in `trials.jsonl`, from 1; None: the first failure, or the first trial.
+        salt_file: Of a salted sweep.
+
+    Raises:
+        InputError: No such trial.
+        RuntimeError: It cannot be run again, or had nothing to see.
+    """
+    number, row = _chosen(folder, number)
+    if named := own_code(row):
+        raise RuntimeError(
+            f"trial {number} names code that does not come with the package ({', '.join(named)}), which no file makes "
+            "run; give it to `apo-bench replay .. --view` yourself."
+        )
+    name = row["scenario"]
+    salt = None if salt_file is None else read_salt(salt_file)
+    spec = replace(settings_of(row, scenario_files(read_run(folder)).get(name, name)), salt=salt)
+    scene = scene_of(spec)
+    content = content_hash(scene.scenario, spec.scenario, scene.arm.files)
+    if spec_hash(spec, content) != row["spec_hash"]:
+        secret = row["salt"] is not None and salt is None
+        why = "its salt was not given; name its file by --salt-file" if secret else "other code or assets made it"
+        raise RuntimeError(f"trial {number} of {folder} cannot be run again: {why}.")
+    simulated = simulate_demonstration(scene, spec.careless, spec.seed, spec.eye, spec.salt)
+    track = FilmTrack()
+    again = run_trial(spec, scene, simulated=simulated, content=content, watch=track.hooks)
+    if again["sim_seconds"] is None:
+        raise RuntimeError(f"in trial {number} nothing was replayed: {again['sentence']}.")
+    seen = observe_demonstration(simulated, noise_of(spec, scene, simulated), spec.seed, spec.salt)
+    return again, trial_story(spec, scene, seen, track, again, simulated)
+
+
+def _chosen(folder: Path, number: int | None) -> tuple[int, Row]:
+    path = folder / "trials.jsonl"
+    first = None
+    k = 0
+    for k, line in each_line(path, "table of trials"):
+        if number is not None and k != number:
+            continue
+        row = row_of(line, f"{path}, line {k}")
+        if number is not None or (row["success"] is False and row["sim_seconds"] is not None):
+            return k, row
+        first = first or (k, row)
+    if first is None:
+        wanted = "there is no trial" if number is None else f"--trial {number} was given; 1 to {k} are there"
+        raise InputError(f"{path}: {wanted}.")
+    return first

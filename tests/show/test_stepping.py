@@ -14,7 +14,7 @@ import pytest
 
 from apo_bench.cli.app import main
 from apo_bench.show.stepping import FACES, Cursor
-from apo_bench.show.trial_again import trial_again
+from apo_bench.show.viewing import trial_again
 from apo_bench.simulation.film.meshes import body_meshes, body_poses, part_meshes
 from apo_bench.simulation.film.still import draw_over, part_poses, show_moment
 from apo_bench.simulation.film.window import WINDOW_KEYS, step_in_window

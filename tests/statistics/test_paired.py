@@ -17,7 +17,7 @@ from statsmodels.stats.contingency_tables import mcnemar as reference
 from statsmodels.stats.multitest import multipletests
 
 from apo_bench.report.report import report
-from apo_bench.report.tables.pairs import pair_table
+from apo_bench.report.tables.cells import pair_table
 from apo_bench.statistics.paired import holm, mcnemar, paired, tango
 from apo_bench.statistics.rates import wilson
 from tests import pages

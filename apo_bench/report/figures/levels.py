@@ -9,12 +9,11 @@ from apo_bench.records.settings import RANGE
 from apo_bench.report.figures.lines import Axis, MethodLine, Point, RuleLine, dodges, entries, levels_axis, line_panel
 from apo_bench.report.figures.sheet import Figure, Panel
 from apo_bench.report.figures.styles import RECOGNITION_STYLES, SEEN, Style, styles
+from apo_bench.statistics.contacts import GapSummary, Quantiles, Recognition
 from apo_bench.statistics.forecasts import ALL
-from apo_bench.statistics.gaps import GapSummary, Quantiles
 from apo_bench.statistics.paired import Paired
 from apo_bench.statistics.rate_text import percent, percents
 from apo_bench.statistics.rates import Cell
-from apo_bench.statistics.recognition import Recognition
 from apo_bench.statistics.settings import (
     Setting,
     cell_place,

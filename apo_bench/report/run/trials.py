@@ -1,24 +1,14 @@
 """How trials ended, in a few words, and which failures a report shows as pictures; others can draw them."""
 
-from __future__ import annotations
-
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 from apo_bench.records.row import Row
 from apo_bench.records.run.own_code import left_out, own_code
 from apo_bench.records.run.replay_command import Files
 from apo_bench.records.salt import Salt
 from apo_bench.statistics.rates import NOT_EXECUTED, rank
-
-
-class Draw(Protocol):
-    """Runs failed trials again and draws them; the sentences say what could not be drawn."""
-
-    def __call__(
-        self, chosen: Sequence[Row], folder: Path, files: Files, salt: Salt | None, *, trust_code: bool
-    ) -> tuple[list[FailurePicture], list[str]]: ...
 
 
 class FailurePicture(NamedTuple):
@@ -30,23 +20,9 @@ class FailurePicture(NamedTuple):
     """How it was made."""
 
 
-class Failures(NamedTuple):
-    """How a report draws failures."""
-
-    most: int
-    draw: Draw | None
-    salt: Salt | None
-    trust_code: bool
-    """Run also trials that name code that does not come with the package."""
-
-    def drawn(self, rows: Sequence[Row], folder: Path, files: Files) -> tuple[list[FailurePicture], list[str]]:
-        """The pictures, and sentences on those that are missing."""
-        if not self.most or self.draw is None:
-            return [], []
-        chosen = sample(rows, self.most, trust_code=self.trust_code)
-        taken, missed = self.draw(chosen, folder, files, self.salt, trust_code=self.trust_code)
-        without = "" if self.trust_code else left_out(rows)
-        return taken, [*missed, *([without] if without else [])]
+Draw = Callable[..., tuple[list[FailurePicture], list[str]]]
+"""Runs failed trials again and draws them, as `failure_pictures` of `apo_bench.show` does; the sentences say what could
+not be drawn."""
 
 
 def verdict(row: Row) -> str:
@@ -64,6 +40,22 @@ def why(row: Row) -> str:
         return ""
     where = "" if row.get("failure_operation") is None else f", operation {row['failure_operation']}"
     return f"{row['failure_stage']}: {row['failure_code']}{where}"
+
+
+def draw_failures(
+    rows: Sequence[Row], folder: Path, files: Files, most: int, draw: Draw | None, salt: Salt | None, trust_code: bool
+) -> tuple[list[FailurePicture], list[str]]:
+    """So many pictures at most, and sentences on those that are missing.
+
+    Args:
+        trust_code: Run also trials that name code that does not come with the package.
+    """
+    if not most or draw is None:
+        return [], []
+    chosen = sample(rows, most, trust_code=trust_code)
+    pictures, missing = draw(chosen, folder, files, salt, trust_code=trust_code)
+    without = "" if trust_code else left_out(rows)
+    return pictures, [*missing, *([without] if without else [])]
 
 
 def sample(rows: Iterable[Row], most: int, *, trust_code: bool = False) -> list[Row]:

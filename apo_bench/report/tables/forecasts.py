@@ -4,10 +4,10 @@ from collections.abc import Sequence
 
 from apo_bench.records.method import knows_relations
 from apo_bench.report.tables.table import Column, Table, millimetres, rate_columns
+from apo_bench.statistics.contacts import Recognition
 from apo_bench.statistics.forecasts import Calibration, Confusion
 from apo_bench.statistics.rate_text import level_label, percent, percents
 from apo_bench.statistics.rates import Rate
-from apo_bench.statistics.recognition import Recognition
 
 _CALIBRATION_NOTE = (
     "Over every level, carelessness and clearance. *Covered* is how often the truth lies in the 95 % region that a "

@@ -1,20 +1,26 @@
-"""How much noise a method bears: the level of half success, and the area under success over level."""
+"""Tables with one line per method: how much noise it bears (the level of half success, the area under success over
+level), what its replays take, and what a sweep took."""
 
 from collections.abc import Sequence
 
 from apo_bench.report.tables.table import Column, Table, interval_columns, place_columns
+from apo_bench.statistics.effort import Effort, TrialTimes, Work
 from apo_bench.statistics.levels.curves import Area, AreaDifference
 from apo_bench.statistics.levels.half_level import HalfLevel
 from apo_bench.statistics.rate_text import points
 
-_NOTE = (
+_HALF_LEVEL_NOTE = (
     "Where success falls to one half, read along the logarithm of the level, with a 95 % interval; *surely* is from "
     "the last level with success surely over one half to the first surely under it, whatever the curve between them. "
     "*Any* is an interval that is open at both ends, *none* is under one half even at level 0. "
     "The area is mean success over the logarithm of the level, from 0 to 1, of seeds that have a result at every level."
 )
-_NONE = "No level varied, so nothing is known of how success falls with it."
+_NO_LEVELS = "No level varied, so nothing is known of how success falls with it."
 _WHERE = place_columns(lambda x: x.setting, levels=False)
+_EFFORT_NOTE = (
+    "Of trials that were right: the operations that were undone and done again, the simulated time, and how far a part "
+    "that was in place was pushed at most."
+)
 
 
 def half_table(levels: Sequence[HalfLevel], areas: Sequence[Area]) -> Table:
@@ -38,7 +44,7 @@ def half_table(levels: Sequence[HalfLevel], areas: Sequence[Area]) -> Table:
         Column("surely_under"),
         Column("", "area (95 %)", text=area),
     )
-    return Table(levels, columns, _NONE, _NOTE)
+    return Table(levels, columns, _NO_LEVELS, _HALF_LEVEL_NOTE)
 
 
 def area_table(areas: Sequence[Area], differences: Sequence[AreaDifference]) -> Table:
@@ -53,6 +59,45 @@ def area_difference_table(differences: Sequence[AreaDifference]) -> Table:
 
 def _difference(d: Area | AreaDifference) -> str | None:
     return points(d.difference, d.interval) if isinstance(d, AreaDifference) else None
+
+
+def effort_table(efforts: Sequence[Effort]) -> Table:
+    """One line per scenario and method; for people."""
+    columns = (
+        Column("scenario", "scenario", words=True),
+        Column("method", "method", words=True),
+        Column("trials", "right"),
+        Column("extra_operations", "extra operations", text=lambda e: f"{e.extra_operations:.1f}"),
+        Column("sim_seconds", "simulated", text=lambda e: f"{e.sim_seconds:.0f} s"),
+        Column("pushed_mm", "pushed at most", text=lambda e: f"{e.pushed_mm:.2f} mm"),
+    )
+    return Table(efforts, columns, "No trial was right.", _EFFORT_NOTE)
+
+
+def time_table(times: Sequence[TrialTimes]) -> Table:
+    """Wall times, one line per scenario and method."""
+    columns = (
+        Column("scenario", "scenario", words=True),
+        Column("method", "method", words=True),
+        Column("trials", "n"),
+        Column("trial_5_s", "5 % are below [s]", lambda t: t.low, lambda t: f"{t.low:.2f}"),
+        Column("trial_median_s", "median [s]", lambda t: t.median, lambda t: f"{t.median:.2f}"),
+        Column("trial_95_s", "95 % are below [s]", lambda t: t.high, lambda t: f"{t.high:.2f}"),
+        Column("trial_sum_s", "together [min]", lambda t: t.total, lambda t: f"{t.total / 60:.1f}"),
+    )
+    return Table(times, columns)
+
+
+def work_table(work: Sequence[Work]) -> Table:
+    """One line per worker; for people."""
+    columns = (
+        Column("host", "host", words=True),
+        Column("worker", "worker", words=True),
+        Column("trials", "rows"),
+        Column("busy_s", "busy [min]", text=lambda w: f"{w.busy_s / 60:.1f}"),
+        Column("rows_per_minute", "rows per minute", text=lambda w: f"{w.rows_per_minute:.1f}"),
+    )
+    return Table(work, columns)
 
 
 _AREAS = (

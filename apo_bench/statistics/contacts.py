@@ -1,13 +1,38 @@
-"""Precision and recall of recognised contacts over the noise."""
+"""Contacts over the noise: quantiles of their gap before and after correction, precision and recall of those that were
+recognised."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, final
 
+import numpy as np
+
+from apo_bench.records.method import knows_relations
 from apo_bench.records.relations import RECOGNISED
 from apo_bench.records.row import Row, look_up
 from apo_bench.statistics.forecasts import ALL
-from apo_bench.statistics.rates import Rate
+from apo_bench.statistics.rates import Place, Rate, order, place_of
+
+_CUTS = (5.0, 50.0, 95.0)
+
+
+class Quantiles(NamedTuple):
+    """Of gaps, [mm]."""
+
+    low: float
+    median: float
+    high: float
+
+
+@final
+@dataclass(frozen=True)
+class GapSummary:
+    """Of the trials of a cell that had a plan."""
+
+    place: Place
+    trials: int
+    seen: Quantiles
+    planned: Quantiles
 
 
 class ObservationPlace(NamedTuple):
@@ -55,6 +80,17 @@ class Recognition:
         return self.all_right.rate
 
 
+def gaps(rows: Iterable[Row]) -> tuple[GapSummary, ...]:
+    """One per cell of a method that corrects, sorted as `tally` sorts."""
+    groups: dict[Place, list[tuple[float, float]]] = {}
+    for row in rows:
+        place = place_of(row)
+        both = (row.get("gap_before_mm"), row.get("gap_after_mm"))
+        if place is not None and knows_relations(place.method) and None not in both:
+            groups.setdefault(place, []).append((float(both[0] or 0.0), float(both[1] or 0.0)))
+    return tuple(_gap(place, groups[place]) for place in sorted(groups, key=order))
+
+
 def recognitions(rows: Iterable[Row]) -> tuple[Recognition, ...]:
     """One per scenario, noise, eye, way of recognising, carelessness and level; and over all scenarios, where several.
 
@@ -71,6 +107,11 @@ def recognitions(rows: Iterable[Row]) -> tuple[Recognition, ...]:
         for where in (place, place._replace(scenario=ALL)) if several else (place,):
             groups.setdefault(where, []).append(row)
     return tuple(_counted(place, groups[place]) for place in sorted(groups, key=_order))
+
+
+def _gap(place: Place, both: Sequence[tuple[float, float]]) -> GapSummary:
+    seen, planned = (Quantiles(*map(float, q)) for q in np.percentile(np.array(both), _CUTS, axis=0).T)
+    return GapSummary(place, len(both), seen, planned)
 
 
 def _counted(place: ObservationPlace, rows: Sequence[Row]) -> Recognition:
