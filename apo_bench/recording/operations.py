@@ -4,7 +4,7 @@ The last straight piece of the path says from where a part came to its goal, to 
 there.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, final
 
@@ -114,15 +114,14 @@ def seen_operation(
     return SeenOperation(stay, rest, path, carried, adjusted)
 
 
-def approaches(scenario: Scenario, operations: Sequence[SeenOperation], T_world_camera: Array) -> Sequence[Approach]:
+def approaches(scenario: Scenario, operations: Sequence[SeenOperation], T_world_camera: Array) -> Iterator[Approach]:
     """Every operation that was seen."""
-    each = list[Approach]()
     for k, (operation, nominal) in enumerate(zip(operations, nominal_operations(scenario), strict=True)):
         if operation.path is None or operation.rest is None:
             continue
         end = last_straight(operation.path, T_world_camera @ operation.rest.T)
         if end is None:
-            each.append(Approach(k, None, "", 0.0))
+            yield Approach(k, None, "", 0.0)
             continue
         arrival = nominal.after
         ways: dict[str, Array] = {macro.name: arrival.own(macro.direction) for macro in arrival.macros}
@@ -131,8 +130,7 @@ def approaches(scenario: Scenario, operations: Sequence[SeenOperation], T_world_
             name: float(np.degrees(np.arccos(np.clip(end.direction @ way, -1.0, 1.0)))) for name, way in ways.items()
         }
         nearest = min(angles, key=lambda name: angles[name])
-        each.append(Approach(k, end, nearest, angles[nearest]))
-    return each
+        yield Approach(k, end, nearest, angles[nearest])
 
 
 def last_straight(path: PoseTrack, goal: Array) -> StraightEnd | None:

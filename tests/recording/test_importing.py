@@ -118,6 +118,19 @@ def test_without_a_scenario_the_order_is_found_all_the_same() -> None:
     assert {puts[4].part, *puts[4].carries} == set(operations[4].moves)
 
 
+def test_a_camera_is_solved_alike_with_and_without_a_scenario() -> None:
+    """Also by the error that stays while a part rests, which weighs parts that were seen for longer no more."""
+    tracks = seen(NAME, 0.5)
+    start = layout_at(load_scenario(NAME), 0.1, 0.0, 0.3).start
+    known = {part: start[part] for part in ("castle1", "stick")}
+    for stays in (None, np.array([3e-3, np.radians(2.0)])):
+        camera = replace(KNOWN, known=known, stays=stays)
+        planned = imported(tracks, camera).camera
+        unplanned = unplanned_recording(tracks, camera, "log.csv").camera
+        assert np.array_equal(planned.T_world_camera, unplanned.T_world_camera)
+        assert np.array_equal(planned.covariance, unplanned.covariance)  # type: ignore[arg-type]
+
+
 def test_times_may_be_stated_and_operations_left_out() -> None:
     tracks = seen(NAME, 0.5)
     told = imported(tracks, stated=Stated(ends=(2.2, 4.0, 5.8)))
