@@ -72,10 +72,10 @@ def test_a_careful_human_shows_the_truth(name: str):
 def test_a_careless_human_errs_where_the_task_says_and_ends_right(name: str, careless: float):
     of = shown(name, careless, 2)
     assert of.demonstration.code == "ok"
-    careless = load_scenario(name).careless
-    k = of.demonstration.assembly.operations[careless.operation].main
-    axis = of.layout.goals[careless.operation][:2, :2] @ careless.axis[:2]
-    erring = ALIKE.get(name, {careless.operation})
+    mistake = load_scenario(name).careless
+    k = of.demonstration.assembly.operations[mistake.operation].main
+    axis = of.layout.goals[mistake.operation][:2, :2] @ mistake.axis[:2]
+    erring = ALIKE.get(name, {mistake.operation})
     for operation, off in enumerate(off_mm(of)):
         if operation in erring:
             assert 1.5 * careless - LEVEL_MM < abs(off[:2] @ axis) < 4.0 * careless + LEVEL_MM
