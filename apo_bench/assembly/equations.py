@@ -128,8 +128,10 @@ class Equations:
         return forms
 
 
-def equations(assembly: Assembly, start: Poses, goals: Array, free: Collection[int] | None = None) -> Equations:
-    """All equations in which a free motion parameter occurs, of contacts that stand and of contacts that were lost.
+def equations(assembly: Assembly, start: Poses, goals: Array) -> Equations:
+    """All equations, of contacts that stand and of contacts that were lost, in the order of `assembly.relations()`.
+
+    Contacts of round faces are those of sheets (`lowered`).
 
     The vertices are the corners of the smaller face of a pair, laid onto the plane of the other one at `goals`: of
     one face only, since both would raise the spurious singular values, and whole, since a lever as long as a table
@@ -137,8 +139,6 @@ def equations(assembly: Assembly, start: Poses, goals: Array, free: Collection[i
 
     Args:
         goals: (n, 4, 4), where the vertices are taken, world frame, [m].
-        free: Operations counted from 0; None stands for every contact, in the order of `assembly.relations()`, where
-            contacts of round faces are those of sheets (`lowered`).
     """
     known = pattern(assembly)
     constants = np.array([start[part] for part in assembly.solids]).reshape(-1, 4, 4)
@@ -150,10 +150,9 @@ def equations(assembly: Assembly, start: Poses, goals: Array, free: Collection[i
         corners = pose.apply(pose.inverse(product(known.words[c], stack)), vertex[rows, :3])
         n = known.onto[c]
         vertex[rows, :3] = corners - np.outer(corners @ n[:3] + n[3], n[:3])
-    system = Equations(
+    return Equations(
         constants, known.letters, known.inverse, known.made, known.contact, known.plane[known.contact], vertex
     )
-    return system if free is None else system.among(system.containing(free))
 
 
 def largest_gap(assembly: Assembly, start: Poses, goals: Array) -> float:

@@ -53,13 +53,10 @@ class PadPlace(NamedTuple):
 class _Rays(NamedTuple):
     """What rays along a direction pass through."""
 
-    across: Array
-    along: Array
-    up: Array
     t: Array
-    """Along `along`, of each ray, (r,)."""
+    """Where each ray is across their direction and the vertical, (r,)."""
     h: Array
-    """Along `up`, of each ray, (r,)."""
+    """How high each ray is, (r,)."""
     low: Array
     """Where they enter each piece, (r, p); infinite where they miss it."""
     high: Array
@@ -188,7 +185,7 @@ def _cast(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Arra
         here = slice(h0[i], h1[i]), slice(t0[i], t1[i])
         ends = _ends(pieces[i], across, start[here].reshape(-1, 3))
         low[(*here, k)], high[(*here, k)] = (end.reshape(T[here].shape) for end in ends)
-    return _Rays(across, along, up, T.ravel(), H.ravel(), *(end.reshape(T.size, len(met)) for end in (low, high)))
+    return _Rays(T.ravel(), H.ravel(), *(end.reshape(T.size, len(met)) for end in (low, high)))
 
 
 def _over(places: Array, at: Array, first: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

@@ -58,7 +58,8 @@ def left_mm(scene: scenes.Scene, wrong: Collection[int], error: Error, free: Col
     for k in wrong:
         goals[k - 1] = error(goals[k - 1])
     freed = {k - 1 for k in free}
-    return solve_newton(equations(scene.assembly, scene.start, goals, freed), goals, freed).gap_m * 1e3
+    system = equations(scene.assembly, scene.start, goals)
+    return solve_newton(system.among(system.containing(freed)), goals, freed).gap_m * 1e3
 
 
 # Freed sets of the paper, most recent first. A set is too small where something remains. Where the size of a remainder
