@@ -357,7 +357,7 @@ def part_lines() -> list[str]:
             lines += [f"Elements: {elements}.", ""]
         if allowed.attributes:
             lines += ["| attribute | value |", "|---|---|"]
-            lines += [f"| `{name}` | {value.said} |" for name, value in allowed.attributes.items()]
+            lines += [f"| `{name}` | {value.words} |" for name, value in allowed.attributes.items()]
     return lines
 
 

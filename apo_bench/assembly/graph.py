@@ -51,7 +51,7 @@ class Arc:
     """The operation that made them, counted from 0."""
     lost: int | None
     """The operation at which they disappeared, or None while they stand."""
-    asked: tuple[Gap, ...] = ()
+    gaps: tuple[Gap, ...] = ()
     """How far apart the faces of each contact are asked to be; empty stands for `centred` throughout."""
     axial: bool = False
     """Whether a round face is among them."""
@@ -62,10 +62,10 @@ class Arc:
     @property
     def pairs(self) -> tuple[str, ...]:
         """The faces that touch, manipulated first: `nz-top`; with what is asked of them, if that is not `centred`."""
-        asked = self.asked or (Gap(),) * len(self.contacts)
+        gaps = self.gaps or (Gap(),) * len(self.contacts)
         return tuple(
             f"{contact.manipulated.face}-{contact.environment.face}{'' if gap == Gap() else f' ({gap})'}"
-            for contact, gap in zip(self.contacts, asked, strict=True)
+            for contact, gap in zip(self.contacts, gaps, strict=True)
         )
 
     @property
@@ -153,10 +153,8 @@ def _arcs(assembly: Assembly, history: list[dict[str, Node]]) -> tuple[Arc, ...]
         lost = relations[0].lost
         nodes = history[-1 if lost is None else made + 1]
         contacts = tuple(r.contact for r in relations)
-        asked = tuple(assembly.gaps.get(contact, Gap()) for contact in contacts)
-        arcs.append(
-            Arc(f"R{i}", nodes[a], nodes[b], contacts, made, lost, asked, any(map(assembly.is_round, contacts)))
-        )
+        gaps = tuple(assembly.gaps.get(contact, Gap()) for contact in contacts)
+        arcs.append(Arc(f"R{i}", nodes[a], nodes[b], contacts, made, lost, gaps, any(map(assembly.is_round, contacts))))
     return tuple(arcs)
 
 

@@ -120,14 +120,14 @@ def _axes_within(pieces: tuple[Piece, ...], axis: Array, low: float, high: float
 @lru_cache(maxsize=64)
 def _holds(solid: Solid, vertical: tuple[float, ...], opening_m: float, over_m: float) -> tuple[PadPlace, ...]:
     up = np.array(vertical)
-    return _found(solid, up, opening_m, over_m, _RAY_M) or _found(solid, up, opening_m, over_m, _FINE_M)
+    return _places(solid, up, opening_m, over_m, _RAY_M) or _places(solid, up, opening_m, over_m, _FINE_M)
 
 
-def _found(solid: Solid, up: Array, opening_m: float, over_m: float, ray_m: float) -> tuple[PadPlace, ...]:
+def _places(solid: Solid, up: Array, opening_m: float, over_m: float, ray_m: float) -> tuple[PadPlace, ...]:
     """With rows of rays so far apart, [m]."""
     bottom, top = extent(solid.pieces, up)
     best = max(bottom + _HEIGHT * (top - bottom), bottom + _OVER_M, top - _PALM_M)
-    candidates: list[tuple[float, int, PadPlace]] = []
+    candidates: list[tuple[float, PadPlace]] = []
     for across in _directions(solid, up):
         along = np.cross(up, across)
         low, high = extent(solid.pieces, along)
@@ -141,17 +141,17 @@ def _found(solid: Solid, up: Array, opening_m: float, over_m: float, ray_m: floa
                     point = (low + high) / 2 * across + place * along + tip * up
                     off = np.abs([(point - solid.centroid) @ across, (point - solid.centroid) @ along]).sum()
                     cost = float(off + 0.5 * abs(tip - best) + 0.25 * (high - low) + _UNEVEN_M * uneven)
-                    candidates.append((round(cost, 9), len(candidates), PadPlace(point, across, (high - low) / 2)))
-    return tuple(hold for _, _, hold in sorted(candidates, key=lambda each: each[:2]))
+                    candidates.append((round(cost, 9), PadPlace(point, across, (high - low) / 2)))
+    return tuple(hold for _, hold in sorted(candidates, key=lambda each: each[0]))
 
 
 def _directions(solid: Solid, up: Array) -> Iterator[Array]:
     """Level directions in which pads may close, each once up to its sign."""
     ways = [face.normal for face in solid.faces.values() if abs(face.normal @ up) < _LEVEL]
-    for face in solid.rounds.values():
-        if not face.hole and face.kind == "cylinder" and abs(face.axis @ up) < _LEVEL:
+    for face in (face for face in solid.rounds.values() if not face.hole and face.kind == "cylinder"):
+        if abs(face.axis @ up) < _LEVEL:
             ways.append(np.cross(up, face.axis))
-        elif not face.hole and face.kind == "cylinder" and abs(face.axis @ up) > 1.0 - _LEVEL:
+        elif abs(face.axis @ up) > 1.0 - _LEVEL:
             x, y = (np.asarray(axis - (axis @ up) * up) for axis in plane_across(up).T)
             ways += [x, y, (x + y) / np.sqrt(2.0), (x - y) / np.sqrt(2.0)]
     kept: list[Array] = []
@@ -190,13 +190,13 @@ def _cast(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Arra
 
 def _over(places: Array, at: Array, first: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     """Of rising places, the first in the shadow of each piece and the one behind its last."""
-    low = np.minimum.reduceat(at, first)
-    high = np.maximum.reduceat(at, first)
-    return np.searchsorted(places, low - _ROUNDING_M), np.searchsorted(places, high + _ROUNDING_M)
+    low = np.searchsorted(places, np.minimum.reduceat(at, first) - _ROUNDING_M)
+    return low, np.searchsorted(places, np.maximum.reduceat(at, first) + _ROUNDING_M)
 
 
 def _ends(piece: Piece, across: Array, start: Array) -> tuple[Array, Array]:
     """Where rays from (r, 3) enter and leave a piece, (r,) each; infinite where they miss it."""
+    # As in a slab test: inwards through planes that look against the ray, outwards through those that look along it.
     rate = piece.planes[:, :3] @ across
     room = piece.planes[:, 3] - start @ piece.planes[:, :3].T
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -246,8 +246,6 @@ def _offers(rays: _Rays, t: float, h: float, opening_m: float) -> Iterator[tuple
 
 def _in_the_way(rays: _Rays, above: NDArray[np.bool_], low: float, high: float) -> bool:
     """Whether a finger, open or on its way down, would strike the part itself."""
-    a = rays.low[above]
-    b = rays.high[above]
     room = _FINGER_M + FINGER_ROOM_M
-    struck = [(a < end) & (b > begin) for begin, end in ((low - room, low - 1e-6), (high + 1e-6, high + room))]
-    return bool((struck[0] | struck[1]).any())
+    beside = (low - room, low - 1e-6), (high + 1e-6, high + room)
+    return any(bool(((rays.low[above] < end) & (rays.high[above] > begin)).any()) for begin, end in beside)

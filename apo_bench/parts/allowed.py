@@ -20,25 +20,25 @@ class NumbersRule(NamedTuple):
     """The least and the largest value of each."""
     least: int
     """The least count of numbers."""
-    said: str
+    words: str
     """What is allowed, in words."""
     groups_of: int = 1
     """So many of them belong together."""
 
     def allows(self, text: str) -> bool:
         # Words as MuJoCo reads them: other alphabets have spaces too, which are letters to it.
-        words = text.split() if text.isascii() else [text]
-        counted = self.least <= len(words) <= len(self.spans) and len(words) % self.groups_of == 0
-        if not counted or not all(map(_NUMBER.fullmatch, words)):
+        numbers = text.split() if text.isascii() else [text]
+        counted = self.least <= len(numbers) <= len(self.spans) and len(numbers) % self.groups_of == 0
+        if not counted or not all(map(_NUMBER.fullmatch, numbers)):
             return False
-        return all(low <= float(word) <= high for word, (low, high) in zip(words, self.spans, strict=False))
+        return all(low <= float(number) <= high for number, (low, high) in zip(numbers, self.spans, strict=False))
 
 
 class TextRule(NamedTuple):
     """A short text."""
 
     pattern: re.Pattern[str]
-    said: str
+    words: str
     """What is allowed, in words."""
 
     def allows(self, text: str) -> bool:

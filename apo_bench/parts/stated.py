@@ -199,7 +199,7 @@ def _friction(node: JsonNode) -> tuple[float, ...]:
     values = node.value if isinstance(node.value, list) else [node.value]
     numbers = node.child(values, "numbers").numbers(len(values)) if 1 <= len(values) <= 3 else None
     if numbers is None or not all(low <= x <= high for x, (low, high) in zip(numbers, FRICTION.spans, strict=False)):
-        node.fail(f"{FRICTION.said} are needed")
+        node.fail(f"{FRICTION.words} are needed")
     return tuple(float(x) for x in numbers)
 
 

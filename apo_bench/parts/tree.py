@@ -53,7 +53,7 @@ class _Reader:
                 listed = ", ".join(allowed.attributes) or "no attributes"
                 self._refuse(f"{called} has {key[:60]}=, which a part may not say; allowed are {listed}", key)
             if not allowed.attributes[key].allows(text):
-                self._refuse(f'{called} has {key}="{text[:60]}"; {allowed.attributes[key].said} is allowed', key)
+                self._refuse(f'{called} has {key}="{text[:60]}"; {allowed.attributes[key].words} is allowed', key)
         if "name" in allowed.attributes and "name" not in attributes and tag != "body":
             place = " ".join(f'{k}="{v[:60]}"' for k, v in attributes.items())
             self._refuse(f"<{tag} {place}> has no name; name it, rows and messages use the name")

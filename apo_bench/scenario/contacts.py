@@ -20,7 +20,7 @@ from apo_bench.geometry.solid import Face, Solid
 from apo_bench.io.documents import JsonNode
 from apo_bench.scenario.keys import LARGEST_LENGTH_MM, read_span, refuse, refuse_name
 
-Asked = Mapping[Contact, Gap]
+ContactGaps = Mapping[Contact, Gap]
 """What is asked of each contact, in the order of the file."""
 _KINDS: tuple[GapKind, ...] = get_args(GapKind)
 _EXAMPLE = '["bottom", "table.top"]'
@@ -30,7 +30,7 @@ _TABLE = '{ faces = ["py", "castle1.spy"], kind = "clearance" }'
 
 def read_contacts(
     nodes: tuple[JsonNode, ...], main: str, carries: tuple[str, ...], solids: Mapping[str, Solid], there: set[str]
-) -> Asked:
+) -> ContactGaps:
     """The contacts that one operation makes.
 
     Args:
@@ -47,7 +47,7 @@ def read_contacts(
     return contacts
 
 
-def check_kinds(node: JsonNode, gaps: Sequence[Asked]) -> None:
+def check_kinds(node: JsonNode, gaps: Sequence[ContactGaps]) -> None:
     """A contact that the last of some operations makes again is asked for in the same way as before."""
     for contact, gap in gaps[-1].items():
         for k, earlier in enumerate(gaps[:-1], start=1):

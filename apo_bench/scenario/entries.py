@@ -16,7 +16,7 @@ from apo_bench.insertion.line import Preference
 from apo_bench.io.documents import JsonNode
 from apo_bench.parts import load_part, part_path
 from apo_bench.parts.allowed import FACE_OR_PART_NAME
-from apo_bench.scenario.contacts import Asked, check_kinds, read_contacts
+from apo_bench.scenario.contacts import ContactGaps, check_kinds, read_contacts
 from apo_bench.scenario.grasps import read_grasp
 from apo_bench.scenario.keys import (
     LARGEST_LENGTH_MM,
@@ -56,7 +56,7 @@ class OperationEntry(NamedTuple):
     """One entry of [[operations]]."""
 
     operation: Operation
-    asked: Asked
+    gaps: ContactGaps
     goal: Array
     """(4, 4), frame of the assembly, [m]."""
     attach: Preference
@@ -124,7 +124,7 @@ def read_operations(node: JsonNode, parts: Mapping[str, PartEntry]) -> tuple[Ope
     for k, each in enumerate(nodes):
         entry = _entry(each, k, parts, poses, there)
         entries.append(entry)
-        check_kinds(each.child(None, "contacts"), [earlier.asked for earlier in entries])
+        check_kinds(each.child(None, "contacts"), [earlier.gaps for earlier in entries])
         T = entry.goal @ pose.inverse(poses[entry.operation.main])
         poses |= {name: T @ poses[name] for name in entry.operation.carries} | {entry.operation.main: entry.goal}
         there |= set(entry.operation.moves)

@@ -96,7 +96,7 @@ def _scenario(root: JsonNode, path: Path) -> tuple[Scenario, tuple[Preference, .
         {name: part.solid for name, part in parts.items()},
         tuple(entry.operation for entry in entries),
         frozenset(name for name, part in parts.items() if part.fixed),
-        {contact: gap for entry in entries for contact, gap in entry.asked.items() if gap != Gap()},
+        {contact: gap for entry in entries for contact, gap in entry.gaps.items() if gap != Gap()},
     )
     for name in parts:
         if name not in assembly.fixed and not any(name in operation.moves for operation in assembly.operations):

@@ -142,11 +142,11 @@ def bands(area: Any, rings: list[tuple[Array, NDArray[np.bool_]]]) -> list[Array
         area: All of the material.
         rings: Corners (k, 2), the material to their left, and whether the side that begins there recedes, (k,).
     """
-    found: list[Array] = []
+    areas: list[Array] = []
     for corners, fit in rings:
         if fit.any():
-            found += _band(area, corners, fit)
-    return found
+            areas += _band(area, corners, fit)
+    return areas
 
 
 def _band(area: Any, corners: Array, fit: NDArray[np.bool_]) -> list[Array]:

@@ -153,8 +153,8 @@ def ring(outline: Outline, hole: bool = False) -> Array:
 
 def receding(outline: Outline, hole: bool = False) -> NDArray[np.bool_]:
     """Whether the sides of a ring recede by the clearance: each that begins at a corner of `ring`, (k,)."""
-    found = [edge.fit for i, edge in enumerate(outline) for _ in _corners(outline, i, hole)]
-    return np.array(found, dtype=np.bool_)
+    recedes = [edge.fit for i, edge in enumerate(outline) for _ in _corners(outline, i, hole)]
+    return np.array(recedes, dtype=np.bool_)
 
 
 def _corners(outline: Outline, i: int, hole: bool) -> Iterator[Array]:
