@@ -57,15 +57,7 @@ def _import(
     from apo_bench.io.tables import write_csv
     from apo_bench.recording.importing import import_recording
     from apo_bench.recording.show.drawing import draw_recording, drawing_of, unfit_drawing
-    from apo_bench.recording.show.text import (
-        PATH_HEAD,
-        camera_lines,
-        imported_lines,
-        observation_table,
-        path_rows,
-        rest_lines,
-    )
-    from apo_bench.recording.without_scenario import deviations
+    from apo_bench.recording.show.text import PATH_HEAD, imported_lines, path_rows
     from apo_bench.scenario.file import load_scenario
 
     out, picture, paths = files
@@ -80,10 +72,7 @@ def _import(
         raise
     mains = [operation.main for operation in loaded.assembly.operations]
     rests = [operation.rest for operation in imported.operations]
-    X = imported.camera.T_world_camera
-    times = {part: track.t for part, track in tracks.items()}
-    print_lines(camera_lines(imported.camera))
-    typer.echo("\n" + "\n".join(rest_lines(list(zip(mains, rests, strict=True)), X, times)) + "\n")
+    _print_rests(imported.camera, mains, rests, tracks, [""])
     print_lines(imported_lines(imported))
     if out.suffix.lower() == ".json":
         from apo_bench.files.json_forms import observation_form, write_form
@@ -91,8 +80,7 @@ def _import(
         name = scenario if scenario == loaded.name else str(Path(scenario).resolve())
         write_form(observation_form(imported.observation, name), out)
     else:
-        off = [(1.0, 1.0) if rest is None else deviations(rest, camera) for rest in rests]
-        _write(out, observation_table(mains, imported.observation.goals, off, [rest is not None for rest in rests]))
+        _write_table(out, mains, rests, imported.observation.goals, camera)
     typer.echo(f"\nWrote {out}")
     if paths is not None:
         write_csv(paths, PATH_HEAD, path_rows(imported))
@@ -104,18 +92,14 @@ def _import(
 
 def _import_unplanned(log: Any, objects: Any, camera: Any, tracks: Any, out: Path, picture: Path | None) -> None:
     from apo_bench.recording.show.drawing import draw_recording, unplanned_drawing
-    from apo_bench.recording.show.text import camera_lines, observation_table, put_lines, rest_lines
-    from apo_bench.recording.without_scenario import deviations, goals_of, unplanned_recording
+    from apo_bench.recording.show.text import put_lines
+    from apo_bench.recording.without_scenario import goals_of, unplanned_recording
 
     recording = unplanned_recording(tracks, camera, log.file)
     parts = [put.part for put in recording.puts]
     rests = [put.rest for put in recording.puts]
-    X = recording.camera.T_world_camera
-    times = {part: track.t for part, track in tracks.items()}
-    print_lines(camera_lines(recording.camera))
-    typer.echo("\n" + "\n".join([*rest_lines(list(zip(parts, rests, strict=True)), X, times), *put_lines(recording)]))
-    off = [deviations(rest, camera) for rest in rests]
-    _write(out, observation_table(parts, goals_of(recording), off, [True] * len(rests)))
+    _print_rests(recording.camera, parts, rests, tracks, put_lines(recording))
+    _write_table(out, parts, rests, goals_of(recording), camera)
     typer.echo(f"\nWrote {out}")
     if picture is not None:
         draw_recording(unplanned_drawing(recording, log, tracks), picture)
@@ -133,6 +117,21 @@ def _stated(ends: str | None, unseen: str | None, operations: int) -> Any:
     return Stated(numbers(ends, "--ends") if ends else (), tuple(k - 1 for k in hidden))
 
 
-def _write(path: Path, text: str) -> None:
+def _print_rests(camera: Any, parts: list[str], rests: list[Any], tracks: Any, further: list[str]) -> None:
+    """The camera, where each part rested after its operation, and further lines."""
+    from apo_bench.recording.show.text import camera_lines, rest_lines
+
+    print_lines(camera_lines(camera))
+    times = {part: track.t for part, track in tracks.items()}
+    lines = rest_lines(list(zip(parts, rests, strict=True)), camera.T_world_camera, times)
+    typer.echo("\n" + "\n".join([*lines, *further]))
+
+
+def _write_table(path: Path, parts: list[str], rests: list[Any], goals: Any, camera: Any) -> None:
+    """Write goals as CSV; an operation that the log does not show has no rest."""
+    from apo_bench.recording.show.text import observation_table
+    from apo_bench.recording.without_scenario import deviations
+
+    sizes = [(1.0, 1.0) if rest is None else deviations(rest, camera) for rest in rests]
     with writing(f"--out {path}"):
-        path.write_text(text, encoding="utf-8")
+        path.write_text(observation_table(parts, goals, sizes, [rest is not None for rest in rests]), encoding="utf-8")

@@ -37,11 +37,8 @@ class DmAdapter(dm_env.Environment):  # type: ignore[misc]
             return self.reset()
         observation, reward, terminated, truncated, self.info = self._env.step(np.asarray(action))
         self._over = terminated or truncated
-        if terminated:
-            return dm_env.termination(float(reward), _arrays(observation))
-        if truncated:
-            return dm_env.truncation(float(reward), _arrays(observation))
-        return dm_env.transition(float(reward), _arrays(observation))
+        time_step = dm_env.termination if terminated else dm_env.truncation if truncated else dm_env.transition
+        return time_step(float(reward), _arrays(observation))
 
     def observation_spec(self) -> Any:
         return _spec(self._env.observation_space, "observation")

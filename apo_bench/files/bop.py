@@ -7,7 +7,7 @@ from array import array
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import final
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,15 +41,19 @@ class PoseRows:
     """(n, 3, 3), camera from model, as written: nearly rotations."""
     t_mm: Array
     """(n, 3), camera from model, axes of OpenCV."""
-    place: tuple[str, ...] | NDArray[np.int64]
+    place: NDArray[Any]
     """Where each row stands in the file: the line, or the entry of a JSON document."""
     score: Array
     """(n,), of the estimator; NaN where the file has none."""
 
-    def said(self, row: int) -> str:
+    def spot(self, row: int) -> str:
         """Where a row stands, for messages."""
+        return f"{self.file}, {self.where_in_file(row)}"
+
+    def where_in_file(self, row: int) -> str:
+        """The line, or the entry of a JSON document."""
         place = self.place[row]
-        return f"{self.file}, {place if isinstance(place, str) else f'line {place}'}"
+        return str(place) if isinstance(place, str) else f"line {place}"
 
 
 def read_results(path: str | Path) -> PoseRows:
@@ -92,11 +96,11 @@ def check_rows(rows: PoseRows) -> PoseRows:
     if wrong.any():
         k = int(np.argmax(wrong))
         fault = f"R R^t differs from the identity by {square[k]:.3g}" if square[k] > _NOT_A_ROTATION else "it mirrors"
-        raise InputError(f"{rows.said(k)}, R: a rotation matrix, row by row, is needed; {fault}.")
+        raise InputError(f"{rows.spot(k)}, R: a rotation matrix, row by row, is needed; {fault}.")
     distance = np.linalg.norm(rows.t_mm, axis=1)
     if np.median(distance) < _METRES:
         raise InputError(
-            f"{rows.said(0)}, t: millimetres are needed, and the median distance to the camera is "
+            f"{rows.spot(0)}, t: millimetres are needed, and the median distance to the camera is "
             f"{np.median(distance):.3g}; if these are metres, multiply by 1000."
         )
     _refuse_twice(rows)
@@ -112,9 +116,9 @@ def _refuse_twice(rows: PoseRows) -> None:
         i = same[np.argmin(order[same + 1])]
         first = int(order[i])
         again = int(order[i + 1])
-        earlier = rows.place[first]
-        earlier = earlier if isinstance(earlier, str) else f"line {earlier}"
-        raise InputError(f"{rows.said(again)}: the row of {earlier} stands there once more; keep one of the two.")
+        raise InputError(
+            f"{rows.spot(again)}: the row of {rows.where_in_file(first)} stands there once more; keep one of the two."
+        )
 
 
 def _lines(path: str | Path) -> Iterator[tuple[int, str]]:

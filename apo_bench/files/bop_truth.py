@@ -51,14 +51,14 @@ def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) 
     behind = truth.t_mm[:, 2] <= 0.0
     if behind.any():
         k = int(np.argmax(behind))
-        raise InputError(f"{truth.said(k)}, t: the third number is the depth before the camera and must be above 0.")
+        raise InputError(f"{truth.spot(k)}, t: the third number is the depth before the camera and must be above 0.")
     return truth
 
 
 def _only(rows: PoseRows, kept: Any) -> PoseRows:
     """The rows of a mask."""
-    place = rows.place[kept] if isinstance(rows.place, np.ndarray) else tuple(np.array(rows.place)[kept].tolist())
-    return PoseRows(rows.file, rows.where[kept], rows.R[kept], rows.t_mm[kept], place, rows.score[kept])
+    where = rows.where[kept]
+    return PoseRows(rows.file, where, rows.R[kept], rows.t_mm[kept], rows.place[kept], rows.score[kept])
 
 
 def _among(where: Any, known: Any) -> Any:
@@ -87,7 +87,9 @@ def _read_scene(path: Path, scene: int) -> PoseRows:
         raise InputError(f"{path}: no pose stands in the file; give the scene_gt.json of a scene with parts.")
     where, R, t, place = zip(*rows, strict=True)
     score = np.full(len(rows), np.nan)
-    return check_rows(PoseRows(str(path), np.array(where, dtype=np.int64), np.array(R), np.array(t), place, score))
+    return check_rows(
+        PoseRows(str(path), np.array(where, dtype=np.int64), np.array(R), np.array(t), np.array(place), score)
+    )
 
 
 def _entries(root: JsonNode, scene: int) -> Iterator[tuple[tuple[int, int, int], Any, Any, str]]:

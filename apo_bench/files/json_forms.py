@@ -24,7 +24,7 @@ from apo_bench.geometry.arrays import Array
 OBSERVATION_SCHEMA = "apo-bench/observation/2"
 PLAN_SCHEMA = "apo-bench/plan/2"
 
-_TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
+TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
 
 OUTLIER_KEYS = MappingProxyType(
     {"gross_rate": "gross", "broad_rate": "broad", "broad_times": "times", "wrong_relation_rate": "relation"}
@@ -89,7 +89,7 @@ def _poses_form(poses: Poses) -> Form:
 
 def covariance_form(C: Array) -> list[list[float]]:
     """A covariance (6, 6), [m, rad], in mm and degrees."""
-    return (C * np.outer(_TO_MM_DEG, _TO_MM_DEG)).tolist()
+    return (C * np.outer(TO_MM_DEG, TO_MM_DEG)).tolist()
 
 
 def _outliers_form(outliers: OutlierModel | None) -> Form:
@@ -113,7 +113,7 @@ def _shared_form(error: SharedError) -> Form:
 
 def _tails_form(tails: Tails) -> Form:
     """How errors are distributed: four numbers each, across and along the ray, tilt and turn about it."""
-    units = _TO_MM_DEG[[0, 0, 3, 3]]
+    units = TO_MM_DEG[[0, 0, 3, 3]]
     return {
         "axes": [frame.tolist() for frame in tails.frames],
         "scales_mm_deg": (tails.scales * units).tolist(),

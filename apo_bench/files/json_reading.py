@@ -12,7 +12,7 @@ from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError, unknown
 from apo_bench.files.deviations import ALLOWED_DEVIATIONS, SHIFT_M, TURN_RAD, is_sensible, is_within
-from apo_bench.files.json_forms import OBSERVATION_SCHEMA, OUTLIER_KEYS, PLAN_SCHEMA
+from apo_bench.files.json_forms import OBSERVATION_SCHEMA, OUTLIER_KEYS, PLAN_SCHEMA, TO_MM_DEG
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.io.documents import JsonNode, read_json
@@ -22,7 +22,6 @@ from apo_bench.scenario.scenario import Scenario
 _LEAST_FREEDOM = 0.4
 _DEVIATIONS = ("deviation_mm", "deviation_deg")
 _POSE = ("position_mm", "quaternion_wxyz")
-_TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
 
 
 def read_json_observation(path: str | Path, scenario: Scenario | None = None) -> Observation:
@@ -127,7 +126,7 @@ def _tails(node: JsonNode, n: int) -> Tails:
     """How errors are distributed."""
     keys = ("axes", "scales_mm_deg", "degrees_of_freedom", "deviations_mm_deg", "limits_mm_deg", "joined")
     fields = node.fields(keys)
-    units = _TO_MM_DEG[[0, 0, 3, 3]]
+    units = TO_MM_DEG[[0, 0, 3, 3]]
     axes = fields["axes"].numbers(n, 3, 3)
     if np.abs(axes @ np.swapaxes(axes, 1, 2) - np.eye(3)).max(initial=0.0) > 1e-6:
         fields["axes"].fail("a rotation matrix for each operation is needed")
@@ -198,7 +197,7 @@ def _covariance(node: JsonNode, *, definite: bool = True) -> Array:
         node.fail("a positive definite 6 x 6 matrix is needed", "every variance must be above 0 and consistent")
     if not definite and lowest < -1e-9 * largest:
         node.fail("a positive semidefinite 6 x 6 matrix is needed", "no variance may be negative")
-    return (C + C.T) / 2 / np.outer(_TO_MM_DEG, _TO_MM_DEG)
+    return (C + C.T) / 2 / np.outer(TO_MM_DEG, TO_MM_DEG)
 
 
 def _stated(entry: Mapping[str, JsonNode], assumed: tuple[float, float] | None) -> Array:
@@ -221,7 +220,7 @@ def _stated(entry: Mapping[str, JsonNode], assumed: tuple[float, float] | None) 
     mm, deg = assumed or (0.0, 0.0)
     mm = _deviation(entry["deviation_mm"], SHIFT_M, 1e-3) if "deviation_mm" in entry else mm
     deg = _deviation(entry["deviation_deg"], TURN_RAD, np.pi / 180.0) if "deviation_deg" in entry else deg
-    return np.diag(np.array([mm] * 3 + [deg] * 3) / _TO_MM_DEG) ** 2
+    return np.diag(np.array([mm] * 3 + [deg] * 3) / TO_MM_DEG) ** 2
 
 
 def _deviation(node: JsonNode, limits: tuple[float, float], unit: float) -> float:

@@ -58,7 +58,7 @@ def _bop(path: Path, how: Conventions) -> tuple[LogRows, list[str]]:
     ids = [str(k) for k in results.where[at, 2]]
     left = f"; {int(again.sum())} estimates of lower score left out" if again.any() else ""
     notes = ["lengths in mm, as in BOP", f"rotation matrices, row by row, at {how.rate_hz:g} images a second{left}"]
-    return LogRows(ids, results.where[at, 1] / how.rate_hz, T, [results.said(int(i)) for i in at]), notes
+    return LogRows(ids, results.where[at, 1] / how.rate_hz, T, [results.spot(int(i)) for i in at]), notes
 
 
 def _tum(path: Path, how: Conventions) -> tuple[LogRows, list[str]]:

@@ -80,7 +80,9 @@ def run_sweep(
     check_grids(grids)
     names = names_of(grids)
     loaded, arm = _checked(names, grids, corrector_limit_s)
-    lock = replace(environment_lock(names, loaded, arm.files, corrector_limit_s), cache=_kept_in(cache))
+    # the whole path of the folder of demonstrations, as every worker finds it
+    cache = None if cache is None else str(KeptDemonstrations(cache).folder.resolve())
+    lock = replace(environment_lock(names, loaded, arm.files, corrector_limit_s), cache=cache)
     files = {loaded[source].name: source for source in loaded if source not in scenario_names()}
     salt = None if salt_file is None else salt_of_sweep(salt_file, out)
     limits = Limits(None if here else limit_s, corrector_limit_s)
@@ -113,11 +115,6 @@ def names_of(grids: Sequence[SweepSettings]) -> Names:
         relations=tuple(dict.fromkeys(name for grid in grids for name in grid.relations)),
         noises=noises,
     )
-
-
-def _kept_in(cache: str | Path | None) -> str | None:
-    """The folder of demonstrations, as every worker finds it."""
-    return None if cache is None else str(KeptDemonstrations(cache).folder.resolve())
 
 
 def _executor(backend: str, address: str | None) -> Executor:

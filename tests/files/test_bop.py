@@ -47,7 +47,7 @@ def test_rows_are_read_in_mm_model_to_camera(tmp_path: Path) -> None:
     assert_array_equal(read.t_mm, [[10, 20, 900], [-1.5, 200, 1000]])
     assert_array_equal(read.R[1], [[0, -1, 0], [1, 0, 0], [0, 0, 1]])
     assert_array_equal(read.score, [0.5, 1e-3])
-    assert read.said(1) == f"{path}, line 4"
+    assert read.spot(1) == f"{path}, line 4"
 
 
 def test_planted_errors_come_back(tmp_path: Path, made: Made) -> None:

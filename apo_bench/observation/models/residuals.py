@@ -155,7 +155,7 @@ def match_rows(estimates: PoseRows, truth: PoseRows) -> NDArray[np.int64]:
     partner = np.full(len(truth.where), -1, dtype=np.int64)
     for there, seen in _groups(truth.where, estimates.where):
         if len(there) * len(seen) > MOST_PAIRS:
-            raise InputError(f"{estimates.said(int(seen[0]))}: {_MOST_IN_ONE_IMAGE}, {len(seen)} were given.")
+            raise InputError(f"{estimates.spot(int(seen[0]))}: {_MOST_IN_ONE_IMAGE}, {len(seen)} were given.")
         off = np.linalg.norm(truth.t_mm[there][:, None] - estimates.t_mm[seen][None], axis=2)
         i, j = linear_sum_assignment(off)
         partner[there[i]] = seen[j]

@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from multiprocessing import connection, resource_tracker
-from typing import Any, NamedTuple, final
+from typing import Any, final
 
 from apo_bench.io.processes import SAFE_PATH, end_descendants, environment
 from apo_bench.names import folder_of_own_modules, own_modules_in
@@ -29,15 +29,6 @@ THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """Children inherit one thread per linear algebra library: the processes already fill the cores."""
 
 
-class _Place(NamedTuple):
-    """What a process is told of the one that starts it."""
-
-    folder: str
-    """Of modules that are named as `module:name`."""
-    safe: str | None
-    """PYTHONSAFEPATH there, for what the process starts in turn."""
-
-
 @final
 class Process:
     """A process that works for this one, as this one sees it."""
@@ -46,13 +37,13 @@ class Process:
         """Start it.
 
         Args:
-            work: What it calls: `work(*given, say, pipe)`. `say` sends its arguments as one message, and what is sent
-                to the process comes out of `pipe`.
+            work: What it calls: `work(*arguments, say, pipe)`. `say` sends what it is given as one message, and what is
+                sent to the process comes out of `pipe`.
         """
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
-        place = _Place(folder_of_own_modules(), os.environ.get(SAFE_PATH))
-        self._process = context.Process(target=_live, args=(work, arguments, theirs, place))
+        surroundings = (folder_of_own_modules(), os.environ.get(SAFE_PATH))
+        self._process = context.Process(target=_live, args=(work, arguments, theirs, *surroundings))
         self._is_open = True
         with environment(dict.fromkeys((*THREADS, SAFE_PATH), "1")):
             resource_tracker.ensure_running()
@@ -117,11 +108,16 @@ class Process:
         self._pipe.close()
 
 
-def _live(work: Callable[..., None], arguments: tuple[Any, ...], pipe: Any, place: _Place) -> None:
-    """The life of the process: its work, and why that ends if it does too early."""
+def _live(work: Callable[..., None], arguments: tuple[Any, ...], pipe: Any, folder: str, safe: str | None) -> None:
+    """The life of the process: its work, and why that ends if it does too early.
+
+    Args:
+        folder: Of modules that are named as `module:name`.
+        safe: PYTHONSAFEPATH of the one that starts it, for what it starts in turn.
+    """
     del os.environ[SAFE_PATH]
-    if place.safe is not None:
-        os.environ[SAFE_PATH] = place.safe
+    if safe is not None:
+        os.environ[SAFE_PATH] = safe
     if hasattr(os, "setsid"):
         os.setsid()
     for number in SIGNALS:
@@ -136,7 +132,7 @@ def _live(work: Callable[..., None], arguments: tuple[Any, ...], pipe: Any, plac
             os._exit(1)  # code that forked and came back from both is heard once
         pipe.send(message)
 
-    with suppress(OSError), own_modules_in(place.folder):
+    with suppress(OSError), own_modules_in(folder):
         try:
             work(*arguments, say, pipe)
         except Exception as error:
