@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -11,15 +12,18 @@ from apo_bench.drafting.draft import draft
 from apo_bench.drafting.posed import on_the_table
 from apo_bench.drafting.writing import scenario_text
 from apo_bench.parts.making import bore, extrude, join, rectangle, shaft
-from tests.drafting.test_draft import at, covered, made
+from tests.drafting.test_draft import at, made
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Part files, and a scenario of a plate, two pins and a cover."""
-    folder = tmp_path_factory.mktemp("covered")
-    made_draft = draft(on_the_table(covered(folder, off_mm=0.0)))
-    (folder / "own.toml").write_text(scenario_text(made_draft, "own", "a test", folder), encoding="utf-8")
+    """Part files, and a scenario of a cube that is put on a plate."""
+    folder = tmp_path_factory.mktemp("cube")
+    plate = extrude(rectangle(80, 60), 0, 15, bottom="bottom", top="top")
+    cube = extrude(rectangle(30, 30), 0, 30, bottom="bottom", top="top")
+    places = {"plate": ("plate", at(0, 0, 0)), "cube": ("cube", at(0, 0, 15))}
+    pile = draft(on_the_table(made(folder, {"plate": plate, "cube": cube}, places)))
+    (folder / "own.toml").write_text(scenario_text(pile, "own", "a test", folder), encoding="utf-8")
     return folder
 
 
@@ -28,7 +32,7 @@ def test_all_is_well_and_the_robot_that_knows_the_truth_succeeds(folder: Path) -
     assert [finding.what for finding in findings if finding.ok] == [
         *("file", "parts", "starts", "ways", "play", "gripper", "reach", "oracle")
     ]
-    assert findings[0].sentence.startswith("4 parts, 3 operations, 7 contacts")
+    assert findings[0].sentence.startswith("2 parts, 1 operations, 1 contacts (1 plane on plane)")
     assert str(findings[-1]) == "ok     oracle   1 of 1 trials in which the robot knows the truth are right"
 
 
@@ -45,12 +49,13 @@ def test_a_trial_that_fails_is_said_with_the_line_to_change(folder: Path) -> Non
 
 
 def test_a_screw_is_known_by_its_name(folder: Path) -> None:
+    text = re.sub(r"\bcube\b(?!\.xml)", "screw_m4", (folder / "own.toml").read_text(encoding="utf-8"))
     path = folder / "renamed.toml"
-    path.write_text((folder / "own.toml").read_text(encoding="utf-8").replace("pin_1", "screw_m4"), encoding="utf-8")
+    path.write_text(text, encoding="utf-8")
     (wrong,) = (finding for finding in check_file(path, seeds=0) if not finding.ok)
     assert wrong.what == "parts"
     assert wrong.sentence.startswith("parts, screw_m4: by its name, and screws and nuts are put in straight here")
-    assert wrong.line == 1 + path.read_text(encoding="utf-8").splitlines().index("[parts.screw_m4]")
+    assert wrong.line == 1 + text.splitlines().index("[parts.screw_m4]")
 
 
 def test_a_part_that_does_not_stand_at_its_start_is_named_with_its_line(tmp_path: Path) -> None:
