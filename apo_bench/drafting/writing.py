@@ -11,6 +11,7 @@ from apo_bench.assembly.topology import Contact
 from apo_bench.drafting.draft import Draft
 from apo_bench.drafting.ordering import Placing
 from apo_bench.drafting.posed import TABLE, PosedPart
+from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.holds import PadPlace
 from apo_bench.parts import part_names, part_path
@@ -147,26 +148,9 @@ def _file_key(file: Path, folder: Path) -> str:
 
 
 def _pose(T: Array) -> str:
-    turn = turn_deg(T[:3, :3])
+    turn = pose.turn_deg(T)
     turned = f", turn_deg = {_list(turn)}" if np.abs(turn).max() > 0.0 else ""
     return f"{{ at_mm = {_list(1e3 * T[:3, 3])}{turned} }}"
-
-
-def turn_deg(R: Array) -> Array:
-    """The turns about the fixed x, then y, then z axis that make a rotation, (3,), [degrees]."""
-    # Of R = Rz Ry Rx the first column is (cos y cos z, cos y sin z, -sin y), the last row (-sin y, sin x cos y,
-    # cos x cos y).
-    down = float(np.hypot(R[0, 0], R[1, 0]))
-    y = np.arctan2(-R[2, 0], down)
-    if down > 1e-9:
-        x = np.arctan2(R[2, 1], R[2, 2])
-        z = np.arctan2(R[1, 0], R[0, 0])
-    else:  # with y at 90 degrees x and z turn about one axis: all of the turn is given to x
-        x = np.arctan2(-R[1, 2], R[1, 1])
-        z = 0.0
-    turn = np.degrees([x, y, z])
-    near = 90.0 * np.round(turn / 90.0)
-    return np.where(np.abs(turn - near) < 1e-7, near, turn) + 0.0
 
 
 def _axis(axis: Array) -> str:

@@ -91,6 +91,26 @@ def at(position: ArrayLike, turn_deg: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
     return T
 
 
+def turn_deg(T: ArrayLike) -> Array:
+    """The turns about the fixed x, then y, then z axis of a pose (4, 4), (3,), [degrees]; inverse of `at`.
+
+    Quarter turns are exact up to rounding. With y at 90 degrees x and z turn about one axis: z is said to be 0.
+    """
+    # Of R = Rz Ry Rx the first column is (cos y cos z, cos y sin z, -sin y), the last row (-sin y, sin x cos y,
+    # cos x cos y).
+    R = np.asarray(T, dtype=np.float64)[:3, :3]
+    down = float(np.hypot(R[0, 0], R[1, 0]))
+    x = np.arctan2(R[2, 1], R[2, 2])
+    y = np.arctan2(-R[2, 0], down)
+    z = np.arctan2(R[1, 0], R[0, 0])
+    if down <= 1e-9:
+        x = np.arctan2(-R[1, 2], R[1, 1])
+        z = 0.0
+    turn = np.degrees([x, y, z])
+    quarter = 90.0 * np.round(turn / 90.0)
+    return np.where(np.abs(turn - quarter) < 1e-7, quarter, turn) + 0.0
+
+
 def pack(T: ArrayLike) -> Array:
     """`(x, y, z, qw, qx, qy, qz)`, (*, 4, 4) -> (*, 7): of q and -q, the one whose first component is above 0.
 

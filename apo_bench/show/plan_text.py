@@ -12,6 +12,7 @@ import numpy as np
 from apo_bench.assembly.goals import Plan, placements
 from apo_bench.assembly.topology import spelled
 from apo_bench.files.json_forms import pose_form
+from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.insertion.arrival import Arrival, turning_state
 from apo_bench.insertion.macros import Macro
@@ -160,20 +161,8 @@ def _chain(line: PlanLine) -> Iterator[str]:
 def _until(line: PlanLine) -> str:
     if line.goal is None:
         return f"back at {line.back_to}"
-    numbers = np.round([*(1e3 * line.goal[:3, 3]), *_turns(line.goal)], 3) + 0.0
+    numbers = np.round([*(1e3 * line.goal[:3, 3]), *pose.turn_deg(line.goal)], 3) + 0.0
     return f"{' '.join(line.relations):11} {' '.join(f'{x:9.3f}' for x in numbers)}"
-
-
-def _turns(T: Array) -> Array:
-    """Turns about the fixed x, then y, then z axis, (3,), [degrees], as in a scenario file."""
-    # R = Rz Ry Rx; where y is 90 degrees only x - z or x + z is known, and z is said to be 0
-    R = T[:3, :3]
-    level = float(np.hypot(R[0, 0], R[1, 0]))
-    if level < 1e-9:
-        turns = [np.arctan2(-R[1, 2], R[1, 1]), np.arctan2(-R[2, 0], level), 0.0]
-    else:
-        turns = [np.arctan2(R[2, 1], R[2, 2]), np.arctan2(-R[2, 0], level), np.arctan2(R[1, 0], R[0, 0])]
-    return np.degrees(turns)
 
 
 def _listed(words: Iterator[str]) -> str:

@@ -12,7 +12,7 @@ from apo_bench.drafting.checking import line_of
 from apo_bench.drafting.draft import draft
 from apo_bench.drafting.posed import PosedPart, on_the_table
 from apo_bench.drafting.waiting import stance
-from apo_bench.drafting.writing import scenario_text, turn_deg
+from apo_bench.drafting.writing import scenario_text
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.parts import load_part
@@ -166,13 +166,6 @@ def test_what_would_tip_over_has_no_order(tmp_path: Path) -> None:
     places = {"base": ("base", at(0, 0, 0)), "bar": ("bar", at(45, 0, 20))}
     with pytest.raises(RuntimeError, match="'bar' would not keep its balance on what is there before it"):
         draft(on_the_table(made(tmp_path, {"base": base, "bar": bar}, places)))
-
-
-def test_turns_are_those_that_a_scenario_file_reads() -> None:
-    rng = np.random.default_rng(0)
-    for turn in (*rng.uniform(-180, 180, (20, 3)), (10, 90, 30), (0, -90, 0), (90, 0, -90)):
-        R = pose.at(np.zeros(3), turn)[:3, :3]
-        np.testing.assert_allclose(pose.at(np.zeros(3), turn_deg(R))[:3, :3], R, atol=1e-12)
 
 
 def test_what_stands_and_what_rolls(tmp_path: Path) -> None:

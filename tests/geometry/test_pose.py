@@ -143,3 +143,11 @@ def test_apply_moves_points() -> None:
 )
 def test_what_is_not_rigid(T: Array) -> None:
     assert not is_rigid(T[None]).any()
+
+
+def test_turns_are_those_that_make_the_pose() -> None:
+    rng = np.random.default_rng(0)
+    for turn in (*rng.uniform(-180, 180, (20, 3)), (10, 90, 30), (0, -90, 0), (90, 0, -90)):
+        T = pose.at((1.0, 2.0, 3.0), turn)
+        assert_allclose(pose.at((1.0, 2.0, 3.0), pose.turn_deg(T)), T, atol=1e-12)
+    assert pose.turn_deg(pose.at(np.zeros(3), (90, 0, -90))).tolist() == [90.0, 0.0, -90.0]
