@@ -1,7 +1,7 @@
 """What an arm makes of a plan before it moves: reach, room to the limits of joints, room of the gripper, tip error."""
 
 from collections.abc import Iterable, Sequence
-from typing import Any, Literal, cast
+from typing import Literal, cast
 
 import mujoco
 import numpy as np
@@ -13,6 +13,7 @@ from apo_bench.geometry.intrusion import intrusion_depths
 from apo_bench.geometry.solid import Solid
 from apo_bench.prediction.arm import ArmMove
 from apo_bench.simulation.arm_checks.tip_error import motion_error
+from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.execution.fingers import OPEN_TO_PICK_M, OPEN_TO_RELEASE_M
 from apo_bench.simulation.execution.prepare import Move, key_angles, moves
 from apo_bench.simulation.execution.transfer import Grip, after_transfer
@@ -111,7 +112,7 @@ def _sag(scene: Scene, q: Array, centroid: Array, weight_n: float) -> Array:
     tip = kinematics.forward(q)[:3, 3]
     # Joint torques of a wrench at the tip are J^T w; each servo gives way by torque over stiffness, and J takes that to
     # a twist of the tip, which turns about the tip: there exp(twist) back.
-    J = _jacobian(kinematics.model, kinematics.configuration.data, kinematics.site, scene.arm.joints)
+    J = _jacobian(kinematics)
     stiffness = np.array([model.actuator(f"arm/{name}").gainprm[0] for name in scene.arm.joints])
     force = np.array([0.0, 0.0, -weight_n])
     wrench = np.concatenate([force, np.cross(centroid - tip, force)])
@@ -119,12 +120,12 @@ def _sag(scene: Scene, q: Array, centroid: Array, weight_n: float) -> Array:
     return np.asarray(pose.at(tip) @ pose.exp(twist) @ pose.at(-tip))
 
 
-def _jacobian(model: Any, data: Any, site: int, joints: tuple[str, ...]) -> Array:
-    """Of the tip, (6, joints): how it moves [m] and turns [rad] with each joint [rad], world."""
-    Jp = np.zeros((3, model.nv))
-    Jr = np.zeros((3, model.nv))
-    mujoco.mj_jacSite(model, data, Jp, Jr, site)
-    return np.concatenate([Jp, Jr])[:, [int(model.joint(name).dofadr[0]) for name in joints]]
+def _jacobian(kinematics: Kinematics) -> Array:
+    """Of the tip, (6, joints): how it moves [m] and turns [rad] with each joint [rad], world, where the arm now is."""
+    model = kinematics.model
+    J = np.zeros((6, model.nv))
+    mujoco.mj_jacSite(model, kinematics.configuration.data, J[:3], J[3:], kinematics.site)
+    return J[:, model.jnt_dofadr[kinematics.ids]]
 
 
 def _beside_mm(scene: Scene, tip: Array, parts: Iterable[tuple[Solid, Array]]) -> float:

@@ -27,8 +27,8 @@ class Kinematics:
     def __init__(self, arm: Arm, posture: bool = True) -> None:
         self.model = _alone(arm)
         self.configuration = mink.Configuration(self.model)
-        self.adr = np.array([int(self.model.jnt_qposadr[self.model.joint(j).id]) for j in arm.joints])
-        self.tip = arm.tip
+        self.ids = [int(self.model.joint(j).id) for j in arm.joints]
+        self.adr = self.model.jnt_qposadr[self.ids]
         self._mount = arm.mount
         self.site = self.model.site(arm.tip).id
         self._task = mink.FrameTask(arm.tip, "site", position_cost=1.0, orientation_cost=0.3)
@@ -36,15 +36,20 @@ class Kinematics:
         self._full = self.model.qpos0.copy()
         limited = self.model.jnt_limited.astype(np.bool_)
         self._range: Array = np.where(limited[:, None], self.model.jnt_range, (-np.inf, np.inf)).T
-        self.ids = [int(self.model.joint(j).id) for j in arm.joints]
         self._posture: Any = None
         if posture:
             self.keep_near(arm.home)
 
     def keep_near(self, home: Array) -> None:
         """Of arms with more than six joints: which joint angles they prefer from now on, [rad]."""
-        if len(self.adr) > 6:
-            self._posture = _posture_task(self, home)
+        if len(self.adr) <= 6:
+            return
+        cost = np.zeros(self.model.nv)
+        cost[self.model.jnt_dofadr[self.ids]] = self.POSTURE
+        self._posture = mink.PostureTask(self.model, cost=cost)
+        q = self.model.qpos0.copy()
+        q[self.adr] = home
+        self._posture.set_target(q)
 
     @property
     def first_link(self) -> str:
@@ -122,14 +127,3 @@ def _alone(arm: Arm) -> Any:
         body.pos = T[:3]
         body.quat = T[3:]
     return spec.compile()
-
-
-def _posture_task(kinematics: Kinematics, home: Array) -> Any:
-    """What keeps the elbow where it is at home, (mink's `PostureTask`)."""
-    cost = np.zeros(kinematics.model.nv)
-    cost[kinematics.model.jnt_dofadr[kinematics.ids]] = Kinematics.POSTURE
-    task = mink.PostureTask(kinematics.model, cost=cost)
-    q = kinematics.model.qpos0.copy()
-    q[kinematics.adr] = home
-    task.set_target(q)
-    return task

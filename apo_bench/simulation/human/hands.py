@@ -179,7 +179,9 @@ class Hands:
 
     def _hold(self, hand: int, part: str, T_hand_part: Array) -> None:
         weld = self._weld(hand, part)
-        at = self._held_at(part)
+        # A weld pulls at the frame of a part of boxes, of others at the centre of mass, so that they hang straight.
+        solid = self.scene.scenario.assembly.solids[part]
+        at = np.zeros(3) if all_boxes(solid.pieces) else solid.centroid
         self.world.model.eq_data[weld, :11] = (
             *at,
             *(T_hand_part[:3, :3] @ at + T_hand_part[:3, 3]),
@@ -188,11 +190,6 @@ class Hands:
         )
         self.data.eq_active[weld] = 1
         self._held[hand][part] = T_hand_part
-
-    def _held_at(self, part: str) -> Array:
-        """Where the weld pulls, (3,): parts of boxes at their frame, others at the centre of mass, to hang straight."""
-        solid = self.scene.scenario.assembly.solids[part]
-        return np.zeros(3) if all_boxes(solid.pieces) else solid.centroid
 
     def _weld(self, hand: int, part: str) -> int:
         return int(self.world.model.equality(f"{HANDS[hand]}_{part}").id)
