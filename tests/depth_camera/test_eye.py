@@ -63,8 +63,8 @@ def watched(name: str, seed: int = 3) -> SimulatedDemonstration:
 
 
 def observed(name: str, level_mm: float, seed: int = 3) -> Observation:
-    shown = watched(name, seed)
-    return observe_demonstration(shown, range_sensor(scene(name), shown, level_mm), seed)
+    simulated = watched(name, seed)
+    return observe_demonstration(simulated, range_sensor(scene(name), simulated, level_mm), seed)
 
 
 def errors(name: str, seen: Observation, seed: int = 3) -> Array:
@@ -162,38 +162,38 @@ def test_levels_share_a_demonstration_and_seeds_give_the_same_bytes() -> None:
 
 @pytest.mark.parametrize("seed", [2, 3])
 def test_the_small_motion_of_castle_2_stays_unnoticed(seed: int) -> None:
-    shown = watched("stick_in_tower", seed)
-    moved = (shown.demonstration.final["castle2"] - shown.demonstration.goals[1])[:3, 3]
+    simulated = watched("stick_in_tower", seed)
+    moved = (simulated.demonstration.final["castle2"] - simulated.demonstration.goals[1])[:3, 3]
     assert 1.4 < 1e3 * np.linalg.norm(moved) < 4.1
-    eye = range_sensor(scene("stick_in_tower"), shown, 1.0)
-    events = eye.events(shown.demonstration, eye.sensed(stream(seed, OBSERVATION)))
+    eye = range_sensor(scene("stick_in_tower"), simulated, 1.0)
+    events = eye.events(simulated.demonstration, eye.sensed(stream(seed, OBSERVATION)))
     assert [event.moved for event in events] == [{"castle1"}, {"castle2"}, {"stick"}]
     seen = observed("stick_in_tower", 1.0, seed)
-    away = (seen.goals[1] - shown.demonstration.goals[1])[:3, 3]
+    away = (seen.goals[1] - simulated.demonstration.goals[1])[:3, 3]
     assert 1e3 * np.linalg.norm(away) < 0.5
 
 
 def test_a_part_that_is_not_the_expected_model_is_not_seen() -> None:
     """The scene shows a stick where the topology expects a second cube-like block to arrive."""
-    shown = watched("stick_in_tower")
-    assembly = shown.demonstration.assembly
+    simulated = watched("stick_in_tower")
+    assembly = simulated.demonstration.assembly
     short = replace(assembly.solids["stick"], pieces=assembly.solids["castle1"].pieces)
     wrong = replace(assembly, solids={**assembly.solids, "stick": short})
-    eye = range_sensor(scene("stick_in_tower"), shown, 1.0)
-    seen = eye(wrong, replace(shown.demonstration, assembly=wrong), stream(3, OBSERVATION))
+    eye = range_sensor(scene("stick_in_tower"), simulated, 1.0)
+    seen = eye(wrong, replace(simulated.demonstration, assembly=wrong), stream(3, OBSERVATION))
     assert seen.seen.tolist() == [True, True, False]
     assert seen.covariance[2][0, 0] > 0.005
-    assert np.array_equal(seen.goals[2], shown.layout.start["stick"])
+    assert np.array_equal(seen.goals[2], simulated.layout.start["stick"])
 
 
 def test_an_operation_that_no_image_shows_is_not_seen() -> None:
-    shown = watched("stick_in_tower")
-    eye = range_sensor(scene("stick_in_tower"), shown, 1.0)
+    simulated = watched("stick_in_tower")
+    eye = range_sensor(scene("stick_in_tower"), simulated, 1.0)
     blind = RangeSensor(eye.finder, eye.images[:2], eye.level_m, eye.turns, eye.play_m)
-    seen = observe_demonstration(shown, blind, 3)
+    seen = observe_demonstration(simulated, blind, 3)
     assert seen.seen.tolist() == [True, False, False]
     none = RangeSensor(eye.finder, eye.images[:1], eye.level_m, eye.turns, eye.play_m)
-    assert not observe_demonstration(shown, none, 3).seen.any()
+    assert not observe_demonstration(simulated, none, 3).seen.any()
 
 
 def test_only_the_representative_of_a_symmetry_is_taken_from_the_plan() -> None:
@@ -265,19 +265,19 @@ def test_levels_of_the_range_finder_are_mm_per_ray_wherever_they_stand(
 
 
 def test_a_trial_of_the_range_finder_says_so(capsys: pytest.CaptureFixture[str]) -> None:
-    asked = ["--level", "0.5", "--careless", "0", "--seed", "4"]
-    assert main(["replay", "block_on_block", "--eye", "range", *asked]) == 0
-    said = capsys.readouterr().out
-    assert "level 0.5 mm per ray, careless 0, seed 4, range finder" in said
-    (settings,) = [line for line in said.splitlines() if "range finder" in line]
+    options = ["--level", "0.5", "--careless", "0", "--seed", "4"]
+    assert main(["replay", "block_on_block", "--eye", "range", *options]) == 0
+    output = capsys.readouterr().out
+    assert "level 0.5 mm per ray, careless 0, seed 4, range finder" in output
+    (settings,) = [line for line in output.splitlines() if "range finder" in line]
     assert "deg" not in settings
 
 
 def test_a_sweep_has_both_eyes(tmp_path: Path) -> None:
-    asked = ["--eye", "noise,range", "--levels", "1", "--careless", "0", "--methods", "none", "--trials", "1"]
+    options = ["--eye", "noise,range", "--levels", "1", "--careless", "0", "--methods", "none", "--trials", "1"]
     out = tmp_path / "run"
     for _ in range(2):
-        assert main(["sweep", "block_on_block", *asked, "--workers", "1", "--out", str(out)]) == 0
+        assert main(["sweep", "block_on_block", *options, "--workers", "1", "--out", str(out)]) == 0
         rows = [json.loads(line) for line in (out / "trials.jsonl").read_text(encoding="utf-8").splitlines()]
         assert sorted((row["eye"], row["noise"], row["level_deg"]) for row in rows) == [
             ("noise", "isotropic", 1.0),

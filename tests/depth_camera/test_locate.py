@@ -105,9 +105,9 @@ def test_of_poses_that_look_the_same_the_expected_turn_is_reported() -> None:
     same = symmetries(SOLIDS["stick"])
     T = pose.at((0.1, 0.2, 0.3), (180.0, 0.0, 0.0)) @ pose.at((0, 0, 0), (0, 0, 143.0))
     T[:3, :3] = expected @ same[5][:3, :3]
-    found = nearest_symmetric_pose(T, same, expected)
-    assert np.allclose(found[:3, :3], expected)
-    assert np.allclose(found[:3, 3], T[:3, 3])
+    nearest = nearest_symmetric_pose(T, same, expected)
+    assert np.allclose(nearest[:3, :3], expected)
+    assert np.allclose(nearest[:3, 3], T[:3, 3])
 
 
 def test_noise_alone_is_no_change() -> None:
@@ -116,9 +116,9 @@ def test_noise_alone_is_no_change() -> None:
     before = range_of(posed(SHAPES["castle"], STANDING), view)
     for level in (0.0, 1e-3, 4e-3):
         noisy = [before + level * rng.standard_normal(before.shape) for _ in range(2)]
-        found = regions(*noisy, level)
-        assert not found.appeared.any()
-        assert not found.vanished.any()
+        changed = regions(*noisy, level)
+        assert not changed.appeared.any()
+        assert not changed.vanished.any()
 
 
 @pytest.mark.parametrize("moved_twice", [False, True])
@@ -154,19 +154,19 @@ def test_a_nudge_goes_unnoticed(yaw: int) -> None:
         before = range_of(posed(SHAPES["castle"], T), view)
         nudged = range_of(posed(SHAPES["castle"], T @ pose.at((0.0, 0.004, 0.0))), view)
         assert (np.abs(nudged - before) > 0.01).any()
-        found = regions(before, nudged, 1e-3)
-        assert not found.appeared.any()
-        assert not found.vanished.any()
+        changed = regions(before, nudged, 1e-3)
+        assert not changed.appeared.any()
+        assert not changed.vanished.any()
 
 
 def test_a_part_that_is_carried_away_appears_and_vanishes() -> None:
     view = RangeFinder().views[0]
     before = range_of(posed(SHAPES["castle"], STANDING), view)
     after = range_of(posed(SHAPES["castle"], pose.at((0.0, 0.2, 0.0)) @ STANDING), view)
-    found = regions(before, after, 0.0)
-    assert ((after < before - 0.02) & ~found.appeared).sum() < 40
-    assert ((after > before + 0.02) & ~found.vanished).sum() < 40
-    assert not (found.appeared & found.vanished).any()
+    changed = regions(before, after, 0.0)
+    assert ((after < before - 0.02) & ~changed.appeared).sum() < 40
+    assert ((after > before + 0.02) & ~changed.vanished).sum() < 40
+    assert not (changed.appeared & changed.vanished).any()
 
 
 def test_small_regions_are_dropped_and_smoothing_keeps_edges() -> None:
@@ -206,9 +206,9 @@ def test_the_stated_covariance_is_that_of_the_fits() -> None:
         common = bias * rng.standard_normal(2)[exact.view]
         error = noise * rng.standard_normal(len(exact)) + common
         seen = Points(exact.at + error[:, None] * exact.ray, exact.ray, exact.view)
-        found = refine(shape, seen, T[None], 3e-3, 15).T[0]
-        xi[i] = pose.log(pose.inverse(T) @ found)
-        z[i] = xi[i] @ np.linalg.solve(covariance(shape, seen, found, 3e-3, noise, bias), xi[i])
+        fitted = refine(shape, seen, T[None], 3e-3, 15).T[0]
+        xi[i] = pose.log(pose.inverse(T) @ fitted)
+        z[i] = xi[i] @ np.linalg.solve(covariance(shape, seen, fitted, 3e-3, noise, bias), xi[i])
     assert np.abs(xi[:, :3].mean(axis=0)).max() < 1e-4
     assert 0.7 < z.mean() / 6.0 < 1.4
 

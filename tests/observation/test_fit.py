@@ -44,8 +44,8 @@ def compared_files(estimates: Path, truth: Path) -> Residuals:
 @pytest.fixture(scope="module")
 def known_file(tmp_path_factory: pytest.TempPathFactory) -> Residuals:
     """40,000 parts with known errors, through the files."""
-    made = made_of.draw(40_000, Known(), np.random.default_rng(3))
-    return compared_files(*made_of.files(tmp_path_factory.mktemp("known"), made))
+    estimates = made_of.draw(40_000, Known(), np.random.default_rng(3))
+    return compared_files(*made_of.files(tmp_path_factory.mktemp("known"), estimates))
 
 
 def test_known_parameters_are_recovered_within_five_percent(known_file: Residuals) -> None:
@@ -76,8 +76,8 @@ def test_a_wrong_fit_is_told(known_file: Residuals) -> None:
 def test_the_limit_is_no_sign_of_short_tails() -> None:
     """Errors that are mostly beyond the limit: the scale is that of the whole, not of what is left."""
     split = Split(Tail(4.0), Tail(30.0), 50.0)
-    found = fit_split(split.draw(40_000, np.random.default_rng(5)), 50.0)
-    assert_allclose([found.across.scale, found.along.scale], [4.0, 30.0], rtol=0.05)
+    fitted = fit_split(split.draw(40_000, np.random.default_rng(5)), 50.0)
+    assert_allclose([fitted.across.scale, fitted.along.scale], [4.0, 30.0], rtol=0.05)
 
 
 @pytest.mark.parametrize("split", SPLITS)
@@ -102,70 +102,70 @@ def test_parts_that_look_alike_when_turned_do_not_count(tmp_path: Path) -> None:
     """Object 2 looks alike turned by half about an axis 20 mm beside its origin, object 3 by any angle: both are taken
     so in estimates, all of them right. The fit is that of the others, but for chance."""
     rng = np.random.default_rng(6)
-    made = made_of.draw(8000, Known(missed=0.0, outliers=0.0), rng)
-    plain = fit_noise(compared_files(*made_of.files(tmp_path, made)), "")
-    part = made.where[:, 2]
-    n = len(made.where)
+    drawn = made_of.draw(8000, Known(missed=0.0, outliers=0.0), rng)
+    plain = fit_noise(compared_files(*made_of.files(tmp_path, drawn)), "")
+    part = drawn.where[:, 2]
+    n = len(drawn.where)
     angle = np.where(part == 2, 180.0 * (rng.random(n) < 0.5), np.where(part == 3, rng.uniform(-180.0, 180.0, n), 0.0))
     turned = Rotation.from_euler("z", angle[:, None], degrees=True).as_matrix()
     axis = np.where(part == 2, 20.0, 0.0)[:, None] * [1.0, 0.0, 0.0]
     beside = axis - np.einsum("nij,nj->ni", turned, axis)
-    t = made.t_seen + np.einsum("nij,nj->ni", made.R_seen, beside)
-    found = compared_files(*made_of.files(tmp_path, made._replace(R_seen=made.R_seen @ turned, t_seen=t)))
-    assert found.round_objects == (3,)
-    assert np.median(found.across_mm[(part == 2) & ~found.upright]) > 10.0
-    kinds = np.array([line.split(",")[3] for line in residuals_text(found).splitlines()[1:]])
+    t = drawn.t_seen + np.einsum("nij,nj->ni", drawn.R_seen, beside)
+    residuals = compared_files(*made_of.files(tmp_path, drawn._replace(R_seen=drawn.R_seen @ turned, t_seen=t)))
+    assert residuals.round_objects == (3,)
+    assert np.median(residuals.across_mm[(part == 2) & ~residuals.upright]) > 10.0
+    kinds = np.array([line.split(",")[3] for line in residuals_text(residuals).splitlines()[1:]])
     assert set(kinds[part[:: -(-n // len(kinds))] == 3]) == {"turned"}
-    measured = fit_noise(found, "")
+    measured = fit_noise(residuals, "")
     for mine, known in ((measured.shift_mm, plain.shift_mm), (measured.turn_deg, plain.turn_deg)):
         assert_allclose([*mine.across, *mine.along], [*known.across, *known.along], rtol=0.1)
-    assert all(figures.distance < 1.2 * figures.by_chance for figures in goodness_of_fit(found, measured))
-    lines = fit_lines(found, measured, goodness_of_fit(found, measured))
+    assert all(figures.distance < 1.2 * figures.by_chance for figures in goodness_of_fit(residuals, measured))
+    lines = fit_lines(residuals, measured, goodness_of_fit(residuals, measured))
     assert any(line.startswith("round ") and "objects 3 look alike" in line for line in lines)
 
 
 def test_outlier_rates_by_score_are_those_of_fifths(tmp_path: Path) -> None:
     """Scores that say which fifth of estimates has 60 % outliers, and scores that say nothing."""
     rng = np.random.default_rng(7)
-    made = made_of.draw(5000, Known(missed=0.0, outliers=0.0), rng)
-    score = rng.permutation(len(made.where)) / len(made.where)
+    drawn = made_of.draw(5000, Known(missed=0.0, outliers=0.0), rng)
+    score = rng.permutation(len(drawn.where)) / len(drawn.where)
     gross = (score < 0.2) & (rng.random(len(score)) < 0.6)
-    t = made.t_seen + 100.0 * gross[:, None]
-    truth = made_of.results(tmp_path / "truth.csv", made.where, made.R, made.t)
-    said = outliers_by_score(
-        compared_files(made_of.results(tmp_path / "e.csv", made.where, made.R_seen, t, score), truth)
+    t = drawn.t_seen + 100.0 * gross[:, None]
+    truth = made_of.results(tmp_path / "truth.csv", drawn.where, drawn.R, drawn.t)
+    bands = outliers_by_score(
+        compared_files(made_of.results(tmp_path / "e.csv", drawn.where, drawn.R_seen, t, score), truth)
     )
-    assert_allclose([band.least for band in said], [0.0, 0.2, 0.4, 0.6, 0.8], atol=1e-3)
-    assert said[0].outliers == pytest.approx(gross.sum() / 1000.0, abs=1e-9)
-    assert [band.outliers for band in said[1:]] == [0.0] * 4
-    assert not outliers_by_score(compared_files(*made_of.files(tmp_path, made)))
+    assert_allclose([band.least for band in bands], [0.0, 0.2, 0.4, 0.6, 0.8], atol=1e-3)
+    assert bands[0].outliers == pytest.approx(gross.sum() / 1000.0, abs=1e-9)
+    assert [band.outliers for band in bands[1:]] == [0.0] * 4
+    assert not outliers_by_score(compared_files(*made_of.files(tmp_path, drawn)))
 
 
 def test_too_few_estimates_and_perfect_ones_are_refused(tmp_path: Path) -> None:
-    made = made_of.draw(100, Known(missed=0.0, outliers=0.0), np.random.default_rng(0))
-    truth = made_of.results(tmp_path / "truth.csv", made.where, made.R, made.t)
+    drawn = made_of.draw(100, Known(missed=0.0, outliers=0.0), np.random.default_rng(0))
+    truth = made_of.results(tmp_path / "truth.csv", drawn.where, drawn.R, drawn.t)
     with pytest.raises(InputError, match="the places that were estimated are the true ones, or nearly"):
         fit_noise(compared_files(truth, truth), "")
-    unturned = made_of.results(tmp_path / "unturned.csv", made.where, made.R, made.t_seen)
+    unturned = made_of.results(tmp_path / "unturned.csv", drawn.where, drawn.R, drawn.t_seen)
     with pytest.raises(InputError, match="the rotations that were estimated are the true ones, or nearly"):
         fit_noise(compared_files(unturned, truth), "")
-    few = made_of.results(tmp_path / "few.csv", made.where[:20], made.R_seen[:20], made.t_seen[:20])
+    few = made_of.results(tmp_path / "few.csv", drawn.where[:20], drawn.R_seen[:20], drawn.t_seen[:20])
     with pytest.raises(InputError, match="20 of 100 parts have an estimate within 50 mm and 30 deg; at least 30"):
         fit_noise(compared_files(few, truth), "")
 
 
 def test_errors_in_one_direction_only_can_be_fitted_read_and_drawn(tmp_path: Path) -> None:
     """A scale at its bound is written and read again."""
-    made = made_of.draw(200, Known(outliers=0.0), np.random.default_rng(0))
-    shift = made.shift * [0.0, 0.0, 1.0]
-    t = made.t + np.einsum("nij,nj->ni", made_of.ray_frames(made.t), shift)
-    found = compared_files(*made_of.files(tmp_path, made._replace(t_seen=t)))
-    measured = fit_noise(found, "")
+    drawn = made_of.draw(200, Known(outliers=0.0), np.random.default_rng(0))
+    shift = drawn.shift * [0.0, 0.0, 1.0]
+    t = drawn.t + np.einsum("nij,nj->ni", made_of.ray_frames(drawn.t), shift)
+    residuals = compared_files(*made_of.files(tmp_path, drawn._replace(t_seen=t)))
+    measured = fit_noise(residuals, "")
     assert measured.shift_mm.across.scale < 0.006
     path = tmp_path / "noise.toml"
     path.write_text(noise_text(measured), encoding="utf-8")
     assert_allclose([*read_noise(path)[0].shift_mm.along], [*measured.shift_mm.along], rtol=1e-4)
-    draw_fit(found, measured, tmp_path / "fit.png")
+    draw_fit(residuals, measured, tmp_path / "fit.png")
 
 
 @pytest.fixture(scope="module")
@@ -203,8 +203,10 @@ def test_published_estimates_have_the_figures_that_are_known(lmo: Residuals) -> 
 def test_the_preset_is_the_fit(name: str, request: pytest.FixtureRequest) -> None:
     shipped = read_noise(presets()[f"megapose-{name}"])[0]
     measured = fit_noise(published(request, name), "")
-    for mine, made in ((shipped.shift_mm, measured.shift_mm), (shipped.turn_deg, measured.turn_deg)):
-        assert_allclose([*mine.across, *mine.along, mine.limit], [*made.across, *made.along, made.limit], rtol=1e-3)
+    for mine, fitted in ((shipped.shift_mm, measured.shift_mm), (shipped.turn_deg, measured.turn_deg)):
+        assert_allclose(
+            [*mine.across, *mine.along, mine.limit], [*fitted.across, *fitted.along, fitted.limit], rtol=1e-3
+        )
     assert_allclose(
         [shipped.missed, shipped.outliers, shipped.farthest_mm],
         [measured.missed, measured.outliers, measured.farthest_mm],
@@ -245,19 +247,19 @@ def test_presets_name_their_source_and_come_without_outliers_too(name: str) -> N
 
 
 def test_the_command_writes_what_it_says(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    made = made_of.draw(1000, Known(), np.random.default_rng(2))
-    estimates, truth = made_of.files(tmp_path, made)
+    drawn = made_of.draw(1000, Known(), np.random.default_rng(2))
+    estimates, truth = made_of.files(tmp_path, drawn)
     out = tmp_path / "noise.toml"
     picture = tmp_path / "fit.png"
     samples = tmp_path / "residuals.csv"
-    asked = ["noise", "fit", "--estimates", str(estimates), "--truth", str(truth)]
+    arguments = ["noise", "fit", "--estimates", str(estimates), "--truth", str(truth)]
     written = ["--out", str(out), "--picture", str(picture), "--residuals", str(samples), "--source", 'a "new"\none']
-    assert main([*asked, *written, "--json"]) == 0
+    assert main([*arguments, *written, "--json"]) == 0
     form = json.loads(capsys.readouterr().out)
-    found = compared_files(estimates, truth)
-    measured = fit_noise(found, 'a "new" one')
-    assert form == json.loads(json.dumps(fit_form(found, measured, goodness_of_fit(found, measured))))
-    notes = fit_notes(found, measured, goodness_of_fit(found, measured))
+    residuals = compared_files(estimates, truth)
+    measured = fit_noise(residuals, 'a "new" one')
+    assert form == json.loads(json.dumps(fit_form(residuals, measured, goodness_of_fit(residuals, measured))))
+    notes = fit_notes(residuals, measured, goodness_of_fit(residuals, measured))
     command = "apo-bench noise fit --estimates estimates.csv --truth truth.csv"
     assert out.read_text(encoding="utf-8") == noise_text(measured, (command, *notes))
     read, _ = read_noise(out)
@@ -265,13 +267,13 @@ def test_the_command_writes_what_it_says(tmp_path: Path, capsys: pytest.CaptureF
     assert_allclose([*read.shift_mm.across, read.missed], [*measured.shift_mm.across, measured.missed], rtol=1e-4)
     assert picture.read_bytes().startswith(b"\x89PNG")
     assert len(samples.read_text(encoding="utf-8").splitlines()) == 1001
-    assert main([*asked, "--scene-id", "1"]) == 0
-    said = capsys.readouterr().out
-    measured = fit_noise(found, "estimates.csv against truth.csv")
-    assert said == "\n".join(fit_lines(found, measured, goodness_of_fit(found, measured))) + "\n"
-    assert main([*asked, "--scene-id", "2"]) == 2
+    assert main([*arguments, "--scene-id", "1"]) == 0
+    output = capsys.readouterr().out
+    measured = fit_noise(residuals, "estimates.csv against truth.csv")
+    assert output == "\n".join(fit_lines(residuals, measured, goodness_of_fit(residuals, measured))) + "\n"
+    assert main([*arguments, "--scene-id", "2"]) == 2
     assert "no image of scene 2 has an estimate" in capsys.readouterr().err
     for option, name in (("--out", "noise.csv"), ("--picture", "no/fit.png"), ("--residuals", "truth.csv")):
-        assert main([*asked, option, str(tmp_path / name)]) == 2
+        assert main([*arguments, option, str(tmp_path / name)]) == 2
         assert option in capsys.readouterr().err
     assert truth.read_text(encoding="utf-8").startswith(made_of.HEADER)

@@ -47,11 +47,11 @@ class Draws(NamedTuple):
 
 
 def drawn(noise: Noise, trials: int = TRIALS) -> Draws:
-    shown = scenes.shown(CYCLE)
-    made = [observe(shown, noise, np.random.default_rng(seed)) for seed in range(trials)]
-    xi = pose.log(pose.inverse(CYCLE.goals) @ np.array([one.goals for one in made]))
-    L = np.linalg.cholesky(np.array([one.covariance for one in made]))
-    seen = np.array([one.seen for one in made], dtype=np.float64)
+    demonstration = scenes.shown(CYCLE)
+    observations = [observe(demonstration, noise, np.random.default_rng(seed)) for seed in range(trials)]
+    xi = pose.log(pose.inverse(CYCLE.goals) @ np.array([observation.goals for observation in observations]))
+    L = np.linalg.cholesky(np.array([observation.covariance for observation in observations]))
+    seen = np.array([observation.seen for observation in observations], dtype=np.float64)
     return Draws(np.linalg.solve(L, xi[..., None])[..., 0] * seen[..., None], seen)
 
 
@@ -159,14 +159,14 @@ def test_levels_scale_the_same_errors_and_use_chance_alike(name: str) -> None:
         rng = np.random.default_rng(2)
         seen.append(observe(scenes.shown(CYCLE), make_noise(name, Level(0.5 * factor, 0.75 * factor)), rng))
         after.add(rng.random())
-    weak, strong = (pose.log(pose.inverse(CYCLE.goals) @ one.goals) for one in seen)
+    weak, strong = (pose.log(pose.inverse(CYCLE.goals) @ observation.goals) for observation in seen)
     assert_array_equal(seen[0].seen, seen[1].seen)
     there = seen[0].seen
     assert there.any()
     assert_allclose(strong[there, 3:], 4.0 * weak[there, 3:], rtol=1e-6, atol=1e-9)
     lengths = [np.linalg.norm(xi[there, :3], axis=1) for xi in (weak, strong)]
     assert_allclose(lengths[1], 4.0 * lengths[0], rtol=1e-6)
-    weight = [np.trace(one.covariance[there][:, :3, :3], axis1=1, axis2=2) for one in seen]
+    weight = [np.trace(observation.covariance[there][:, :3, :3], axis1=1, axis2=2) for observation in seen]
     assert_allclose(weight[1], 16.0 * weight[0], rtol=1e-2)
     assert len(after) == 1
 
@@ -194,8 +194,10 @@ def test_one_seed_gives_the_same_bytes_and_another_one_others(name: str) -> None
 def test_carelessness_is_stated_but_not_drawn(name: str) -> None:
     careless = np.zeros((5, 6, 6))
     careless[1, 1, 1] = 0.0029**2
-    shown = (scenes.shown(CYCLE), scenes.shown(CYCLE, careless))
-    plain, loose = (observe(one, make_noise(name, LEVEL), np.random.default_rng(0)) for one in shown)
+    demonstrations = (scenes.shown(CYCLE), scenes.shown(CYCLE, careless))
+    plain, loose = (
+        observe(demonstration, make_noise(name, LEVEL), np.random.default_rng(0)) for demonstration in demonstrations
+    )
     assert_array_equal(loose.goals, plain.goals)
     assert plain.seen[1]
     assert_allclose(loose.covariance - plain.covariance, careless, atol=1e-17)
@@ -210,7 +212,7 @@ def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPat
     n = len(scenario.assembly)
     demonstration = Demonstration(scenario.assembly, layout.start, layout.goals, final, np.zeros((n, 6, 6)))
     scene: Any = SimpleNamespace(scenario=scenario, clearance_mm=0.25, arm=SimpleNamespace(mjcf=""))
-    shown = SimulatedDemonstration(Layout(layout.goals, layout.start), demonstration)
+    simulated = SimulatedDemonstration(Layout(layout.goals, layout.start), demonstration)
     carried_out: list[Any] = []
 
     class Carried(Exception):
@@ -224,7 +226,7 @@ def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(trial, "predicted_outcome", lambda *_: "")  # which needs an arm
     spec = TrialSettings("carried_bridge", level_mm=1.5, level_deg=0.5, noise=name, method="none", seed=5)
     with pytest.raises(Carried):
-        trial.run_trial(spec, scene, simulated=shown, content="any")
+        trial.run_trial(spec, scene, simulated=simulated, content="any")
     expected = make_noise(name, Level(1.5, 0.5))(demonstration.assembly, demonstration, stream(5, 2))
     assert expected.seen.all()
     assert carried_out[0].goals.tobytes() == expected.goals.tobytes()
@@ -235,9 +237,9 @@ def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPat
 @pytest.mark.parametrize("name", NAMES)
 def test_what_was_not_seen_is_never_carried_out(name: str) -> None:
     """Of forty seeds: a plan of `none` exists exactly where everything was seen, and then holds what was seen."""
-    shown = SimulatedDemonstration(Layout(CYCLE.goals, CYCLE.start), scenes.shown(CYCLE))
+    simulated = SimulatedDemonstration(Layout(CYCLE.goals, CYCLE.start), scenes.shown(CYCLE))
     for seed in range(40):
-        seen = observe_demonstration(shown, make_noise(name, LEVEL), seed)
+        seen = observe_demonstration(simulated, make_noise(name, LEVEL), seed)
         planned = apply_method("none", seen, CYCLE.goals)
         if seen.seen.all():
             assert planned.plan is not None

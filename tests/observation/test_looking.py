@@ -49,16 +49,19 @@ def test_a_look_does_not_depend_on_what_was_asked_before():
 
 def test_a_look_may_miss_and_err_as_the_first():
     look = looks(100, "outliers")
-    found = [look(range(N)) for _ in range(100)]
-    missed = np.mean([~one.seen for one in found])
+    observations = [look(range(N)) for _ in range(100)]
+    missed = np.mean([~seen.seen for seen in observations])
     assert 0.0 < missed < 0.06  # 2 % of 500; 0.06 is 6 deviations above
-    away = [np.linalg.norm(one.goals[one.seen][:, :3, 3] - demonstration().goals[one.seen][:, :3, 3]) for one in found]
+    away = [
+        np.linalg.norm(seen.goals[seen.seen][:, :3, 3] - demonstration().goals[seen.seen][:, :3, 3])
+        for seen in observations
+    ]
     assert max(away) > 5 * np.median(away)
 
 
 def test_the_relations_are_those_that_the_corrector_was_told():
-    told = load_scenario("carried_bridge").assembly
-    assert looks(1, assembly=told)([0]).assembly is told
+    assembly = load_scenario("carried_bridge").assembly
+    assert looks(1, assembly=assembly)([0]).assembly is assembly
 
 
 @pytest.mark.parametrize("asked", [[], [N], [-1], ["a"], [0.5]])

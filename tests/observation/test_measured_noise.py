@@ -57,10 +57,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Files of residuals: `whole.csv`, and `inliers.csv` of an estimator with a bias, without outliers and misses."""
     path = tmp_path_factory.mktemp("residuals")
     for name, known in (("whole", WHOLE), ("inliers", INLIERS)):
-        made = residuals_of(path, known)
+        residuals = residuals_of(path, known)
         if known is INLIERS:
-            made = replace(made, shift_mm=0.85 * made.shift_mm + [0.0, 2.0, 5.0])
-        (path / f"{name}.csv").write_text(residuals_text(made), encoding="utf-8")
+            residuals = replace(residuals, shift_mm=0.85 * residuals.shift_mm + [0.0, 2.0, 5.0])
+        (path / f"{name}.csv").write_text(residuals_text(residuals), encoding="utf-8")
     return path
 
 
@@ -79,11 +79,11 @@ def see(name: str, seed: int, level: Level = LEVEL) -> Observation:
 def whitened(name: str, draws: int = DRAWS) -> tuple[Array, Array]:
     """Body twists in units of what was stated, (draws, n, 6), and which were seen, (draws, n)."""
     noise = make_noise(name, LEVEL)
-    shown = scenes.shown(TOWER)
-    seen = [observe(shown, noise, np.random.default_rng(seed)) for seed in range(draws)]
-    xi = pose.log(pose.inverse(TOWER.goals) @ np.array([one.goals for one in seen]))
-    L = np.linalg.cholesky(np.array([one.covariance for one in seen]))
-    return np.linalg.solve(L, xi[..., None])[..., 0], np.array([one.seen for one in seen])
+    demonstration = scenes.shown(TOWER)
+    seen = [observe(demonstration, noise, np.random.default_rng(seed)) for seed in range(draws)]
+    xi = pose.log(pose.inverse(TOWER.goals) @ np.array([observation.goals for observation in seen]))
+    L = np.linalg.cholesky(np.array([observation.covariance for observation in seen]))
+    return np.linalg.solve(L, xi[..., None])[..., 0], np.array([observation.seen for observation in seen])
 
 
 def test_no_bias_and_the_covariance_that_is_stated(names: tuple[str, str]) -> None:
@@ -142,7 +142,9 @@ def test_a_level_multiplies_what_was_measured(names: tuple[str, str]) -> None:
             after.add(rng.random())
         assert len(after) == 1
         assert_array_equal(seen[0].seen, seen[1].seen)
-        weak, strong = (pose.log(pose.inverse(TOWER.goals) @ one.goals)[one.seen] for one in seen)
+        weak, strong = (
+            pose.log(pose.inverse(TOWER.goals) @ observation.goals)[observation.seen] for observation in seen
+        )
         lengths = [np.linalg.norm(xi[:, :3], axis=1) for xi in (weak, strong)]
         assert_allclose(lengths[1], 4.0 * lengths[0], rtol=1e-6)
         assert_allclose(strong[:, 3:], 2.0 * weak[:, 3:], rtol=1e-6, atol=1e-12)
@@ -177,10 +179,10 @@ def test_what_is_seen_reaches_the_robot_and_misses_do_not(names: tuple[str, str]
 def test_nothing_of_the_truth_is_in_what_was_missed(names: tuple[str, str]) -> None:
     """Its pose is the one at which the part started or was seen last, and what is stated says that it is not known."""
     noise = make_noise(names[0], LEVEL)
-    shown = scenes.shown(TOWER)
+    demonstration = scenes.shown(TOWER)
     missed = 0
     for seed in range(60):
-        seen = observe(shown, noise, np.random.default_rng(seed))
+        seen = observe(demonstration, noise, np.random.default_rng(seed))
         for k in np.flatnonzero(~seen.seen):
             missed += 1
             start = TOWER.start[TOWER.assembly.operations[k].main]

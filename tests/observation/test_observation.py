@@ -27,8 +27,8 @@ CARELESS[1, 1, 1] = 0.0029**2
 def errors(level: Level, draws: int) -> Array:
     """Body twists of what was seen, from what was shown, (draws * n, 6)."""
     rng = np.random.default_rng(11)
-    shown = scenes.shown(TOWER)
-    seen = [Isotropic(level)(shown.assembly, shown, rng).goals for _ in range(draws)]
+    demonstration = scenes.shown(TOWER)
+    seen = [Isotropic(level)(demonstration.assembly, demonstration, rng).goals for _ in range(draws)]
     return pose.log(pose.inverse(TOWER.goals) @ np.array(seen)).reshape(-1, 6)
 
 
@@ -61,15 +61,17 @@ def test_the_frame_of_the_part_counts_not_the_world() -> None:
 
 def test_level_zero_is_exact_bit_for_bit() -> None:
     for careless in (None, CARELESS):
-        shown = scenes.shown(TOWER, careless)
-        seen = observe(shown, Isotropic(Level(0.0, 0.0)), np.random.default_rng(5))
-        assert seen.goals.tobytes() == shown.goals.tobytes()
+        demonstration = scenes.shown(TOWER, careless)
+        seen = observe(demonstration, Isotropic(Level(0.0, 0.0)), np.random.default_rng(5))
+        assert seen.goals.tobytes() == demonstration.goals.tobytes()
 
 
 def test_levels_only_scale_the_same_unit_draws() -> None:
-    shown = scenes.shown(TOWER)
+    demonstration = scenes.shown(TOWER)
     twist = {
-        level: pose.log(pose.inverse(TOWER.goals) @ observe(shown, Isotropic(level), np.random.default_rng(2)).goals)
+        level: pose.log(
+            pose.inverse(TOWER.goals) @ observe(demonstration, Isotropic(level), np.random.default_rng(2)).goals
+        )
         for level in (Level(1.0, 1.0), Level(3.0, 0.5))
     }
     ratio = twist[Level(3.0, 0.5)] / twist[Level(1.0, 1.0)]
@@ -79,11 +81,11 @@ def test_levels_only_scale_the_same_unit_draws() -> None:
 
 
 def test_levels_consume_the_generator_alike() -> None:
-    shown = scenes.shown(TOWER)
+    demonstration = scenes.shown(TOWER)
     states = set()
     for mm in (0.0, 1.0):
         rng = np.random.default_rng(3)
-        observe(shown, Isotropic(Level(mm, mm)), rng)
+        observe(demonstration, Isotropic(Level(mm, mm)), rng)
         states.add(rng.random())
     assert len(states) == 1
 

@@ -138,9 +138,9 @@ def test_a_plain_function_by_module_and_name(tmp_path: Path, monkeypatch: pytest
     assert main(["noise", "card", "plain_noise_here:high"]) == 0
     assert "# plain_noise_here:high: " in capsys.readouterr().out
     assert main(["noise", "card", "plain_noise_here:undeclared"]) == 2
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert "undeclared.deviation_mm" in said
+    output = capsys.readouterr().err
+    assert output.count("\n") == 1
+    assert "undeclared.deviation_mm" in output
 
 
 def test_every_model_with_a_name_is_listed_and_says_what_it_is(capsys: pytest.CaptureFixture[str]) -> None:
@@ -218,9 +218,9 @@ def test_a_card_of_noise_that_sees_nothing_says_so(tmp_path: Path, capsys: pytes
     text = presets()["megapose-lmo"].read_text(encoding="utf-8")
     blind.write_text(re.sub("missed_rate = [0-9.]+", "missed_rate = 1", text), encoding="utf-8")
     assert main(["noise", "card", str(blind)]) == 0
-    said = capsys.readouterr()
-    assert said.out.endswith("\nNothing was seen: every operation of stick_in_tower was missed.\n")
-    assert "nan" not in said.out + said.err
+    output = capsys.readouterr()
+    assert output.out.endswith("\nNothing was seen: every operation of stick_in_tower was missed.\n")
+    assert "nan" not in output.out + output.err
     assert main(["noise", "card", str(blind), "--out", str(out)]) == 1
     assert capsys.readouterr().err == f"apo-bench: nothing was seen, so {out} was not written.\n"
     assert not out.exists()
@@ -229,8 +229,8 @@ def test_a_card_of_noise_that_sees_nothing_says_so(tmp_path: Path, capsys: pytes
 @pytest.mark.parametrize("command", [["replay", "--help"], ["sweep", "--help"], ["noise", "card", "--help"]])
 def test_help_says_that_noise_may_be_measured(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     assert main(command) == 0
-    said = " ".join(capsys.readouterr().out.split())
-    assert "FILE.toml, empirical:FILE.csv, or package.module:name" in said
+    output = " ".join(capsys.readouterr().out.split())
+    assert "FILE.toml, empirical:FILE.csv, or package.module:name" in output
 
 
 def test_the_help_of_all_names_the_three_noise_commands(capsys: pytest.CaptureFixture[str]) -> None:
@@ -262,9 +262,9 @@ def test_a_card_can_be_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str])
 )
 def test_wrong_requests(arguments: list[str], message: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["noise", *arguments]) == 2
-    said = capsys.readouterr().err
-    assert message in said
-    assert said.count("\n") == 1
+    output = capsys.readouterr().err
+    assert message in output
+    assert output.count("\n") == 1
 
 
 def test_the_old_names_are_still_there() -> None:

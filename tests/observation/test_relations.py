@@ -48,14 +48,14 @@ def gaps(assembly: Assembly, scene: scenes.Scene) -> np.ndarray:
 def test_exactly_one_contact_is_wrong(name: str, seed: int) -> None:
     scene = scenes.ALL[name]()
     right = contacts(scene.assembly)
-    given = (scene.assembly, scene.start, scene.goals)
-    less = contacts(missed(*given, stream(seed, RELATIONS)))
+    arguments = (scene.assembly, scene.start, scene.goals)
+    less = contacts(missed(*arguments, stream(seed, RELATIONS)))
     assert less < right
     assert len(right - less) == 1
-    off = contacts(Shifted()(*given, stream(seed, RELATIONS)))
+    off = contacts(Shifted()(*arguments, stream(seed, RELATIONS)))
     assert len(off) == len(right)
     assert len(right - off) == 1
-    more = contacts(false(*given, stream(seed, RELATIONS)))
+    more = contacts(false(*arguments, stream(seed, RELATIONS)))
     assert more > right
     assert len(more - right) == 1
 
@@ -90,10 +90,10 @@ def test_a_false_contact_is_plausible(name: str) -> None:
 
 def test_the_culprit_is_the_relation_of_the_graph_that_is_told() -> None:
     scene = scenes.stick_in_tower()
-    given = (scene.assembly, scene.start, scene.goals)
+    arguments = (scene.assembly, scene.start, scene.goals)
     for seed in SEEDS:
-        assert culprit(scene.assembly, missed(*given, stream(seed, RELATIONS))) is None
-        for wrong in (false(*given, stream(seed, RELATIONS)), Shifted()(*given, stream(seed, RELATIONS))):
+        assert culprit(scene.assembly, missed(*arguments, stream(seed, RELATIONS))) is None
+        for wrong in (false(*arguments, stream(seed, RELATIONS)), Shifted()(*arguments, stream(seed, RELATIONS))):
             ((made, contact),) = contacts(wrong) - contacts(scene.assembly)
             (arc,) = [arc for arc in relation_graph(wrong).arcs if arc.made == made and contact in arc.contacts]
             assert culprit(scene.assembly, wrong) == arc.name
@@ -133,10 +133,10 @@ def test_the_plan_and_those_who_do_not_ask_keep_the_right_relations() -> None:
         heard.append(observation)
         return observation.goals
 
-    made = apply_method(listens, seen, scene.goals, wrong)
+    plan = apply_method(listens, seen, scene.goals, wrong)
     assert heard == [wrong]
-    assert made.plan is not None
-    assert made.plan.assembly is seen.assembly
+    assert plan.plan is not None
+    assert plan.plan.assembly is seen.assembly
 
 
 def test_the_stream_is_its_own() -> None:

@@ -25,12 +25,12 @@ def contacts(assembly: Assembly) -> set[tuple[int, Contact]]:
 def test_exactly_one_contact_is_wrong(name: str) -> None:
     scene = SCENES[name]()
     right = contacts(scene.assembly)
-    given = (scene.assembly, scene.start, scene.goals)
+    arguments = (scene.assembly, scene.start, scene.goals)
     for seed in range(4):
-        assert len(right - contacts(missed(*given, np.random.default_rng(seed)))) == 1
-        off = contacts(Shifted()(*given, np.random.default_rng(seed)))
+        assert len(right - contacts(missed(*arguments, np.random.default_rng(seed)))) == 1
+        off = contacts(Shifted()(*arguments, np.random.default_rng(seed)))
         assert (len(off), len(right - off)) == (len(right), 1)
-        more = contacts(false(*given, np.random.default_rng(seed)))
+        more = contacts(false(*arguments, np.random.default_rng(seed)))
         assert more >= right
         assert len(more - right) <= 1
 

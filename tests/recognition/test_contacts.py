@@ -70,9 +70,11 @@ def test_every_contact_is_recognised_and_no_other(name: str, level: float) -> No
     """Rounding can only decide where there is no noise."""
     scene = scenes.ALL[name]()
     for seed in range(3):
-        found = recognise(seen_at(scene, seed, level))
-        assert contacts(found.assembly) == contacts(scene.assembly)
-        assert tuple(e.contact for e in found.evidence) == tuple(r.contact for r in found.assembly.relations())
+        recognised = recognise(seen_at(scene, seed, level))
+        assert contacts(recognised.assembly) == contacts(scene.assembly)
+        assert tuple(e.contact for e in recognised.evidence) == tuple(
+            r.contact for r in recognised.assembly.relations()
+        )
 
 
 @pytest.mark.parametrize("name", scenario_names())
@@ -202,9 +204,9 @@ def test_what_is_no_observation_and_no_rules_is_said(wrong: tuple[Any, ...]) -> 
 def test_kinds_of_gaps_are_not_looked_at() -> None:
     scenario = load_scenario("stick_in_tower")
     contact = scenario.assembly.operations[0].contacts[0]
-    told = replace(scenario.assembly, gaps={contact: Gap("contact")})
+    with_gap = replace(scenario.assembly, gaps={contact: Gap("contact")})
     layout = draw_layout(scenario, np.random.default_rng(0))
-    seen = stated(scenes.seen(scenes.Scene(told, layout.start, layout.goals), layout.goals), 0.5)
+    seen = stated(scenes.seen(scenes.Scene(with_gap, layout.start, layout.goals), layout.goals), 0.5)
     assert not recognise(seen).assembly.gaps
 
 

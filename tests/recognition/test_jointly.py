@@ -57,10 +57,10 @@ def names(assembly: Assembly) -> set[str]:
 
 def test_without_contacts_nothing_is_gained_and_nothing_moved() -> None:
     seen = block_at(3, 4, 27)
-    found = estimate(seen, seen.assembly, seen.goals)
-    assert found.badness == 0.0
-    assert_allclose(found.goals, seen.goals, atol=1e-12)
-    assert_allclose(found.covariance, np.diag(np.diag(seen.covariance[0])), atol=1e-12)
+    estimated = estimate(seen, seen.assembly, seen.goals)
+    assert estimated.badness == 0.0
+    assert_allclose(estimated.goals, seen.goals, atol=1e-12)
+    assert_allclose(estimated.covariance, np.diag(np.diag(seen.covariance[0])), atol=1e-12)
 
 
 def test_an_estimate_lies_where_contact_puts_it() -> None:
@@ -68,24 +68,24 @@ def test_an_estimate_lies_where_contact_puts_it() -> None:
     for name in NAMES:
         scene = scenes.ALL[name]()
         seen = seen_at(scene, 1, 1.0)
-        found = estimate(seen, scene.assembly, seen.goals)
-        made = ContactCorrector(compiled=False)(seen)
-        assert np.abs(equations(scene.assembly, seen.start, found.goals).residual(found.goals)).max() < 5e-4
-        assert_allclose(found.goals, made.goals, atol=2e-2)
+        estimated = estimate(seen, scene.assembly, seen.goals)
+        corrected = ContactCorrector(compiled=False)(seen)
+        assert np.abs(equations(scene.assembly, seen.start, estimated.goals).residual(estimated.goals)).max() < 5e-4
+        assert_allclose(estimated.goals, corrected.goals, atol=2e-2)
 
 
 def test_the_score_is_the_likelihood_of_the_gap_beside_a_wide_prior() -> None:
     """A block 2 mm above the table: only the vertical and two tilts are asked for."""
     level = 1.0
     seen = block_at(0, 0, 27)
-    found = estimate(seen, with_contacts(seen, "A.nz on table.top"), seen.goals)
+    estimated = estimate(seen, with_contacts(seen, "A.nz on table.top"), seen.goals)
     s = np.array([level * 1e-3, np.radians(level), np.radians(level)])
     room = np.hypot(s, [40e-3, np.radians(23.0), np.radians(23.0)])
     by_hand = 2.0 * (
         multivariate_normal(cov=np.diag(s**2)).logpdf([2e-3, 0, 0])
         - multivariate_normal(cov=np.diag(room**2)).logpdf([0, 0, 0])
     )
-    assert found.badness == pytest.approx(-by_hand, rel=0.01)
+    assert estimated.badness == pytest.approx(-by_hand, rel=0.01)
 
 
 def test_a_contact_that_others_imply_gains_nothing() -> None:
@@ -104,11 +104,11 @@ def test_a_contact_that_others_imply_gains_nothing() -> None:
 @pytest.mark.parametrize("level", [0.5, 2.0])
 def test_every_contact_is_recognised_and_no_other(name: str, level: float) -> None:
     scene = scenes.ALL[name]()
-    found = recognise_jointly(seen_at(scene, 0, level))
-    assert contacts(found.assembly) == contacts(scene.assembly)
-    assert tuple(e.contact for e in found.evidence) == tuple(r.contact for r in found.assembly.relations())
-    assert found.probability is not None
-    assert found.probability > 0.5
+    recognised = recognise_jointly(seen_at(scene, 0, level))
+    assert contacts(recognised.assembly) == contacts(scene.assembly)
+    assert tuple(e.contact for e in recognised.evidence) == tuple(r.contact for r in recognised.assembly.relations())
+    assert recognised.probability is not None
+    assert recognised.probability > 0.5
 
 
 def test_contacts_that_come_with_the_observation_are_not_looked_at() -> None:
@@ -176,8 +176,8 @@ def test_round_faces_are_recognised_with_flat_ones() -> None:
     """A peg in the bore of a plate, both on the table."""
     scene = rounds.peg_in_plate()
     goals = scenes.noisy(scene.goals, np.random.default_rng(1), 0.5, 0.5)
-    found = recognise_jointly(stated(scenes.seen(scene, goals), 0.5))
-    assert contacts(found.assembly) == contacts(scene.assembly)
+    recognised = recognise_jointly(stated(scenes.seen(scene, goals), 0.5))
+    assert contacts(recognised.assembly) == contacts(scene.assembly)
 
 
 @pytest.mark.parametrize("given", [None, {"rules": 3}])

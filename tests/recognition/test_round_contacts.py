@@ -37,9 +37,11 @@ def built(name: str) -> scenes.Scene:
 def test_every_contact_is_recognised_and_no_other(name: str, level: float) -> None:
     scene = built(name)
     for seed in range(3):
-        found = recognise(seen_at(scene, seed, level, play_m=0.1e-3))
-        assert contacts(found.assembly) == contacts(scene.assembly)
-        assert tuple(e.contact for e in found.evidence) == tuple(r.contact for r in found.assembly.relations())
+        recognised = recognise(seen_at(scene, seed, level, play_m=0.1e-3))
+        assert contacts(recognised.assembly) == contacts(scene.assembly)
+        assert tuple(e.contact for e in recognised.evidence) == tuple(
+            r.contact for r in recognised.assembly.relations()
+        )
 
 
 def test_fixed_thresholds_find_them_too() -> None:
@@ -52,11 +54,13 @@ def test_how_a_part_of_revolution_is_turned_does_not_matter() -> None:
     seen = seen_at(scene, 4, 0.5)
     goals = np.array(seen.goals)
     goals[2] = goals[2] @ pose.exp([0, 0, 0, 0, 0, 2.1])
-    found = recognise(seen)
+    recognised = recognise(seen)
     again = recognise(replace(seen, goals=goals))
     assert contacts(again.assembly) == contacts(scene.assembly)
-    assert_allclose([e.gap_m for e in again.evidence], [e.gap_m for e in found.evidence], rtol=0, atol=5e-5)
-    assert_allclose([e.seen_gap_m for e in again.evidence], [e.seen_gap_m for e in found.evidence], rtol=0, atol=5e-5)
+    assert_allclose([e.gap_m for e in again.evidence], [e.gap_m for e in recognised.evidence], rtol=0, atol=5e-5)
+    assert_allclose(
+        [e.seen_gap_m for e in again.evidence], [e.seen_gap_m for e in recognised.evidence], rtol=0, atol=5e-5
+    )
 
 
 @pytest.mark.parametrize(("radius", "fits"), [(4.3, False), (4.5, True), (5.0, True), (5.05, True), (5.2, False)])
@@ -73,8 +77,8 @@ def test_a_peg_beside_its_bore_is_not_in_it() -> None:
     for aside_mm, above_mm, within in ((0.3, 0, True), (2.5, 0, False), (0.0, 18, False)):
         goals = np.array(scene.goals)
         goals[1, :3, 3] += [1e-3 * aside_mm, 0.0, 1e-3 * above_mm]
-        found = recognise(stated(scenes.seen(scene, goals), 0.2))
-        assert any(str(e.contact) == "peg.wall on plate.bore" for e in found.evidence) is within
+        recognised = recognise(stated(scenes.seen(scene, goals), 0.2))
+        assert any(str(e.contact) == "peg.wall on plate.bore" for e in recognised.evidence) is within
 
 
 class Pair(NamedTuple):

@@ -36,17 +36,17 @@ def test_every_format_gives_the_poses_that_were_written(name: str, tmp_path: Pat
     (tmp_path / "camera.toml").write_text(f'schema = "apo-bench/camera/1"\n[log]\n{form.log}\n', encoding="utf-8")
     log = read_log(tmp_path / form.file, form.format, read_camera(tmp_path / "camera.toml").conventions)
     assert form.format in FORMATS
-    for one in written.values():
-        found = log.tracks[f"tracker/{one.id}" if name == "ros-json" else one.id]
-        assert np.abs(found.T - one.T).max() < 1e-5  # files have seven digits, of up to 1500 mm
-        assert np.abs(found.t - (one.t - one.t[0])).max() < 1e-5
+    for part in written.values():
+        track = log.tracks[f"tracker/{part.id}" if name == "ros-json" else part.id]
+        assert np.abs(track.T - part.T).max() < 1e-5  # files have seven digits, of up to 1500 mm
+        assert np.abs(track.t - (part.t - part.t[0])).max() < 1e-5
 
 
 def test_a_part_is_where_its_frame_lies_in_the_model(tmp_path: Path) -> None:
     written = tracked()
     FORMS["tum"].write(written, tmp_path / "log")
     frame = "at_mm = [10, -20, 30], turn_deg = [20, -40, 60]"
-    parts = "\n".join(f'{part} = {{ id = "{one.id}", frame = {{ {frame} }} }}' for part, one in written.items())
+    parts = "\n".join(f'{part} = {{ id = "{track.id}", frame = {{ {frame} }} }}' for part, track in written.items())
     (tmp_path / "o.toml").write_text(f'schema = "apo-bench/objects/1"\n[objects]\n{parts}\n', encoding="utf-8")
     tracks = part_tracks(read_log(tmp_path / "log", "tum", Conventions()), read_objects(tmp_path / "o.toml"))
     for part, T in motion("block_on_block")[1].items():
@@ -79,11 +79,11 @@ WRONG: dict[str, tuple[str, str]] = {
 def test_what_is_wrong_with_a_log_is_one_sentence(what: str, tmp_path: Path) -> None:
     text, sentence = WRONG[what]
     (tmp_path / "log.csv").write_text(text, encoding="utf-8")
-    with pytest.raises(InputError) as found:
+    with pytest.raises(InputError) as error:
         read_log(tmp_path / "log.csv", "csv", Conventions())
-    assert sentence in str(found.value)
-    assert str(found.value).startswith(str(tmp_path))
-    assert str(found.value).endswith(".")
+    assert sentence in str(error.value)
+    assert str(error.value).startswith(str(tmp_path))
+    assert str(error.value).endswith(".")
 
 
 def test_columns_are_known_by_their_names_however_they_are_written(tmp_path: Path) -> None:
@@ -118,9 +118,9 @@ def test_what_is_wrong_with_a_line_of_tum_is_one_sentence(line: str, sentence: s
 )
 def test_a_column_that_does_not_exist_is_named(renamed: dict[str, str], sentence: str, tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(HEAD + ROW, encoding="utf-8")
-    with pytest.raises(InputError) as found:
+    with pytest.raises(InputError) as error:
         read_log(tmp_path / "log.csv", "csv", Conventions(columns=renamed))
-    assert sentence in str(found.value)
+    assert sentence in str(error.value)
 
 
 @pytest.mark.parametrize("form", FORMATS)

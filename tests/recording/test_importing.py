@@ -42,13 +42,13 @@ def goals(name: str) -> np.ndarray:
 def test_goals_are_found_within_the_noise_of_their_means(name: str, camera: str) -> None:
     tracks = seen(name, 0.5)
     stated = GIVEN if camera == "given" else replace(KNOWN, known=dict.fromkeys(tracks))
-    found = imported(tracks, stated, name)
-    off = pose.log(pose.inverse(goals(name)) @ found.observation.goals)
+    recording = imported(tracks, stated, name)
+    off = pose.log(pose.inverse(goals(name)) @ recording.observation.goals)
     # 24 frames and more: 0.1 mm and 0.1 deg per axis; five times that, and as much again for a solved camera.
     assert np.abs(off[:, :3]).max() < 1e-3
     assert np.degrees(np.abs(off[:, 3:]).max()) < 1.0
-    assert found.unclear == ()
-    assert bool(found.observation.shared) == (camera == "solved")
+    assert recording.unclear == ()
+    assert bool(recording.observation.shared) == (camera == "solved")
 
 
 def test_frames_that_are_wrong_and_frames_that_are_missing_change_nothing() -> None:
@@ -59,10 +59,10 @@ def test_frames_that_are_wrong_and_frames_that_are_missing_change_nothing() -> N
         wrong[::17] = wrong[::17] @ pose.at((0.05, 0.0, 0.0), (0.0, 120.0, 0.0))
         kept = rng.random(len(t)) > 0.2
         tracks[part] = PoseTrack(t[kept], wrong[kept])
-    found = imported(tracks)
-    off = pose.log(pose.inverse(goals(NAME)) @ found.observation.goals)
+    recording = imported(tracks)
+    off = pose.log(pose.inverse(goals(NAME)) @ recording.observation.goals)
     assert np.abs(off[:, :3]).max() < 1e-3
-    assert all(not one.rest.mean.inlier.all() for one in found.operations if one.rest is not None)
+    assert all(not operation.rest.mean.inlier.all() for operation in recording.operations if operation.rest is not None)
 
 
 def test_frames_that_a_tracker_repeats_make_nothing_surer() -> None:
@@ -71,17 +71,20 @@ def test_frames_that_a_tracker_repeats_make_nothing_surer() -> None:
         part: PoseTrack((t[:, None] + np.arange(3) / 90.0).ravel(), np.repeat(T, 3, axis=0))
         for part, (t, T) in tracks.items()
     }
-    found = imported(often)
+    repeated = imported(often)
     plain = imported(tracks)
-    off = pose.log(pose.inverse(goals(NAME)) @ found.observation.goals)
+    off = pose.log(pose.inverse(goals(NAME)) @ repeated.observation.goals)
     assert np.abs(off[:, :3]).max() < 1e-3
-    means = ([one.rest.mean.covariance for one in each.operations if one.rest] for each in (found, plain))
+    means = (
+        [operation.rest.mean.covariance for operation in each.operations if operation.rest]
+        for each in (repeated, plain)
+    )
     ratio = np.divide(*(np.trace(C, axis1=1, axis2=2) for C in map(np.array, means)))
     assert ratio.min() > 0.5  # three times as many frames would make it 0.33
 
 
 def test_the_covariance_of_a_frame_is_that_of_its_noise() -> None:
-    scatter = [one.rest.mean.scatter for one in imported(seen(NAME, 1.0)).operations if one.rest]
+    scatter = [operation.rest.mean.scatter for operation in imported(seen(NAME, 1.0)).operations if operation.rest]
     deviations = np.sqrt([np.diagonal(S) for S in scatter]) / np.repeat([1e-3, np.radians(1.0)], 3)
     assert np.abs(deviations - 1.0).max() < 0.6  # 24 frames: 15 % each, eighteen of them
     assert abs(deviations.mean() - 1.0) < 0.15
@@ -91,9 +94,9 @@ def test_at_least_half_of_few_frames_count() -> None:
     """A frame may be the farthest along one axis only: here each is, so that each would be an outlier."""
     xi = np.zeros((5, 6))
     xi[np.arange(5), np.arange(5)] = 0.01
-    found = average(pose.exp(xi))
-    assert found.inlier.sum() >= 3
-    assert np.isfinite(found.T).all()
+    mean = average(pose.exp(xi))
+    assert mean.inlier.sum() >= 3
+    assert np.isfinite(mean.T).all()
 
 
 def test_the_last_straight_piece_of_a_bent_path_is_found_with_its_length() -> None:
@@ -105,10 +108,10 @@ def test_the_last_straight_piece_of_a_bent_path_is_found_with_its_length() -> No
     T = np.tile(np.eye(4), (60, 1, 1))
     T[:, :3, 3] = np.concatenate([bent, down]) + noise
     T[50, :3, 3] += [0.0, 0.08, 0.0]  # a frame that is wrong
-    found = last_straight(PoseTrack(np.arange(60.0), T), np.eye(4))
-    assert found is not None
-    assert found.direction @ [0.0, 0.0, -1.0] > np.cos(np.radians(5.0))
-    assert 0.05 < found.length_m < 0.09
+    end = last_straight(PoseTrack(np.arange(60.0), T), np.eye(4))
+    assert end is not None
+    assert end.direction @ [0.0, 0.0, -1.0] > np.cos(np.radians(5.0))
+    assert 0.05 < end.length_m < 0.09
 
 
 def test_without_a_scenario_the_order_is_found_all_the_same() -> None:
@@ -133,8 +136,8 @@ def test_a_camera_is_solved_alike_with_and_without_a_scenario() -> None:
 
 def test_times_may_be_stated_and_operations_left_out() -> None:
     tracks = seen(NAME, 0.5)
-    told = imported(tracks, stated=Stated(ends=(2.2, 4.0, 5.8)))
-    assert np.array_equal(told.observation.goals, imported(tracks).observation.goals)
+    by_time = imported(tracks, stated=Stated(ends=(2.2, 4.0, 5.8)))
+    assert np.array_equal(by_time.observation.goals, imported(tracks).observation.goals)
     hidden = imported(tracks, stated=Stated(unseen=(1,)))
     assert hidden.observation.seen.tolist() == [True, False, True]
     with pytest.raises(InputError, match=r"'castle2' does not rest at 3\.3 s, where operation 2 is to have ended"):
@@ -171,10 +174,10 @@ MISTAKES = {
 def test_a_usual_mistake_is_named_with_what_mends_it(mistake: str, camera: CameraFile) -> None:
     change, sentence = MISTAKES[mistake]
     tracks = {part: PoseTrack(t, change(T @ pose.inverse(MODEL)) @ MODEL) for part, (t, T) in seen(NAME, 0.3).items()}
-    with pytest.raises(InputError, match=sentence) as found:
+    with pytest.raises(InputError, match=sentence) as error:
         import_recording(tracks, camera, load_scenario(NAME), NOTHING, "log.csv", dict.fromkeys(tracks, MODEL))
-    assert str(found.value).endswith(".")
-    assert "\n" not in str(found.value)
+    assert str(error.value).endswith(".")
+    assert "\n" not in str(error.value)
 
 
 def test_a_contact_that_is_open_by_more_than_noise_is_unclear() -> None:

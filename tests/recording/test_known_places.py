@@ -27,9 +27,9 @@ def solved(off: Array) -> CameraPose:
 
 
 def test_parts_on_their_places_give_the_camera() -> None:
-    found = solved(np.zeros(6))
-    assert np.abs(pose.log(pose.inverse(CAMERA) @ found.T_world_camera)).max() < 1e-9
-    assert found.off_mm < 1e-6
+    camera = solved(np.zeros(6))
+    assert np.abs(pose.log(pose.inverse(CAMERA) @ camera.T_world_camera)).max() < 1e-9
+    assert camera.off_mm < 1e-6
 
 
 def test_places_that_disagree_make_the_camera_unsure() -> None:

@@ -43,9 +43,9 @@ def test_rests_last_as_long_as_they_did() -> None:
 @pytest.mark.parametrize(("frames", "rests"), [(5, 1), (20, 2)])
 def test_a_few_frames_beside_a_rest_are_no_rest(frames: int, rests: int) -> None:
     """Pushed by 0.55 mm along two axes, which no single frame shows."""
-    found = rests_of(adjusted(0.55, 120, frames))
-    assert len(found) == rests
-    assert all(rest.seconds >= LEAST_REST_S / 2 for rest in found)
+    spans = rests_of(adjusted(0.55, 120, frames))
+    assert len(spans) == rests
+    assert all(rest.seconds >= LEAST_REST_S / 2 for rest in spans)
 
 
 def test_an_adjusted_part_stays_and_is_where_it_was_last() -> None:

@@ -16,8 +16,8 @@ def test_scatter_and_missing_frames_are_those_that_were_made() -> None:
     for part, (t, T) in seen("stick_in_tower", 0.8, seed=5).items():
         kept = rng.random(len(t)) > 0.1
         tracks[part] = PoseTrack(t[kept], T[kept])
-    found = still_residuals(Log("log", tracks, ()))
-    measured = fit_noise(found, "still")
+    residuals = still_residuals(Log("log", tracks, ()))
+    measured = fit_noise(residuals, "still")
     # some 400 frames: a scale is known within 5 %, four of those
     for split in (measured.shift_mm, measured.turn_deg):
         across, along = np.sqrt(split.variances)
