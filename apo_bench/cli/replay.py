@@ -45,9 +45,9 @@ def run_replay(
 
     check_outputs([(video, "--video", (".mp4", ".gif")), (save_observation, "--save-observation", (".json",))])
     if view:
-        from apo_bench.show.viewing import choose_viewer
+        from apo_bench.show.viewing import choose_display
 
-        place = choose_viewer(port)
+        place = choose_display(port)
     elif port is not None:
         raise InputError(f"--port {port}, which is for --view, was given without it; leave it out.")
     if view and trial_limit is not None:

@@ -75,7 +75,7 @@ def view_command(
     """Look at a scenario, or at a finished trial, which is run again, and step through it; `show` draws files."""
     from apo_bench.cli.terminal import print_row
     from apo_bench.scenario.file import load_scenario
-    from apo_bench.show.viewing import choose_viewer, trial_again, view
+    from apo_bench.show.viewing import choose_display, trial_again, view
     from apo_bench.simulation.scene.scene import build_scene
     from apo_bench.trial.story import scenario_story
 
@@ -85,10 +85,10 @@ def view_command(
             if value is not None:
                 raise InputError(f"{option}, which is for the folder of a sweep, was given for {target}; leave it out.")
         scenario = load_scenario(target)
-        place = choose_viewer(port)
+        place = choose_display(port)
         story = scenario_story(build_scene(scenario))
     else:
-        place = choose_viewer(port)
+        place = choose_display(port)
         row, story = trial_again(folder, trial, salt_file)
         print_row(row)
     view(story, place, port, typer.echo)

@@ -110,12 +110,12 @@ class Page:
         self._drawn = state
 
     def _draw_ghosts(self, ghosts: tuple[Ghost, ...]) -> None:
-        shown = {(ghost.name, part): T for ghost in ghosts for part, T in ghost.poses.items()}
+        placed = {(ghost.name, part): T for ghost in ghosts for part, T in ghost.poses.items()}
         for key, meshes in self._ghosts.items():
             for mesh in meshes:
-                mesh.visible = key in shown
+                mesh.visible = key in placed
                 if mesh.visible:
-                    at = pose.pack(shown[key])
+                    at = pose.pack(placed[key])
                     mesh.position = at[:3]
                     mesh.wxyz = at[3:]
 

@@ -191,8 +191,8 @@ def _wider(scenario: Scenario) -> Iterator[tuple[str, float]]:
     assembly = scenario.assembly
     clearance = scenario.clearance_mm
     history = placements(assembly, scenario.start, scenario.goals)
-    for contact, made, _ in assembly.relations():
-        play = joint_play_mm(assembly, contact, made, history[made], clearance)
+    for contact, operation, _ in assembly.relations():
+        play = joint_play_mm(assembly, contact, operation, history[operation], clearance)
         if play is not None and play > clearance:
             yield str(contact), play
 

@@ -63,7 +63,7 @@ def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Fi
 def fit_lines(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Figures]) -> list[str]:
     """A fit in words, line by line."""
     n = len(residuals.where)
-    found = int(residuals.found.sum())
+    seen = int(residuals.found.sum())
     inlier = int(residuals.inlier.sum())
     mean, error = _bias(residuals)
     turns = _percentiles(residuals.angle_deg[residuals.inlier])[:2]
@@ -71,10 +71,10 @@ def fit_lines(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[F
     facts = [
         ("source", measured.source),
         ("parts", f"{n} in {_images(residuals)} images, {residuals.distance_mm:.0f} mm away in the median"),
-        ("found", f"{found}; {n - found} missed ({100 * measured.missed:.1f} %); {_left_over(residuals)}"),
+        ("found", f"{seen}; {n - seen} missed ({100 * measured.missed:.1f} %); {_left_over(residuals)}"),
         (
             "inliers",
-            f"{inlier} off by less than {INLIER_MM:g} mm; {found - inlier} outliers "
+            f"{inlier} off by less than {INLIER_MM:g} mm; {seen - inlier} outliers "
             f"({100 * measured.outliers:.1f} % of those found)",
         ),
         *_score_fact(residuals),

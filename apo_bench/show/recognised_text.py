@@ -44,7 +44,7 @@ def difference_lines(observation: Observation, recognised: Recognised) -> list[s
     """`all 9 contacts of the scenario were recognised, and no other`, or what differs."""
     right = observation.assembly
     count = count_contacts(right, recognised.assembly)
-    missed = [f"missed: {made + 1}: {contact}" for made, contact in _missed(right, recognised)]
+    missed = [f"missed: {k + 1}: {contact}" for k, contact in _missed(right, recognised)]
     total = count["contacts_right"] + count["contacts_missed"]
     if not missed and not count["contacts_false"]:
         return [f"all {total} contacts of the scenario were recognised, and no other"]
@@ -88,8 +88,8 @@ def recognition_form(
             {**_evidence_form(e), "in_scenario": (e.made, e.contact) in in_scenario} for e in recognised.evidence
         ],
         "missed": [
-            {"operation": made + 1, "manipulated": str(contact.manipulated), "environment": str(contact.environment)}
-            for made, contact in _missed(observation.assembly, recognised)
+            {"operation": k + 1, "manipulated": str(contact.manipulated), "environment": str(contact.environment)}
+            for k, contact in _missed(observation.assembly, recognised)
         ],
         **count_contacts(observation.assembly, recognised.assembly),
         "probability": recognised.probability,

@@ -24,10 +24,10 @@ from apo_bench.trial.stages import observe_demonstration, scene_of, simulate_dem
 from apo_bench.trial.story import Story, trial_story
 from apo_bench.trial.trial import noise_of, run_trial
 
-Viewer = Literal["window", "browser"]
+Display = Literal["window", "browser"]
 
 
-def choose_viewer(port: int | None) -> Viewer:
+def choose_display(port: int | None) -> Display:
     """Where it can be shown; asked before anything is run.
 
     Args:
@@ -52,10 +52,10 @@ def choose_viewer(port: int | None) -> Viewer:
     return "window"
 
 
-def view(story: Story, viewer: Viewer, port: int | None, say: Callable[[str], None]) -> None:
+def view(story: Story, display: Display, port: int | None, say: Callable[[str], None]) -> None:
     """Show it until a person closes the window, or Ctrl-C."""
     try:
-        if viewer == "browser":
+        if display == "browser":
             serve_story(story, PORT if port is None else port, say)
         else:
             cursor = Cursor(story)

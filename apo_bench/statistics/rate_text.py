@@ -8,11 +8,11 @@ def percent(rate: float | None, digits: int = 1) -> str:
     """`97.0 %`, or a dash where nothing counted; only what is all or nothing says 100.0 or 0.0."""
     if rate is None:
         return "–"
-    said = f"{100 * rate:.{digits}f}"
+    text = f"{100 * rate:.{digits}f}"
     least = 10.0**-digits
-    if rate < 1.0 and float(said) == 100.0:
+    if rate < 1.0 and float(text) == 100.0:
         return f"> {100 - least:.{digits}f} %"
-    return f"< {least:.{digits}f} %" if rate > 0.0 and float(said) == 0.0 else f"{said} %"
+    return f"< {least:.{digits}f} %" if rate > 0.0 and float(text) == 0.0 else f"{text} %"
 
 
 def percents(interval: Interval, digits: int = 1) -> str:
@@ -34,8 +34,8 @@ def points(difference: float | None, interval: Interval) -> str | None:
     """`+4.0 (-0.3 to +9.1)`."""
     if difference is None:
         return None
-    said, low, high = (signed(100 * x, 1) for x in (difference, *interval))
-    return f"{said} ({low} to {high})"
+    middle, low, high = (signed(100 * x, 1) for x in (difference, *interval))
+    return f"{middle} ({low} to {high})"
 
 
 def failures(cell: Cell, most: int = 3) -> str:

@@ -15,7 +15,7 @@ from apo_bench.assembly.correction_record import Consistency, Correction
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.graph import relation_graph
 from apo_bench.assembly.topology import Contact, PartFace
-from apo_bench.correction.learning.likelihood import Estimate
+from apo_bench.correction.learning.likelihood import EstimatedNumber
 from apo_bench.geometry import pose
 from apo_bench.observation.fitting.components import COMPONENTS
 from apo_bench.observation.fitting.fit import fit_noise, goodness_of_fit
@@ -197,11 +197,11 @@ def test_estimates_left_over_are_counted_per_image(tmp_path: Path) -> None:
 def test_what_noise_was_learned_is_said_with_its_interval() -> None:
     from types import SimpleNamespace
 
-    estimates = [Estimate(0.46, 0.4, 0.54), *([Estimate(0.0, 0.0, 1.03)] * (len(COMPONENTS) - 1))]
+    estimates = [EstimatedNumber(0.46, 0.4, 0.54), *([EstimatedNumber(0.0, 0.0, 1.03)] * (len(COMPONENTS) - 1))]
     noise = SimpleNamespace(
         observations=12,
         deviations=estimates,
-        gross=Estimate(0.05, 0.01, 0.2),
+        gross=EstimatedNumber(0.05, 0.01, 0.2),
         constant=np.array([1.0, 0, 0, 0, 0, 0.5]),
         constant_covariance=np.diag([0.04, 0.04, 0.04, 0.01, 0.01, 0.01]),
     )

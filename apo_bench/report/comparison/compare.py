@@ -1,4 +1,7 @@
-"""Two sweeps against each other, trial by trial: two versions, two machines, two fidelities."""
+"""Two sweeps against each other, trial by trial: two versions, two machines, two fidelities.
+
+What is counted stands above how it is counted, in one file, since neither is understood without the other.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

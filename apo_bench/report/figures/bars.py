@@ -129,7 +129,7 @@ def _outcome_panel(setting: Setting, cells: Sequence[Cell]) -> Panel:
             axis.text(WIDTH - _RIGHT + 5, top + _HIGH - 2, f"n {cell.trials}", **_SMALL)
         pieces = [piece for top, cell in bars for piece in _bar(cell, setting, top)]
         drawn = _boxes(axis, [box for box, _, _ in pieces], [color for _, color, _ in pieces])
-        tip(drawn, [said for _, _, said in pieces])
+        tip(drawn, [words for _, _, words in pieces])
         for share in (0.0, 0.5, 1.0):
             axis.text(_x(share), y + 12, f"{100 * share:.0f} %", ha="center", **_SMALL)
         axis.text(_x(0.5), y + 26, "share of trials", ha="center", **_SMALL)
@@ -147,8 +147,8 @@ def _bar(cell: Cell, setting: Setting, y: float) -> Iterable[tuple[_Box, str, st
         if count:
             left = _x(done / cell.trials)
             right = _x((done + count) / cell.trials)
-            said = f"{at}: {ending} {count} of {cell.trials} ({percent(count / cell.trials)})"
-            yield (left, y, right - left, _HIGH), _color_of(ending), said
+            words = f"{at}: {ending} {count} of {cell.trials} ({percent(count / cell.trials)})"
+            yield (left, y, right - left, _HIGH), _color_of(ending), words
             done += count
 
 

@@ -22,7 +22,7 @@ from apo_bench.statistics.settings import Setting, members
 
 
 def figures(
-    found: Summary,
+    numbers: Summary,
     grouped: Mapping[Setting, Sequence[Cell]],
     gaps: Sequence[GapSummary],
     confusions: Sequence[Confusion],
@@ -31,18 +31,18 @@ def figures(
 ) -> dict[str, DrawnFigure]:
     """By the name of their file."""
     where = list(grouped)
-    looks = styles(methods_of(found.cells))
-    pairs = members(where, found.pairs)
-    made = {
-        "success_over_level": success_figure(found.cells),
-        "success_over_tightness": tightness_figure(found.cells),
-        "success_over_looks": looks_figure(found.cells),
+    looks = styles(methods_of(numbers.cells))
+    pairs = members(where, numbers.pairs)
+    figures = {
+        "success_over_level": success_figure(numbers.cells),
+        "success_over_tightness": tightness_figure(numbers.cells),
+        "success_over_looks": looks_figure(numbers.cells),
         "failure_stages": outcome_figure(grouped),
         "gap_before_and_after": gap_figure(members(where, gaps), looks),
         "prediction": prediction_figure(confusions),
         "recognised": recognition_figure(recognitions),
         "timing": time_figure(times),
     }
-    for reference in dict.fromkeys(p.reference for p in found.pairs):
-        made[f"difference_to_{reference}"] = difference_figure(pairs, reference, looks)
-    return {name: draw(figure) for name, figure in made.items() if figure.panels}
+    for reference in dict.fromkeys(p.reference for p in numbers.pairs):
+        figures[f"difference_to_{reference}"] = difference_figure(pairs, reference, looks)
+    return {name: draw(figure) for name, figure in figures.items() if figure.panels}

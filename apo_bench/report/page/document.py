@@ -33,21 +33,21 @@ def page(template: str, **values: Any) -> str:
 
 def prose(text: str) -> Markup:
     """Sentences in which `code` and *emphasis* are marked as in Markdown; `%` stays with its number."""
-    said = re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text)).replace(" %", "\u00a0%"))
-    return Markup(re.sub(r"\*([^*]+)\*", r"<em>\1</em>", said))
+    code = re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text)).replace(" %", "\u00a0%"))
+    return Markup(re.sub(r"\*([^*]+)\*", r"<em>\1</em>", code))
 
 
 @cache
 def _templates() -> Environment:
-    made = Environment(
+    environment = Environment(
         loader=PackageLoader("apo_bench.report.page"),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    made.filters |= {"prose": prose, "zip": zip}
-    return made
+    environment.filters |= {"prose": prose, "zip": zip}
+    return environment
 
 
 @cache

@@ -28,9 +28,9 @@ def scenario_files(run: Mapping[str, Any]) -> dict[str, str]:
 
 def limits_of(run: Mapping[str, Any]) -> Limits:
     """The limits that a sweep had when it was last started; the usual ones where it does not say."""
-    said = run.get("limits") or {}
-    trial_s = said.get("trial_s", USUAL_LIMITS.trial_s)
-    corrector_s = said.get("corrector_s") or USUAL_LIMITS.corrector_s
+    limits = run.get("limits") or {}
+    trial_s = limits.get("trial_s", USUAL_LIMITS.trial_s)
+    corrector_s = limits.get("corrector_s") or USUAL_LIMITS.corrector_s
     return Limits(None if trial_s is None else float(trial_s), float(corrector_s))
 
 
@@ -41,17 +41,17 @@ def run_facts(run: Mapping[str, Any], rows: Mapping[str, Any]) -> list[FactTable
         rows: What the rows themselves say, by what it is called.
     """
     plain = {k: v for k, v in run.items() if not isinstance(v, (dict, list)) and k != "command"}
-    made = [
+    facts = [
         FactTable("", _table("rows", rows), False),
         *([FactTable("", _table("run", plain), False)] if plain else []),
     ]
     for key, values in run.items():
         name = key.replace("_", " ")
         if isinstance(values, dict) and values:
-            made.append(FactTable(name, _table(name, values), len(values) > _MANY))
+            facts.append(FactTable(name, _table(name, values), len(values) > _MANY))
         elif isinstance(values, list) and values:
-            made.append(FactTable(name, _side_by_side(name, values), False))
-    return made
+            facts.append(FactTable(name, _side_by_side(name, values), False))
+    return facts
 
 
 def _table(name: str, values: Mapping[str, Any]) -> Table:
@@ -64,22 +64,22 @@ def _table(name: str, values: Mapping[str, Any]) -> Table:
 
 def _side_by_side(name: str, values: Sequence[Any]) -> Table:
     """One line per key."""
-    given = [value if isinstance(value, dict) else {"": value} for value in values]
+    records = [value if isinstance(value, dict) else {"": value} for value in values]
 
-    def entry(one: Mapping[str, Any], number: int) -> Column:
-        return Column("", str(number), text=lambda key: value_words(one[key]) if key in one else None, words=True)
+    def entry(record: Mapping[str, Any], number: int) -> Column:
+        return Column("", str(number), text=lambda key: value_words(record[key]) if key in record else None, words=True)
 
     columns = [Column("", name, text=lambda key: key, words=True)]
-    columns += [entry(one, i) for i, one in enumerate(given, start=1)]
-    return Table(list(dict.fromkeys(key for one in given for key in one)), columns)
+    columns += [entry(record, i) for i, record in enumerate(records, start=1)]
+    return Table(list(dict.fromkeys(key for record in records for key in record)), columns)
 
 
 def value_words(value: Any) -> str:
     """A value as a person reads it: lists with commas, the rest as JSON."""
     if isinstance(value, str):
-        said = value
+        text = value
     elif isinstance(value, (list, tuple)) and not any(isinstance(x, (dict, list)) for x in value):
-        said = ", ".join(x if isinstance(x, str) else json.dumps(x) for x in value) or "–"
+        text = ", ".join(x if isinstance(x, str) else json.dumps(x) for x in value) or "–"
     else:
-        said = json.dumps(value)
-    return said if len(said) <= _LONG else said[:_LONG] + " …"
+        text = json.dumps(value)
+    return text if len(text) <= _LONG else text[:_LONG] + " …"
