@@ -48,6 +48,7 @@ def softened_length(z: Array, Jt: Array, S: Array) -> Array:
     Near z equations are linear in the little that play leaves, so the shortest sum of what is left of z and of what
     equations are off by is r^t (J J^t + S)^-1 r, with r = J z what the observation was off by.
     """
+    # r is what the observation was off by, Gaussian with covariance J J^t of noise and S of play.
     J = np.swapaxes(Jt, 1, 2)
     A = J @ Jt + S
     r = J @ z[..., None]

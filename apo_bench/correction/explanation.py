@@ -130,6 +130,7 @@ def explain(observation: Observation, goals: Array, dropped: Collection[str] = (
     problem = problem_of((replace(observation, goals=goals, shared=()),))
     system = problem.laid.system.only(0)
     kept = problem.demands.exact & problem.without(tuple(dropped))
+    # B = J_r(xi) L makes body twists at the goals of z, so J B is the derivative by z.
     xi = pose.log(pose.inverse(observation.goals) @ goals)
     Jr = right_jacobian(xi)
     B = Jr @ problem.L[0]
@@ -210,6 +211,7 @@ def _own(known: Freedom, n: int) -> Iterator[Array]:
 
 def _along(k: int, own: Array, B: Array, direction: Direction) -> tuple[int, ...]:
     """The later operations that move if operation k moves in one of its free directions."""
+    # The twist as a combination of the operation's own free directions, which take later operations along.
     share = np.linalg.lstsq(B @ own[6 * k : 6 * k + 6], direction.twist, rcond=None)[0]
     moved = np.linalg.norm((own @ share).reshape(-1, 6), axis=1)
     return tuple(int(j) for j in np.flatnonzero(moved > 1e-6 * moved[k]) if j > k)
@@ -225,6 +227,8 @@ def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, spans: A
     stack = np.concatenate([np.array([start[part] for part in assembly.solids]), goals])
     explained = []
     for part in last:
+        # The part's twist is a sum over goals, so spans of all goals go through it together. `unit` is how far each
+        # component was seen to deviate: directions are told from rounding in that unit.
         reach = _reach(words[part], stack, len(assembly.solids), len(goals))
         moved = reach.reshape(6, -1) @ spans.reshape(reach[0].size, -1)
         unit = np.sqrt(np.square(np.swapaxes(reach, 0, 1) @ B).sum(axis=(0, 2)))[:, None]

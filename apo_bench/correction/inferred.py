@@ -179,6 +179,8 @@ def _placed(conditions: Sequence[_Condition], seen: Array) -> Array:
     """The pose that agrees best with what is said; what is not said of its orientation is as it was seen."""
     T = np.eye(4)
     T[:3, :3] = R = _turned(conditions, seen[:3, :3])
+    # The position minimises the squares of what each condition leaves: exact along the directions that a plane says,
+    # and as vague as the face is large across them.
     exact = [condition.exact(R) for condition in conditions]
     A = np.zeros((3, 3))
     b = np.zeros(3)
@@ -245,6 +247,7 @@ def _sensed(conditions: Sequence[_Condition], seen: Array) -> Array:
 
 def _fitted(own: Array, way: Array, beside: Array, seen: Array) -> Array:
     """(3, 3): R own = way. Where these look along one line, parts stand square to each other, as near as can be."""
+    # One direction leaves the turn about it: of the quarter turns of the other part the one nearest to what was seen.
     rank = _directions(own)
     if rank == 1:
         square = beside @ quarter_turns()
@@ -254,6 +257,7 @@ def _fitted(own: Array, way: Array, beside: Array, seen: Array) -> Array:
         return _nearest(np.outer(way[0], own[0]) + _PLANE_M * seen)
     H = way.T @ own
     if rank == 2:
+        # Two directions: their cross product is the third, so that the fit is a rotation and no reflection.
         i, j = divmod(int(np.linalg.norm(np.cross(own[:, None], own), axis=2).argmax()), len(own))
         H = H + np.outer(np.cross(way[i], way[j]), np.cross(own[i], own[j]))
     return _nearest(H)

@@ -67,6 +67,7 @@ def fit_covariance(assembly: Assembly, play_m: float) -> Array | None:
             row[every[shift] : every[shift] + 3] = n
     each = unit_m**2 / 3.0 * np.diff(pattern(assembly).begin)
     by *= np.sqrt(each)[:, None]
+    # A uniform displacement of half width u has variance u^2 / 3; rows that a displacement has a part in go together.
     S = np.diag(np.repeat(count * each, 3))
     S[::3, ::3] = by @ by.T
     return frozen(S)

@@ -38,6 +38,7 @@ def contains_truth(observation: Observation, correction: Correction, truth: Arra
         return None
     free = known.free
     true = pose.log(pose.inverse(observation.goals) @ truth)
+    # Deviation of the truth in the tangent space of the contacts, in standard deviations.
     off = free.T @ coordinates_of(L, true - xi)
     tailed = observation.tails is not None
     most = drawn_radius(observation, L, free, level) if tailed else chdtri(free.shape[1], 1.0 - level)

@@ -63,6 +63,7 @@ def estimate_shared(
     for error in observation.shared:
         if error.correlation is not None:
             continue
+        # Rows of A: what the shared error makes of the twist of each operation.
         A = np.zeros((len(seen), 6, 6))
         rows = list(error.operations)
         A[rows] = error.ways(seen)

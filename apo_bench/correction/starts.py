@@ -138,6 +138,7 @@ def _solutions(problem: Problem, starts: Array) -> Iterator[Array]:
     e = np.concatenate([np.atleast_2d(result.e) for result in results])
     holds = np.isfinite(goals).all(axis=(1, 2, 3)) & (np.abs(e).max(axis=1, initial=0.0) <= observation.gap_m)
     holds &= ~looking_away(observation.assembly, observation.start, goals).any(axis=1)
+    # The nearest first, since only the nearest that holds is of use.
     z = correction_to(observation.goals, problem.L[0], goals[holds])
     for i in np.flatnonzero(holds)[np.argsort(np.square(z).sum(axis=1))]:
         if rest[i] or 6 * n > LARGEST_DENSE:

@@ -26,6 +26,7 @@ def drawn_lengths(observation: Observation, L: Array, Jt: Array, S: Array | None
         S: (3 c, 3 c), the covariance of what equations are off by, [m^2]; None: nothing.
     """
     r = _drawn(observation, L) @ Jt
+    # As `softened_length`, of errors that are drawn: r of each is J z, and what play adds, factored as S = V w V^t.
     A = Jt.T @ Jt
     if S is not None:
         w, V = np.linalg.eigh(S)

@@ -113,6 +113,7 @@ def _shortest(meetings: Meeting, T: Array) -> tuple[Array, NDArray[np.intp], Arr
     a, b = meetings.centers
     half_a, half_b = meetings.halves
     R = T[:, :3, :3]
+    # Middles of b seen from a, and of a from b; a box reaches |R| half along the axes of the other one.
     way_a = np.einsum("qij,qj->qi", R, b) + T[:, :3, 3] - a
     way_b = -np.einsum("qij,qi->qj", R, way_a)
     spread = np.abs(R)

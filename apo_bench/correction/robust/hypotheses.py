@@ -86,6 +86,8 @@ class Hypothesis:
         observation = self.observation
         if not correction.ok or correction.test is None or not self._faces_oppose():
             return np.inf
+        # What contacts leave at the observation is Gaussian with covariance S = J J^t + soft^2: -2 log of its density
+        # is the squared length of the correction and log det S. Of an operation that was left out `ROOM` is as likely.
         wide = np.array(observation.covariance)
         wide[list(self.left_out)] = ROOM
         system = seen_system(observation)
@@ -95,6 +97,7 @@ class Hypothesis:
         soft = soft_deviation(observation)
         false = np.zeros(Jt.shape[1])
         if self.dropped:
+            # Faces of a wrong relation are anywhere: its equations deviate by their distance, not by what play leaves.
             wrong = np.repeat(~observation.assembly.without(self.dropped), 3)
             each = np.repeat(np.sqrt(np.diff(pattern(observation.assembly).begin)), 3) * _WRONG_M
             soft = np.where(wrong, each, soft)

@@ -81,6 +81,7 @@ def places(goal: Array, covariance: Array, number: int) -> Iterator[Array]:
     free = w > _FREE_M**2
     if not free.any():
         return
+    # Halton points, spread evenly, as normal deviates along the free axes of the covariance.
     z = norm.ppf(qmc.Halton(int(free.sum()), scramble=False).random(number + 1)[1:])
     twists = (z[np.argsort((z * z).sum(axis=1))] * np.sqrt(w[free])) @ V[:, free].T / _WEIGHTS
     yield from goal @ pose.exp(twists)

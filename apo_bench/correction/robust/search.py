@@ -204,12 +204,14 @@ class ContactAgreement:
         system = seen_system(seen)
         self._e, self._Jt = linearised_by(system, seen.goals, noise_factor(seen))
         known = np.delete(seen.covariance, self._unknown, axis=0)
+        # A turn by an angle a moves points by a^2 beyond what is linear: that much is no contradiction.
         turned = np.sqrt(np.trace(known[:, 3:, 3:], axis1=1, axis2=2).max(initial=0.0))
         soft = np.hypot(soft_deviation(seen), turned * turned * _LEVER_M)
         self._S = self._Jt.T @ self._Jt + np.diag(soft * soft)
         letters = pattern(seen.assembly).letters - len(seen.assembly.solids)
         c = len(system)
         self._uses = (letters[..., None] == np.arange(len(seen.goals))).any(axis=1)
+        # e^t S^-1 e of every contact by itself: a lower bound of what any set with it leaves.
         each = self._e.reshape(c, 3, 1), self._S.reshape(c, 3, c, 3)[np.arange(c), :, np.arange(c)]
         self._alone = (each[0] * np.linalg.solve(each[1], each[0])).sum(axis=(1, 2))
 

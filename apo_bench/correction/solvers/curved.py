@@ -32,6 +32,7 @@ def descended(system: CompactEquations, observed: Array, L: Array, goals: Array)
     z = correction_to(observed, L, goals)
     for _ in range(_TURNS):
         e, Jt = _linearised(system, observed, L, z)
+        # N spans the free directions; multipliers l solve z + J^t l = 0 in the others, and `towards` closes e there.
         U, w, Vt = np.linalg.svd(Jt)
         rank = int(np.count_nonzero(w > _RANK * w[0]))
         N = U[:, rank:]
@@ -40,8 +41,10 @@ def descended(system: CompactEquations, observed: Array, L: Array, goals: Array)
         Vt = Vt[:rank]
         multipliers = -Vt.T @ (U.T @ z / w)
         towards = -U @ (Vt @ e / w)
+        # The Lagrangian's second derivative along N, 1 + sum l_i f_i'': f'' N as a difference of two derivatives.
         _, beside = _linearised(system, observed, L, z + _APART * N.T)
         bent = N + ((beside - Jt) @ multipliers).T / _APART
+        # Newton's step along N, downhill whatever the sign of a curvature.
         curvature, axes = np.linalg.eigh((N.T @ bent + bent.T @ N) / 2.0)
         slope = axes.T @ (N.T @ z + bent.T @ towards)
         step = towards - N @ (axes @ (slope / np.maximum(np.abs(curvature), _FLAT)))

@@ -102,7 +102,7 @@ def nearest_between(
     """The nearest goals that satisfy the equations and the inequalities.
 
     Args:
-        seen: (n, 4, 4), world frame, [m].
+        observed: (n, 4, 4), what was seen, world frame, [m].
         L: (n, 6, 6) or (n, 6, 6 n), as of `nearest_goals`.
         start: The nearest goals without inequalities.
 
@@ -129,10 +129,12 @@ def nearest_between(
     last = np.zeros(len(start.z))
     for _ in range(_TURNS):
         e, Jt = linearised_by(system, T, B)
+        # Equations first: the shortest z on them, and what they leave free there, of the rank that is known already.
         nearest = _settled(e, Jt, z)
         free = np.linalg.svd(Jt)[0][:, known:] if Jt.size else np.eye(len(z))
         e_wall, J_wall = inequalities.system.linearised(T)
         J_wall = pulled(J_wall.reshape(len(inequalities), -1), B)
+        # Where walls will be at that z; the program moves on in the free directions alone, z = nearest + free u.
         ahead = e_wall + J_wall @ (nearest - z)
         u, room = _program(J_wall, free, inequalities.low - ahead, inequalities.high - ahead)
         step = nearest + free @ u - z
@@ -140,6 +142,7 @@ def nearest_between(
         trace.append((float(np.abs(e).max(initial=0.0)), length))
         over = settles(length, before)
         rest = over and room
+        # All of the step where it is the last, so that equations hold to rounding.
         pace = _paced(pace, step, last)
         last = step if rest else shortened_step(step, L)
         z = z + (step if rest else pace * last)
@@ -194,6 +197,7 @@ def _program(J: Array, free: Array, low: Array, high: Array) -> tuple[Array, boo
     """
     import daqp
 
+    # Rows of unit length, so that one tolerance in standard deviations holds for all; walls that do not depend on u go.
     A = J @ free
     size = np.sqrt((A * A).sum(axis=1))
     seeing = size > _BLIND * np.sqrt((J * J).sum(axis=1))

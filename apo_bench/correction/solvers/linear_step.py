@@ -148,6 +148,7 @@ def shortest_z(J: Array, e: Array, z: Array, added: Array) -> Array:
         J: (b, m, 6 n).
         e: (b, m); so is `added`, above zero, to the diagonal.
     """
+    # Push-through: the multipliers of m equations, not 6 n unknowns, so directions that no equation sees stay at zero.
     b, m = e.shape
     Jt = np.swapaxes(J, 1, 2)
     A = J @ Jt

@@ -87,6 +87,7 @@ def descend(
     now = np.array(goals)
     changing = np.array(sorted(free), dtype=np.intp)
     trace = list[Iterate]()
+    # Columns of angles as the way of a point, so that one cut-off serves all (Eq. 14 with scaled unknowns).
     units = np.array([1.0, 1.0, 1.0, length_m, length_m, length_m] * len(changing))
     columns = (6 * changing[:, None] + np.arange(6)).ravel()
     for turn in range(turns + 1):
@@ -99,6 +100,7 @@ def descend(
         trace.append(Iterate(largest(e), rank, size))
         if size < REST_M or turn == turns:
             break
+        # T <- T dT(dq), q <- 0: the derivatives of the appendix hold at q = 0 only.
         now[changing] = now[changing] @ displacement((step / units).reshape(-1, 6))
     return Solution(now, trace[-1].gap_m, trace[-1].rank, size < REST_M, True, tuple(trace))
 
@@ -113,6 +115,7 @@ def least_step(J: Array, e: Array, cut_off: float, at_most: int | None = None) -
         return np.zeros(J.shape[1]), 0
     if not (np.isfinite(e).all() and np.isfinite(J).all()):
         raise np.linalg.LinAlgError("a number is not finite")
+    # W* of Eq. 22 inverts the singular values that count, and no others.
     U, w, Vt = np.linalg.svd(J, full_matrices=False)
     rank = min(int(np.count_nonzero(w > cut_off * w[0])), len(w) if at_most is None else at_most)
     return -Vt[:rank].T @ ((U[:, :rank].T @ e) / w[:rank]), rank

@@ -52,6 +52,7 @@ def freedom(Jt: Any) -> Freedom | None:
         Jt = Jt.toarray()
     if not Jt.size:
         return Freedom(0, equations_, np.inf, np.eye(unknowns))
+    # The columns of U behind the rank are an orthonormal basis of what no equation sees.
     U, w, _ = np.linalg.svd(Jt, full_matrices=True)
     rank = int(np.count_nonzero(w > RANK_CUT_OFF * w[0]))
     left = w[rank:].max(initial=0.0)
@@ -69,6 +70,8 @@ def jacobian_rank(Jt: Any) -> int:
     largest = G.diagonal().max()
     if not largest > 0.0:
         return 0
+    # Squares of pivots of G, the largest left first, fall from what counts to rounding; if none lies between, that is
+    # the rank, quicker than by singular values.
     R, _, rank, _ = dpstrf(G, tol=UNCLEAR[0] * largest)
     if R[rank - 1, rank - 1] ** 2 > UNCLEAR[1] * largest:
         return int(rank)
@@ -94,6 +97,7 @@ def projections(Jt: Any) -> tuple[list[int], Array | None]:
     rank = []
     P = np.empty((len(Jt), unknowns, unknowns))
     for i, each in enumerate(Jt):
+        # P = 1 - Q Q^t, of the columns of Q that the rank keeps.
         matrix = each if isinstance(each, np.ndarray) else each.toarray()
         basis = _row_space(matrix) if matrix.size else matrix
         rank.append(basis.shape[1])

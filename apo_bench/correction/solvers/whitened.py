@@ -77,6 +77,7 @@ def noise_factor(observation: Observation) -> Array:
     Raises:
         InputError: A covariance is not positive definite, or operations are said to share more than their errors.
     """
+    # Errors that operations share couple them, so L is the factor of one matrix of all of them.
     if not observation.shared:
         return scales(observation.covariance)
     scales(observation.covariance)
