@@ -40,14 +40,14 @@ def check_observations(observations: Sequence[Any]) -> None:
                 f"{_name(observations, 0)} has no start of the part '{part}'; state where every part starts."
             )
     parts = list(first.assembly.solids)
-    starts = np.array([first.start[part] for part in parts]).reshape(-1, 4, 4)
 
     def name(j: int) -> str:
         if j < len(parts):
             return f"the start of '{parts[j]}' in {_name(observations, 0)}"
         return f"the goal of {_operation(observations, j - len(parts))}"
 
-    _check_poses(np.concatenate([starts, *(observation.goals for observation in observations)]), name)
+    rows = [*map(first.start.__getitem__, parts), *(observation.goals.reshape(-1, 4) for observation in observations)]
+    _check_poses(np.concatenate(rows).reshape(-1, 4, 4), name)
     C = np.concatenate([observation.covariance for observation in observations])
     off = C - np.swapaxes(C, 1, 2)
     if not off.any():

@@ -153,7 +153,7 @@ def problem_of(
     assembly = first.assembly
     shared = any(observation.shared for observation in observations)
     goals = np.concatenate([observation.goals for observation in observations]).reshape(len(observations), -1, 4, 4)
-    start = np.array([first.start[part] for part in assembly.solids]).reshape(-1, 4, 4)
+    start = np.concatenate([np.zeros((0, 4)), *(first.start[part] for part in assembly.solids)]).reshape(-1, 4, 4)
     demands = _demands(assembly, first.play_m)
     by = kernels() if compiled else None
     there = goals if at is None else at

@@ -60,7 +60,7 @@ def solve(problem: Problem, kept: NDArray[np.bool_]) -> list[Solved]:
     chosen = kept & problem.demands.exact
     nearest = problem.nearest(chosen)
     chi_square, simple = _lengths(problem, chosen, nearest)
-    if problem.observation.tails is not None or not problem.demands.exact[kept].all():
+    if problem.observation.tails is not None or not (problem.demands.every or problem.demands.exact[kept].all()):
         simple[:] = False
     every = _solved(problem, kept, nearest, chi_square.tolist())
     return [

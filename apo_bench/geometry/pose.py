@@ -12,6 +12,7 @@ from apo_bench.geometry.arrays import Array
 
 FARTHEST_M = 1e4
 """Nothing is farther from the origin: beyond it, rounding is no longer small."""
+_ONE = np.eye(4)
 _NOT_ORTHOGONAL = 1e-6
 """How far R R^t may be from the identity."""
 _ROUNDING = 1e-9
@@ -155,12 +156,13 @@ def nearest_rotations(R: Array) -> Array:
 def is_rigid(T: ArrayLike) -> NDArray[np.bool_]:
     """Whether each matrix, (n, 4, 4), is a proper rigid displacement, -> (n,); numbers that are not finite are not."""
     T = np.asarray(T, dtype=np.float64)
-    finite = np.isfinite(T).all(axis=(1, 2))
+    n = len(T)
+    finite = np.isfinite(T).reshape(n, 16).all(axis=1)
     if not finite.all():
         T = np.where(finite[:, None, None], T, 0.0)
     R = T[:, :3, :3]
-    orthogonal = np.abs(R @ np.swapaxes(R, 1, 2) - np.eye(3)).max(axis=(1, 2)) < _NOT_ORTHOGONAL
-    last_row = np.abs(T[:, 3] - np.eye(4)[3]).max(axis=1) < _NOT_ORTHOGONAL
+    orthogonal = np.abs(R @ np.swapaxes(R, 1, 2) - _ONE[:3, :3]).reshape(n, 9).max(axis=1) < _NOT_ORTHOGONAL
+    last_row = np.abs(T[:, 3] - _ONE[3]).max(axis=1) < _NOT_ORTHOGONAL
     return np.asarray(finite & orthogonal & last_row & (np.linalg.det(R) > 0.0))
 
 
