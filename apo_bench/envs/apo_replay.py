@@ -332,10 +332,10 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     def _watch(self) -> Any:
         """What looks on at a replay: in mode `human` a new window, since every replay has its own data."""
         if self.render_mode == "human":
-            from apo_bench.simulation.scene.render import Viewer
+            from apo_bench.simulation.scene.render import ReplayWindow
 
             self.close()
-            self._window = Viewer(self._scene)
+            self._window = ReplayWindow(self._scene)
         return self._remember if self.render_mode == "rgb_array" else self._window
 
     def _remember(self, data: Any) -> None:

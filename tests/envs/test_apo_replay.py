@@ -468,7 +468,7 @@ def test_the_human_mode_watches_the_replay_and_closes(watched: APOReplay, monkey
         def close(self) -> None:
             self.closed = True
 
-    monkeypatch.setattr("apo_bench.simulation.scene.render.Viewer", Window)
+    monkeypatch.setattr("apo_bench.simulation.scene.render.ReplayWindow", Window)
     monkeypatch.setattr(watched, "render_mode", "human")
     watched.reset(seed=SEED)
     assert watched.render() is None

@@ -135,7 +135,7 @@ def test_a_window_is_not_copied(monkeypatch: pytest.MonkeyPatch) -> None:
         def __reduce__(self) -> Any:
             raise TypeError("a window cannot be pickled")
 
-    monkeypatch.setattr("apo_bench.simulation.scene.render.Viewer", Window)
+    monkeypatch.setattr("apo_bench.simulation.scene.render.ReplayWindow", Window)
     env = APOReplay(SMALL, grasp="weld", level=40, render_mode="human")
     env.reset(seed=SEED)
     env.step(NEAR)

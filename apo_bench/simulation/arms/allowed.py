@@ -1,4 +1,7 @@
-"""All that the MJCF file of an arm or gripper may say: which elements, with which attributes, in which range."""
+"""All that the MJCF file of an arm or gripper may say: which elements, with which attributes, in which range.
+
+It is one table, longer than other files: whoever asks whether something is allowed looks in one place.
+"""
 
 import re
 from collections.abc import Mapping

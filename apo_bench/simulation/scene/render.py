@@ -161,7 +161,7 @@ def save_film(frames: Iterable[_Image], path: str | Path, fps: float) -> None:
         raise InputError(f"the film '{path}' cannot be written: {error}.") from error
 
 
-class Viewer:
+class ReplayWindow:
     """Shows a replay in MuJoCo's window, in real time: pass it as `watch`. On macOS run under `mjpython`."""
 
     def __init__(self, scene: Scene) -> None:
