@@ -22,7 +22,7 @@ from apo_bench.cli import (
     plan,
     power,
     recording,
-    replay,
+    replay_trial,
     report,
     scenario,
     show,
@@ -115,7 +115,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "compare": report.compare_command,
     "view": show.view_command,
     "scene": plan.scene_command,
-    "replay": replay.run_replay,
+    "replay": replay_trial.run_replay,
 }
 for _name, _command in _COMMANDS.items():
     app.command(_name, cls=GroupedOptions if _name in _LONG else None)(_command)

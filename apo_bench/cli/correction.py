@@ -12,7 +12,7 @@ from apo_bench.cli.printing import print_json, print_lines, print_tables
 from apo_bench.cli.setting_options import AsJson, ScenarioArgument
 from apo_bench.errors import InputError
 from apo_bench.io.streams import redirect_output
-from apo_bench.records.short_names import CORRECTOR
+from apo_bench.records import CORRECTOR
 from apo_bench.scenario.scenario import Scenario
 
 _EXACT_M = 1e-9
@@ -157,7 +157,7 @@ def _explained(observation: Observation, correction: Correction) -> Any:
 def _corrector(method: str, doubt: str | None) -> Any:
     """The corrector `contact` with what it is to do in doubt, or any other as a trial knows it."""
     from apo_bench.correction.contact import ContactCorrector, Doubt
-    from apo_bench.records.method import with_simulated
+    from apo_bench.records import with_simulated
 
     if doubt is not None and doubt not in _DOUBTS:
         raise InputError(f"--if-doubtful {doubt} was given; {', '.join(_DOUBTS[:-1])} or {_DOUBTS[-1]} is allowed.")

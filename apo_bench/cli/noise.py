@@ -48,7 +48,7 @@ def print_noise_card(
 ) -> None:
     """Print the card of a noise model: formula, frame, parameters, and a histogram of its errors."""
     from apo_bench.observation.noise import Level
-    from apo_bench.records.settings import check
+    from apo_bench.records import check
     from apo_bench.show.noise_card import draw_errors, draw_histogram, noise_card
 
     check("level_mm", level, called="level")

@@ -58,7 +58,7 @@ def recognise_command(
     **options: Any,
 ) -> None:
     """Find the contacts of what was seen, and say how they differ from those of the scenario."""
-    from apo_bench.records.relations import RECOGNISED
+    from apo_bench.records import RECOGNISED
     from apo_bench.scenario.file import load_scenario
     from apo_bench.show.recognised_text import confidence_line, difference_lines, evidence_table, recognition_form
     from apo_bench.trial.recognised_contacts import recognise_by

@@ -15,7 +15,7 @@ from apo_bench.cli.setting_options import AsJson, ScenarioArgument, StatedDeg, S
 from apo_bench.errors import InputError
 from apo_bench.files.deviations import assumed_deviations
 from apo_bench.io.streams import redirect_output
-from apo_bench.records.short_names import CORRECTOR
+from apo_bench.records import CORRECTOR
 from apo_bench.scenario.scenario import Scenario
 
 
@@ -56,8 +56,7 @@ def scene_command(
     scenario: ScenarioArgument, out: Annotated[Path, typer.Option(help="The MJCF file to write.")], **options: Any
 ) -> None:
     """Write the scene of a scenario as one MJCF file that opens in MuJoCo's viewer."""
-    from apo_bench.records.setting_columns import in_python
-    from apo_bench.records.settings import check
+    from apo_bench.records import check, in_python
     from apo_bench.scenario.file import load_scenario
     from apo_bench.simulation.scene.scene import scene_xml
 

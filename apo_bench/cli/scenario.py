@@ -113,7 +113,7 @@ def scenario_check(
 ) -> None:
     """Say whether human and robot can do a scenario, and which line of its file to change if not."""
     from apo_bench.drafting.checking import check_file
-    from apo_bench.records.settings import check
+    from apo_bench.records import check
 
     if not 0 <= seeds <= 1000:
         raise InputError(f"--seeds {seeds} was given; 0 to 1000 are allowed.")

@@ -12,11 +12,8 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from apo_bench.cli.arguments import numbers, path_given, whole_numbers, words
-from apo_bench.records.relations import RECOGNISED
+from apo_bench.records import FOREIGN_ARMS, LEVEL, METHODS, RECOGNISED, SETTINGS, WRONG_RELATIONS, SettingInfo
 from apo_bench.records.run.replay_command import milli, number
-from apo_bench.records.setting_info import SettingInfo
-from apo_bench.records.settings import LEVEL, SETTINGS
-from apo_bench.records.short_names import FOREIGN_ARMS, METHODS, WRONG_RELATIONS
 from apo_bench.resources import folder
 
 Completion = Callable[[str], list[str]]

@@ -12,7 +12,7 @@ from apo_bench.cli.arguments import check_writable, path_given
 from apo_bench.cli.setting_options import ScenarioArgument, StatedDeg, StatedMm, takes, trial_options
 from apo_bench.errors import InputError
 from apo_bench.files.deviations import assumed_deviations
-from apo_bench.records.short_names import CORRECTOR
+from apo_bench.records import CORRECTOR
 from apo_bench.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -96,7 +96,7 @@ def view_command(
 
 def _corrected(scenario: Scenario, observed: Observation, method: str, step: int) -> BeliefPanel:
     from apo_bench.correction.own_code.own import correct_named
-    from apo_bench.records.method import with_simulated
+    from apo_bench.records import with_simulated
     from apo_bench.show.believed_picture import belief_panel
     from apo_bench.trial.fitting import fitting_plan
     from apo_bench.trial.planning import plan_warning

@@ -23,8 +23,7 @@ from apo_bench.cli.setting_options import (
     takes,
 )
 from apo_bench.errors import InputError
-from apo_bench.records.limits import CORRECTOR_LIMIT_S
-from apo_bench.records.setting_columns import in_python
+from apo_bench.records import CORRECTOR_LIMIT_S, in_python
 
 if TYPE_CHECKING:
     from apo_bench.sweeps.grid import SweepSettings

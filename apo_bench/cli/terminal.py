@@ -9,8 +9,7 @@ from rich.table import Table
 
 from apo_bench.cli.printing import console
 from apo_bench.io.plain_text import clean
-from apo_bench.records.row import FreedSet, MovedInHand, Predicted, Row
-from apo_bench.records.settings import RANGE
+from apo_bench.records import RANGE, FreedSet, MovedInHand, Predicted, Row
 from apo_bench.report.tables.cells import cell_table
 from apo_bench.report.tables.forecasts import prediction_summary
 from apo_bench.report.tables.table import Column

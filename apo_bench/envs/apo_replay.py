@@ -19,9 +19,16 @@ from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.records.robot_error import checked_robot_error
-from apo_bench.records.row import Predicted
-from apo_bench.records.settings import RANGE, USUAL, TrialSettings, check, level_pair, refuse_noise
+from apo_bench.records import (
+    RANGE,
+    USUAL,
+    Predicted,
+    TrialSettings,
+    check,
+    checked_robot_error,
+    level_pair,
+    refuse_noise,
+)
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.arms.arm import Arm

@@ -8,7 +8,7 @@ from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.spaces import Action, Seen, packed
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
-from apo_bench.records.short_names import CORRECTOR, CORRECTORS, SIMULATED
+from apo_bench.records import CORRECTOR, CORRECTORS, SIMULATED
 
 
 @final

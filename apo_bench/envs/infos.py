@@ -8,7 +8,7 @@ from collections.abc import Mapping
 from typing import Any, final
 
 from apo_bench.assembly.reached import Outcome
-from apo_bench.records.row import Predicted
+from apo_bench.records import Predicted
 
 
 @final

@@ -9,16 +9,18 @@ from typing import Any, final
 
 from apo_bench.errors import InputError
 from apo_bench.io.plain_text import UNSHOWN
-from apo_bench.records.method import knows_relations, knows_truth, may_look
-from apo_bench.records.salt import Salt
-from apo_bench.records.settings import (
+from apo_bench.records import (
     LEVEL,
     RANGE,
     SETTINGS,
+    Salt,
     TrialSettings,
     check,
     check_together,
+    knows_relations,
+    knows_truth,
     level_pair,
+    may_look,
     refuse_noise,
 )
 from apo_bench.scenario.file import load_scenario

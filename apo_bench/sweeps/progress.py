@@ -7,8 +7,7 @@ from contextlib import contextmanager
 from typing import Any, final
 
 from apo_bench.io.plain_text import clean
-from apo_bench.records.row import Row, look_up
-from apo_bench.records.setting_columns import KEY
+from apo_bench.records import KEY, Row, look_up
 
 Count = Callable[[Row], None]
 """Takes every row as it comes."""

@@ -6,14 +6,9 @@ from functools import partial
 from pathlib import Path
 
 from apo_bench.errors import InputError, unknown
-from apo_bench.records.limits import CORRECTOR_LIMIT_S, Limits
-from apo_bench.records.row import Row
+from apo_bench.records import CORRECTOR, CORRECTOR_LIMIT_S, Limits, Row, level_pair, salt_of_sweep, trial_key
 from apo_bench.records.run.run_file import run_record
 from apo_bench.records.run.run_folder import RunFolder
-from apo_bench.records.salt import salt_of_sweep
-from apo_bench.records.setting_columns import trial_key
-from apo_bench.records.settings import level_pair
-from apo_bench.records.short_names import CORRECTOR
 from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.arms.arm import Arm

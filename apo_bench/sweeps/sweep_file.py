@@ -19,8 +19,7 @@ from typing import Any
 
 from apo_bench.errors import InputError
 from apo_bench.io.documents import JsonNode, read_toml
-from apo_bench.records.setting_columns import in_python
-from apo_bench.records.settings import LEVEL, SETTINGS
+from apo_bench.records import LEVEL, SETTINGS, in_python
 from apo_bench.sweeps.grid import AXES, LARGEST_TRIALS, SHARED, SweepSettings
 
 _SEVERAL = {info.axis: info for info in AXES}

@@ -23,8 +23,8 @@ from apo_bench.files.json_forms import OBSERVATION_SCHEMA, PLAN_SCHEMA
 from apo_bench.io.reading import read_bytes
 from apo_bench.names import admit
 from apo_bench.observation.presets import noise_path
+from apo_bench.records import ROW, TrialSettings
 from apo_bench.records.run.own_code import DATA_PREFIXES, is_own_code
-from apo_bench.records.settings import ROW, TrialSettings
 from apo_bench.resources import folder
 from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.scenario import Scenario

@@ -24,7 +24,7 @@ from apo_bench.errors import InputError
 from apo_bench.io.documents import parse_json
 from apo_bench.io.reading import read_text
 from apo_bench.io.writing import write_whole
-from apo_bench.records.settings import RANGE, TrialSettings
+from apo_bench.records import RANGE, TrialSettings
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.fingerprint import code_files, content_pieces
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration

@@ -10,7 +10,7 @@ from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.observation.relations import culprit
-from apo_bench.records.row import MovedInHand, Row, finite
+from apo_bench.records import MovedInHand, Row, finite
 from apo_bench.trial.planning import MethodResult
 from apo_bench.trial.pose_error import goal_errors, pose_errors
 from apo_bench.trial.stages import Attempt

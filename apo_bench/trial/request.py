@@ -9,13 +9,17 @@ from apo_bench.assembly.goals import Observation
 from apo_bench.correction.own_code.own import OwnCorrectors
 from apo_bench.errors import InputError
 from apo_bench.io.reading import read_text
-from apo_bench.records.limits import CORRECTOR_LIMIT_S
-from apo_bench.records.method import parsed
-from apo_bench.records.relations import RECOGNISED
-from apo_bench.records.row import Row
-from apo_bench.records.salt import read_salt
-from apo_bench.records.setting_columns import in_python
-from apo_bench.records.settings import LEVEL, RANGE, TrialSettings
+from apo_bench.records import (
+    CORRECTOR_LIMIT_S,
+    LEVEL,
+    RANGE,
+    RECOGNISED,
+    Row,
+    TrialSettings,
+    in_python,
+    parsed,
+    read_salt,
+)
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.scenario.starts import in_the_air

@@ -10,10 +10,7 @@ from typing import cast
 
 from apo_bench.assembly.reached import Outcome
 from apo_bench.io.plain_text import clean
-from apo_bench.records.outcomes import sentence
-from apo_bench.records.row import LONGEST_SENTENCE, ROW_FIELDS, Row
-from apo_bench.records.setting_columns import setting_columns
-from apo_bench.records.settings import ENV_ID, ROW, TrialSettings
+from apo_bench.records import ENV_ID, LONGEST_SENTENCE, ROW, ROW_FIELDS, Row, TrialSettings, sentence, setting_columns
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.fingerprint import spec_hash

@@ -21,11 +21,7 @@ from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Noise
 from apo_bench.observation.observing import observe
 from apo_bench.prediction.failure import ARM_CODES, predict
-from apo_bench.records.outcomes import sentence
-from apo_bench.records.robot_error import NO_ROBOT_ERROR, robot_sigmas
-from apo_bench.records.row import Predicted
-from apo_bench.records.salt import Salt
-from apo_bench.records.settings import RANGE, SETTINGS, TrialSettings
+from apo_bench.records import NO_ROBOT_ERROR, RANGE, SETTINGS, Predicted, Salt, TrialSettings, robot_sigmas, sentence
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.scenario.scenario import Scenario

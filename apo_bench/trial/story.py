@@ -8,8 +8,7 @@ import numpy as np
 
 from apo_bench.assembly.goals import Observation, Poses, placements
 from apo_bench.geometry.arrays import Array
-from apo_bench.records.row import Row
-from apo_bench.records.settings import RANGE, TrialSettings
+from apo_bench.records import RANGE, Row, TrialSettings
 from apo_bench.scenario.layout import layout_at
 from apo_bench.simulation.film.still import Chapter, FilmTrack, scenario_chapter
 from apo_bench.simulation.scene.scene import Scene

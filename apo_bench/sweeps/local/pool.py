@@ -5,8 +5,7 @@ from collections.abc import Sequence
 from multiprocessing import connection
 from typing import Any, final
 
-from apo_bench.records.row import Row
-from apo_bench.records.settings import TrialSettings
+from apo_bench.records import Row, TrialSettings
 from apo_bench.sweeps.local.process import Process
 from apo_bench.sweeps.work.dispatch import STARTING_S, Dispatch, Job, check_limit
 from apo_bench.sweeps.work.environment_lock import EnvironmentLock

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol, final
 
 from apo_bench.errors import InputError
-from apo_bench.records.method import is_own
-from apo_bench.records.settings import TrialSettings
+from apo_bench.records import TrialSettings, is_own
 from apo_bench.sweeps.work.environment_lock import EnvironmentLock
 from apo_bench.sweeps.work.messages import Check, Message, Unit, checked
 from apo_bench.sweeps.work.worker import Emit, timing

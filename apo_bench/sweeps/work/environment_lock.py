@@ -12,9 +12,7 @@ from apo_bench.correction.own_code.own import check_correctors
 from apo_bench.errors import InputError
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.relations import make_relations
-from apo_bench.records.limits import CORRECTOR_LIMIT_S
-from apo_bench.records.method import parsed, with_simulated
-from apo_bench.records.relations import RECOGNISED
+from apo_bench.records import CORRECTOR_LIMIT_S, RECOGNISED, parsed, with_simulated
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.arms.finding import find_arm

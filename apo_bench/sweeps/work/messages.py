@@ -19,7 +19,7 @@ from types import FrameType
 from typing import Any, final
 
 from apo_bench.errors import InputError
-from apo_bench.records.settings import TrialSettings
+from apo_bench.records import TrialSettings
 
 Message = tuple[Any, ...]
 

@@ -11,11 +11,7 @@ from apo_bench.assembly.reached import Outcome
 from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.correction.own_code.own import OwnCorrectors
 from apo_bench.errors import InputError
-from apo_bench.records.method import parsed
-from apo_bench.records.outcomes import sentence
-from apo_bench.records.row import Row
-from apo_bench.records.setting_columns import KEY, row_key
-from apo_bench.records.settings import TrialSettings
+from apo_bench.records import KEY, Row, TrialSettings, parsed, row_key, sentence
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.sweeps.work.environment_lock import EnvironmentLock

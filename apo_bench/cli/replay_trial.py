@@ -15,7 +15,7 @@ from apo_bench.cli.show import Port
 from apo_bench.cli.sweep import interrupted
 from apo_bench.errors import InputError
 from apo_bench.io.streams import redirect_output
-from apo_bench.records.limits import CORRECTOR_LIMIT_S
+from apo_bench.records import CORRECTOR_LIMIT_S
 
 if TYPE_CHECKING:
     from apo_bench.trial.story import Story
