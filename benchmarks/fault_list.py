@@ -76,9 +76,9 @@ FAULTS = (
         "0.0",
         "faces that are inside each other have no gap",
     ),
-    Fault("judging/finished.py", "relation.lost <= k for", "relation.lost < k for", "no fixture is put away any more"),
-    Fault("judging/finished.py", "reached.area / true.area", "true.area / reached.area", "shares turned over"),
-    Fault("judging/demonstrated.py", "put.pop(part, None)", "put.get(part)", "a part that is moved on is pushed"),
+    Fault("judging/rules.py", "relation.lost <= k for", "relation.lost < k for", "no fixture is put away any more"),
+    Fault("judging/rules.py", "reached.area / true.area", "true.area / reached.area", "shares turned over"),
+    Fault("judging/rules.py", "put.pop(part, None)", "put.get(part)", "a part that is moved on is pushed"),
     Fault("judging/judgement.py", "np.degrees(snapshot.spin_rad_s)", "snapshot.spin_rad_s", "rad/s taken for deg/s"),
     Fault("judging/verdict.py", "or not self.demonstrated.holds)", "or self.demonstrated.holds)", "the wrong reason"),
     Fault(

@@ -25,7 +25,7 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import overlap
 from apo_bench.geometry.symmetry import nearest_alike
-from apo_bench.judging.finished import fixtures
+from apo_bench.judging.rules import fixtures
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.scenario.file import load_scenario

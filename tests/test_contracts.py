@@ -74,7 +74,7 @@ BREACHES = {
     "judge": [
         ("apo_bench.judging.verdict", "apo_bench.observation.noise"),
         ("apo_bench.judging.contacts", "apo_bench.recognition.contacts"),
-        ("apo_bench.judging.finished", "apo_bench.correction.contact"),
+        ("apo_bench.judging.rules", "apo_bench.correction.contact"),
     ],
     "corrector": [
         ("apo_bench.correction.contact", "apo_bench.scenario.scenario"),

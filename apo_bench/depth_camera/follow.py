@@ -17,8 +17,7 @@ from apo_bench.depth_camera.regions import Regions, regions
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.revolution import turned_alike
-from apo_bench.geometry.symmetry import nearest_symmetric_pose, symmetries
+from apo_bench.geometry.symmetry import nearest_symmetric_pose, symmetries, turned_alike
 
 _GONE = 0.5
 """A part has moved if so much of what was seen of it has vanished."""

@@ -10,8 +10,8 @@ from apo_bench.assembly.topology import Assembly, Contact
 from apo_bench.assembly.touching import corners, touched_contacts
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.revolution import turned_alike
 from apo_bench.geometry.solid import Solid
+from apo_bench.geometry.symmetry import turned_alike
 
 _ONE_WAY = 0.999
 """Cosine between the normals of faces that look the same way: together they are a plain support."""

@@ -8,9 +8,8 @@ import numpy as np
 from apo_bench.assembly.reached import Reached, Snapshot
 from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry.arrays import Array
-from apo_bench.judging.demonstrated import judge_demonstrated
-from apo_bench.judging.finished import judge_finished
 from apo_bench.judging.judgement import Judgement
+from apo_bench.judging.rules import judge_demonstrated, judge_finished
 from apo_bench.records.thresholds import Criteria, Meaning
 
 

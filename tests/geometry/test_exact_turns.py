@@ -8,9 +8,8 @@ from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.hull import Hull
-from apo_bench.geometry.revolution import revolution, turn_about
 from apo_bench.geometry.solid import Box, Face, Solid
-from apo_bench.geometry.symmetry import nearest_alike, nearest_symmetry, symmetries
+from apo_bench.geometry.symmetry import nearest_alike, nearest_symmetry, revolution, symmetries, turn_about
 from apo_bench.observation.models.level import Level
 from apo_bench.observation.models.symmetric import AnyTurn, Symmetric
 from apo_bench.trial.pose_error import goal_errors

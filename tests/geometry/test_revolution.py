@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench.geometry import pose
-from apo_bench.geometry.revolution import revolution, turned_alike
 from apo_bench.geometry.solid import Box, Solid
+from apo_bench.geometry.symmetry import revolution, turned_alike
 from tests import rounds, scenes
 
 

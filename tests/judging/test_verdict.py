@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from apo_bench.assembly.goals import placements
 from apo_bench.assembly.reached import Reached
 from apo_bench.geometry import pose
-from apo_bench.judging.finished import fixtures
 from apo_bench.judging.judgement import FAULTS
+from apo_bench.judging.rules import fixtures
 from apo_bench.judging.verdict import Verdict, judge
 from apo_bench.records.outcomes import CODES
 from apo_bench.records.thresholds import Criteria, Thresholds

@@ -10,9 +10,8 @@ from apo_bench.assembly.topology import Assembly
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.polygon import across_axis
-from apo_bench.geometry.revolution import revolution, turn_about
 from apo_bench.geometry.solid import Solid
-from apo_bench.geometry.symmetry import folds, nearest_alike, symmetries
+from apo_bench.geometry.symmetry import folds, nearest_alike, revolution, symmetries, turn_about
 from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Facts, Level
 
