@@ -12,7 +12,7 @@ from apo_bench.assembly.topology import Contact, Gap, PartFace
 from apo_bench.errors import InputError
 from apo_bench.io.documents import JsonNode
 from apo_bench.scenario.checks import check_clearance, check_scenario
-from apo_bench.scenario.contacts import Asked, read_contacts
+from apo_bench.scenario.contacts import ContactGaps, read_contacts
 from apo_bench.scenario.scenario import Shift, Site
 from tests import rounds, scenes
 from tests.rounds import as_scenario
@@ -28,7 +28,7 @@ SOLIDS = {
 }
 
 
-def read(value: Any, main: str = "peg") -> Asked:
+def read(value: Any, main: str = "peg") -> ContactGaps:
     node = JsonNode(value, "mine.toml", "operation 1, contacts, contact 1")
     return read_contacts((node,), main, (), SOLIDS, {"table", "plate", "loose", "sunk"})
 
