@@ -10,10 +10,10 @@ import numpy as np
 from apo_bench.assembly.correction_record import Correction, Look, LookingCorrector
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.lowering import lowered_observation
-from apo_bench.correction.admitted import check_observations
 from apo_bench.correction.baselines.measured import gap_of, goals_as_given
 from apo_bench.correction.contact import ContactCorrector
-from apo_bench.correction.returned import RIGID, check_correction, check_near
+from apo_bench.correction.correction_checks import RIGID, check_correction, check_near
+from apo_bench.correction.observation_checks import check_observations
 from apo_bench.correction.status import opposing
 from apo_bench.errors import InputError, failed, kind
 from apo_bench.geometry.arrays import Array, NotReal, real

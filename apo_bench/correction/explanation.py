@@ -5,7 +5,8 @@ are its block of the null space of the Jacobian without the columns of earlier o
 dimensions of all operations add up to the freedom of the whole, and their ranks to its rank.
 
 How uncertain a direction still is comes from the posterior of all goals at once, so a free direction is as uncertain
-as it was seen, or less where several parts that must move together were seen.
+as it was seen, or less where several parts that must move together were seen. A third of this file are the records that
+are returned.
 """
 
 from collections.abc import Collection, Iterator

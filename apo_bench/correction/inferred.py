@@ -3,7 +3,7 @@
 A contact says that two normals oppose, that a point lies in a plane, and that two faces cover each other, so their
 middles are not far apart; or that two axes are one line. With the poses of all other operations in its equations known,
 a contact of an operation says this of its goal alone. The operation of which most is said is inferred first; then it is
-known to the others.
+known to the others. Longer than other files: what flat and round faces say, and the pose that follows, is one idea.
 """
 
 from collections.abc import Collection, Sequence

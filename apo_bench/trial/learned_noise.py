@@ -12,7 +12,7 @@ import numpy as np
 from apo_bench.assembly.goals import Observation
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.learning.evidence import UNITS, readings
-from apo_bench.correction.learning.likelihood import LearnedNoise, Shown, learn_noise
+from apo_bench.correction.learning.likelihood import LearnedNoise, ObservedErrors, learn_noise
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
@@ -77,7 +77,7 @@ def learn(observations: Sequence[Observation], camera: Camera, source: str, *, c
         others = [gross ^ {k} for k in range(n) if k not in unseen]
         F = component_factors(camera, correction.goals, P)
         ways = view_ways(correction.goals, P)
-        evidence.append(Shown(readings(observation, correction.goals, [gross, *others]), F, ways, n, unseen))
+        evidence.append(ObservedErrors(readings(observation, correction.goals, [gross, *others]), F, ways, n, unseen))
     # the likelihood is climbed from what is typical; errors of a whole view are taken for smaller at first
     start = [typical[0 if component.unit == "mm" else 1] for component in COMPONENTS]
     start[4:] = [0.3 * x for x in start[4:]]

@@ -15,7 +15,7 @@ from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.cli.app import main
 from apo_bench.correction.learning import likelihood
 from apo_bench.correction.learning.evidence import UNITS, readings
-from apo_bench.correction.learning.likelihood import Shown
+from apo_bench.correction.learning.likelihood import ObservedErrors
 from apo_bench.errors import InputError
 from apo_bench.files.json_forms import observation_form, write_form
 from apo_bench.geometry import pose
@@ -117,7 +117,7 @@ def test_the_slope_of_the_likelihood_is_that_of_its_values() -> None:
         F = component_factors(camera, goals, view_frame(camera, [goals]))
         ways = view_ways(goals, view_frame(camera, [goals]))
         some = readings(observation, goals, [(), (1,), (0, 2)])
-        prepared.append(likelihood._prepared(Shown(some, F, ways, 3)))
+        prepared.append(likelihood._prepared(ObservedErrors(some, F, ways, 3)))
     x = np.array([0.1, 1.5, 0.4, -0.3, -2.0, 0.2, -1.0])
     c = 0.1 * np.arange(6.0)
     _, slope = likelihood._surprise(x, prepared, c)

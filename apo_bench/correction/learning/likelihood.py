@@ -35,7 +35,7 @@ _NUDGE = 1e-3
 
 @final
 @dataclass(frozen=True, eq=False)
-class Shown:
+class ObservedErrors:
     """What is known of one observation."""
 
     readings: tuple[Reading, ...]
@@ -73,7 +73,7 @@ class LearnedNoise:
     observations: int
 
 
-def learn_noise(observations: Sequence[Shown], start: Sequence[float], constant: bool) -> LearnedNoise:
+def learn_noise(observations: Sequence[ObservedErrors], start: Sequence[float], constant: bool) -> LearnedNoise:
     """The most likely noise.
 
     Args:
@@ -124,7 +124,7 @@ class _Prepared(NamedTuple):
     n: int
 
 
-def _prepared(observation: Shown) -> _Prepared:
+def _prepared(observation: ObservedErrors) -> _Prepared:
     most = max((len(one.known) for one in observation.readings), default=0)
     prepared = []
     for one in observation.readings:

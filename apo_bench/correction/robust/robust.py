@@ -16,8 +16,8 @@ from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.correction.consistency import TEST_LEVEL
 from apo_bench.correction.contact import contact_apply
 from apo_bench.correction.inferred import inferred_goals
+from apo_bench.correction.robust.crowding import least_crowded
 from apo_bench.correction.robust.hypotheses import Case, Hypothesis, as_stated
-from apo_bench.correction.robust.room import least_crowded
 from apo_bench.correction.robust.search import Search
 from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, Sightings, looked_again, views_of
 from apo_bench.correction.status import refused_correction

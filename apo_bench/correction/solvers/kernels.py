@@ -4,7 +4,8 @@ Nothing is decided here: how much to damp, when to stop and what a result is wor
 for both twins. Plain Python that runs as it stands, and imports nothing from the package: Numba (Lam, Pitrou and
 Seibert, 2015) compiles it at the first correction and keeps the result for as long as this file stays as it is. It is
 written for a short compilation, too: few statements, each with few indices, and no views. Arrays are C-contiguous; b
-observations of one assembly with c contacts, n operations and p parts.
+observations of one assembly with c contacts, n operations and p parts. Longer than other files, since what is one
+matrix product elsewhere is three loops here.
 """
 
 import math

@@ -17,9 +17,9 @@ from apo_bench.correction.correctors import correct
 from apo_bench.correction.inferred import inferred_goals
 from apo_bench.correction.problem import seen_system
 from apo_bench.correction.region import contains_truth
+from apo_bench.correction.robust.crowding import crowding
 from apo_bench.correction.robust.hypotheses import Case, hypothesis, soft_deviation
 from apo_bench.correction.robust.robust import RobustCorrector, contact_robust
-from apo_bench.correction.robust.room import crowding
 from apo_bench.correction.robust.search import ContactAgreement
 from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, views_of
 from apo_bench.correction.solvers.compact import linearised_by
