@@ -1,7 +1,5 @@
 """What a CAD file becomes first: closed meshes whose triangles belong to faces with parameters, [mm]."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -69,12 +67,12 @@ class Mesh:
         """The corners of these edges, (e, 2)."""
         return self.sides[self.twins[:, 0]]
 
-    def part(self, triangles: Any) -> Mesh:
+    def part(self, triangles: Any) -> "Mesh":
         """The mesh of some of the triangles, with the corners that they use, in their order."""
         used, index = np.unique(self.triangles[triangles], return_inverse=True)
         return Mesh(self.corners[used], index.reshape(-1, 3))
 
-    def flipped(self) -> Mesh:
+    def flipped(self) -> "Mesh":
         """Inside out."""
         return Mesh(self.corners, self.triangles[:, ::-1])
 

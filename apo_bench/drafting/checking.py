@@ -12,7 +12,6 @@ import numpy as np
 
 from apo_bench.assembly.goals import Plan, placements
 from apo_bench.assembly.kinds import contact_kind
-from apo_bench.assembly.topology import Contact
 from apo_bench.drafting.posed import TABLE
 from apo_bench.drafting.touching import walls_without_play
 from apo_bench.drafting.waiting import stance
@@ -132,14 +131,11 @@ def _looked(what: str, wrong: Iterable[str], well: str) -> Iterator[Finding]:
 
 def _counted(scenario: Scenario) -> str:
     assembly = scenario.assembly
-    kinds = Counter(str(contact_kind(*map(assembly.face_of, contact))) for contact in _contacts(scenario))
+    contacts = [contact for operation in assembly.operations for contact in operation.contacts]
+    kinds = Counter(str(contact_kind(*map(assembly.face_of, contact))) for contact in contacts)
     counts = ", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items()))
     parts = len(assembly.solids) - (TABLE in assembly.solids)
-    return f"{parts} parts, {len(assembly)} operations, {kinds.total()} contacts ({counts})"
-
-
-def _contacts(scenario: Scenario) -> Iterator[Contact]:
-    return (contact for operation in scenario.assembly.operations for contact in operation.contacts)
+    return f"{parts} parts, {len(assembly)} operations, {len(contacts)} contacts ({counts})"
 
 
 def _parts(scenario: Scenario) -> Iterator[str]:

@@ -78,7 +78,8 @@ def _below(label: Any, T: Array, product: str, name: str, colors: Any) -> Iterat
     # A shape in its own frame, so that all of its copies are one shape, and where that frame is.
     placed = XCAFDoc.XCAFDoc_ShapeTool.GetShape_s(part)
     shape = placed.Located(TopLoc.TopLoc_Location())
-    color = _color(label) or _color(part) or _color_of_faces(colors, shape)
+    of_label = XCAFDoc.XCAFDoc_ColorTool.GetColor_s
+    color = _first_color(of_label, label) or _first_color(of_label, part) or _color_of_faces(colors, shape)
     yield Leaf(product, name, shape, here @ matrix_of(placed.Location().Transformation()), color)
 
 
@@ -99,15 +100,8 @@ def matrix_of(transformation: Any) -> Array:
     return np.array([*rows, [0.0, 0.0, 0.0, 1.0]])
 
 
-def _color(label: Any) -> Rgb | None:
-    """Of an entry of the tree."""
-    from OCP import XCAFDoc
-
-    return _first_color(XCAFDoc.XCAFDoc_ColorTool.GetColor_s, label)
-
-
 def _first_color(get: Callable[[Any, Any, Any], bool], owner: Any) -> Rgb | None:
-    """Of its surface, else of all of it."""
+    """The colour of a surface, else that of all of it; of an entry of the tree, or a shape."""
     from OCP import Quantity, XCAFDoc
 
     color = Quantity.Quantity_Color()
