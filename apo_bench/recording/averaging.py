@@ -39,6 +39,11 @@ class Mean:
         return self.scatter / self.independent
 
 
+def per_axis(C: Array) -> tuple[float, float]:
+    """Standard deviations along and about an axis, root mean squares over axes, of a covariance (6, 6), [m, rad]."""
+    return float(np.sqrt(np.trace(C[:3, :3]) / 3.0)), float(np.sqrt(np.trace(C[3:, 3:]) / 3.0))
+
+
 def average(T: Array) -> Mean:
     """The mean of poses (n, 4, 4): that about which inliers have no mean twist.
 
@@ -92,6 +97,7 @@ def _axes(T: Array) -> Array:
 
 def _middle(T: Array) -> Array:
     """The pose of a frame that is near to most: medians of positions, and of turns from that frame."""
+    # Of the 25 frames nearest to the middle, the one from which the median turn to the others is the least.
     place = np.median(T[:, :3, 3], axis=0)
     off = np.linalg.norm(T[:, :3, 3] - place, axis=1)
     few = T[np.argsort(off)[: min(len(T), 25)]]

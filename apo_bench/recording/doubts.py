@@ -11,6 +11,7 @@ from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.recording.arranging import Arrange, Arrangement
+from apo_bench.recording.averaging import per_axis
 from apo_bench.recording.camera_file import CameraFile
 from apo_bench.recording.mistakes import mistakes, reversed_in_time
 from apo_bench.recording.operations import SeenOperation
@@ -125,8 +126,9 @@ def _rivals(arrangement: Arrangement) -> Iterator[str]:
 
 def _open(arrangement: Arrangement, covariance: Array, assembly: Assembly) -> Iterator[str]:
     for k, fit in arrangement.fits.items():
-        mm = 1e3 * np.sqrt(np.trace(covariance[k, :3, :3]) / 3.0)
-        deg = np.degrees(np.sqrt(np.trace(covariance[k, 3:, 3:]) / 3.0))
+        m, rad = per_axis(covariance[k])
+        mm = 1e3 * m
+        deg = np.degrees(rad)
         if fit.wrong_mm > _OPEN_MM + _OPEN * (mm + deg):
             yield (
                 f"operation {k + 1} ({assembly.operations[k].main}) leaves a contact open by {1e3 * fit.gap_m:.1f} mm "

@@ -55,6 +55,7 @@ def _errors(camera: Camera, track: PoseTrack, rest: RestSpan) -> Array:
     """
     T = track.T[rest.first : rest.last + 1]
     n = float(rest.mean.inlier.sum())
+    # From the camera's axes into those of the ray; turns first from the part's axes into the camera's.
     F = camera.frames(rest.T[None])[0]
     shift = (T[:, :3, 3] - rest.T[:3, 3]) @ F
     turn = pose.log(pose.inverse(rest.T) @ T)[:, 3:] @ rest.T[:3, :3].T @ F

@@ -9,6 +9,7 @@ import numpy as np
 from apo_bench.errors import InputError
 from apo_bench.geometry.arrays import Array
 from apo_bench.recording.arranging import solved_camera, staying
+from apo_bench.recording.averaging import per_axis
 from apo_bench.recording.camera_file import CameraFile
 from apo_bench.recording.camera_pose import CameraPose
 from apo_bench.recording.log import PoseTrack
@@ -89,8 +90,7 @@ def _put(moves: Sequence[_Move]) -> Put:
 
 def deviations(rest: RestSpan, camera: CameraFile) -> tuple[float, float]:
     """Standard deviations per axis of one rest, [m, rad]: of its mean, and of what stays; else that of one frame."""
-    C = rest.mean.covariance + staying(camera, rest.mean)
-    return float(np.sqrt(np.trace(C[:3, :3]) / 3.0)), float(np.sqrt(np.trace(C[3:, 3:]) / 3.0))
+    return per_axis(rest.mean.covariance + staying(camera, rest.mean))
 
 
 def goals_of(recording: UnplannedRecording) -> Array:

@@ -35,6 +35,7 @@ def component_factors(camera: Camera, goals: Array, P: Array) -> tuple[Array, ..
         P: (4, 4), the frame in which the whole view errs.
     """
     n = len(goals)
+    # Columns of F are the axes of each ray in the frame of its part: two across and one along, of shifts and of turns.
     turned = np.swapaxes(goals[:, :3, :3], 1, 2) @ camera.frames(goals)
     own = np.zeros((4, n, 6, n, 3))
     for i, (row, columns) in enumerate(((0, (0, 1)), (0, (2,)), (3, (0, 1)), (3, (2,)))):

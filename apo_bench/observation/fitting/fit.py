@@ -92,6 +92,7 @@ def fit_split(errors: Array, limit: float, name: str = "errors") -> Split:
         seen = log_density_across(split.across, r).mean() + log_density_along(split.along, x).mean()
         return float(np.log(max(split.inside, 1e-300)) - seen)
 
+    # Medians of a Gaussian: 1.18 s of a length across (Rayleigh), 0.675 s of a size along.
     low = np.log(SMALLEST_SCALE * limit)
     high = np.log(limit)
     start = [np.log(max(size, SMALLEST_SCALE * limit)) for size in (np.median(r) / 1.18, np.median(np.abs(x)) / 0.675)]
@@ -143,6 +144,7 @@ def _figures(name: str, unit: str, sizes: Array, cdf: Callable[[Array], Array], 
     ordered = np.sort(sizes)
     n = len(sizes)
     at = np.interp(ordered, grid, chance)
+    # The empirical distribution steps from (i - 1) / n to i / n at the i-th size; the distance is largest at a step.
     step = np.arange(n + 1) / n
     return Figures(
         name=name,

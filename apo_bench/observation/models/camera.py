@@ -62,6 +62,8 @@ class Camera:
     def frames(self, goals: Array) -> Array:
         """The frames of the rays, (n, 3, 3), world from ray: the third column is the ray."""
         R = self.T_world_camera[:3, :3]
+        # The shortest turn from z to the ray r is about k = z x r, with |k| = sin and r_z = cos: Rodrigues' formula
+        # I + K + K^2 (1 - cos) / sin^2, where (1 - cos) / sin^2 = 1 / (1 + cos).
         ray = self.rays(goals) @ R
         K = pose.hat(np.stack([-ray[:, 1], ray[:, 0], np.zeros(len(ray))], axis=1))
         cosine = ray[:, 2, None, None]

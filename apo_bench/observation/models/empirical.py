@@ -19,7 +19,11 @@ from apo_bench.observation.models.fitted import LEVEL_UNITS, check_measured_leve
 from apo_bench.observation.models.level import Facts, Level
 from apo_bench.observation.models.residuals import Residuals
 
-_KINDS = _INLIER, _TURNED, _OUTLIER, _MISSED = "inlier", "turned", "outlier", "missed"
+_INLIER = "inlier"
+_TURNED = "turned"
+_OUTLIER = "outlier"
+_MISSED = "missed"
+_KINDS = (_INLIER, _TURNED, _OUTLIER, _MISSED)
 _ERRORS = ("x_mm", "y_mm", "along_mm", "turn_x_deg", "turn_y_deg", "turn_along_deg")
 _COLUMNS = ("scene_id", "im_id", "obj_id", "kind", *_ERRORS)
 MOST_RESIDUALS = 8000
@@ -82,6 +86,7 @@ class Empirical:
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         n = len(assembly)
         sample = self.sample
+        # Columns of chance: which residual, whether an outlier, whether missed; drawn for all, whatever comes of them.
         chance = rng.random((n, 3))
         sign = rng.choice([-1.0, 1.0], (n, 1))
         errors = _picked(sample.inliers, chance[:, 0])
@@ -166,6 +171,7 @@ def _acting_where_seen(errors: list[list[float]]) -> Array:
     There a part that is turned by w is shifted by V(-w) d, with V of the exponential exp(d, w) = (exp w, V(w) d): so d
     is the shift that was measured, times the inverse of V(-w), and the pose that was estimated comes back exactly.
     """
+    # log of the pose with rotation exp(-w) and position d is (V(-w)^-1 d, -w).
     measured = np.array(errors).reshape(-1, 6) * LEVEL_UNITS
     back = np.concatenate([np.zeros((len(measured), 3)), -measured[:, 3:]], axis=1)
     T = pose.exp(back)

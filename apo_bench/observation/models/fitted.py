@@ -136,6 +136,7 @@ class Fitted:
         sigma = np.repeat(self.measured.view or (0.0, 0.0), 3) * LEVEL_UNITS * np.repeat(self.level, 3)
         if not sigma.any() or not len(seen.goals):
             return seen
+        # E = P exp(e) P^-1 displaces all that is seen alike, about the middle of it.
         P = view_frame(self.camera, [seen.goals])
         goals = P @ pose.exp(sigma * unit) @ pose.inverse(P) @ seen.goals
         return with_shared(replace(seen, goals=goals), view_error(self.camera, goals, sigma))
@@ -234,6 +235,7 @@ def observe_in_ray_frames(
 def _gross(measured: MeasuredNoise, n: int, rng: np.random.Generator) -> Array:
     """Errors (n, 6) of outliers, [mm, deg]: any direction, any rotation."""
     limit = measured.shift_mm.limit
+    # Gaussian vectors have any direction alike often, Gaussian quaternions any rotation; log-uniform sizes.
     direction = rng.standard_normal((n, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     size = limit * (measured.farthest_mm / limit) ** rng.random((n, 1))

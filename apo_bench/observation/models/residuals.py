@@ -110,6 +110,7 @@ def match_residuals(estimates: PoseRows, truth: PoseRows, scene: int | None = No
     found = partner >= 0
     n = len(partner)
     among_all = len(estimates.where) if scene is None else int(np.sum(estimates.where[:, 0] == scene))
+    # BOP poses are in the frame of the camera, so its own pose is the identity. F^t takes errors into the ray's frame.
     there = np.tile(np.eye(4), (n, 1, 1))
     there[:, :3, 3] = truth.t_mm * 1e-3
     F = Camera(np.eye(4)).frames(there)[found]
@@ -121,6 +122,7 @@ def match_residuals(estimates: PoseRows, truth: PoseRows, scene: int | None = No
     turned = np.full((n, 3), np.nan)
     shift[found] = np.einsum("nji,nj->ni", F, estimates.t_mm[partner[found]] - truth.t_mm[found])
     turned[found] = np.einsum("nji,nj->ni", F, turn)
+    # trace(R_seen R^t) = 1 + 2 cos(angle).
     trace = np.full(n, np.nan)
     trace[found] = np.degrees(np.arccos(np.clip((np.einsum("nij,nij->n", R_seen, R) - 1.0) / 2.0, -1.0, 1.0)))
     return Residuals(

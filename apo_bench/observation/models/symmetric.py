@@ -71,6 +71,7 @@ class Symmetric:
             about = pose.adjoint(frame)
             sigma, stated = self._deviations(fold)
             if np.any(unit[k] * sigma):
+                # About the centre of volume: the body twist there is Ad(frame) xi at the part's origin.
                 off = pose.exp(about @ (unit[k] * sigma))
                 xi[k] = pose.log(nearest_alike(solid, off, np.eye(4)))
             covariance[k] = about @ np.diag(stated**2) @ about.T

@@ -94,6 +94,7 @@ class Split:
         """Errors (n, 3); what falls outside the limit is drawn anew."""
         kept = np.zeros((0, 3))
         while len(kept) < n:
+            # Student t is a Gaussian over sqrt(chi-square(n) / n): one divisor for both directions across, one along.
             unit = rng.standard_normal((n, 3))
             error = unit * [self.across.scale, self.across.scale, self.along.scale]
             error[:, :2] /= _root_chi(self.across, n, rng)[:, None]
@@ -136,6 +137,7 @@ def log_density_across(tail: Tail, r: Array) -> Array:
 
 def _below_across(tail: Tail, r: Array) -> Array:
     """The chance that Student t in two directions is nearer than r."""
+    # 1 - (1 + r^2 / (n s^2))^(-n / 2); of a Gaussian 1 - exp(-r^2 / 2 s^2).
     h = tail.heaviness
     u = (r / tail.scale) ** 2
     return np.asarray(-np.expm1(-u / 2.0 if h == 0.0 else -0.5 / h * np.log1p(h * u)))
@@ -148,6 +150,8 @@ def _square_below(tail: Tail, r: Array) -> Array:
     s2 = tail.scale**2
     if h == 0.0:
         return np.asarray(-2.0 * s2 * np.expm1(-u / 2.0) - r * r * np.exp(-u / 2.0))
+    # With F = 1 - (1 + h u)^(-1 / 2h) the first integral is s^2 / h ((1 + h u)^power - 1) / power, power = 1 - 1 / 2h;
+    # log(1 + h u) where that is 0, at two degrees of freedom.
     grown = np.log1p(h * u)
     power = 1.0 - 0.5 / h
     whole = grown if abs(power) < 1e-9 else np.expm1(power * grown) / power

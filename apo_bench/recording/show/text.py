@@ -9,6 +9,7 @@ import numpy as np
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.io.words import columns, direction
+from apo_bench.recording.averaging import per_axis
 from apo_bench.recording.camera_pose import CameraPose
 from apo_bench.recording.importing import ImportedRecording
 from apo_bench.recording.log import Log
@@ -164,9 +165,9 @@ def _paths(recording: ImportedRecording) -> Iterator[str]:
 
 
 def _rest_cells(rest: RestSpan, X: Array) -> list[str]:
-    S = rest.mean.scatter
+    m, rad = per_axis(rest.mean.scatter)
     p = 1e3 * (X @ rest.T)[:3, 3]
-    off = f"{1e3 * np.sqrt(np.trace(S[:3, :3]) / 3.0):.2f} mm {np.degrees(np.sqrt(np.trace(S[3:, 3:]) / 3.0)):.2f} deg"
+    off = f"{1e3 * m:.2f} mm {np.degrees(rad):.2f} deg"
     frames = len(rest.mean.inlier)
     outliers = frames - int(rest.mean.inlier.sum())
     return [f"{rest.begins:.2f}", f"{rest.ends:.2f}", str(frames), str(outliers), *(f"{x:.2f}" for x in p), off]
