@@ -145,6 +145,7 @@ def _failed_contact(row: Row, scene: Any) -> Contact | None:
     operations = scene.scenario.assembly.operations
     k = row.get("failure_operation")
     every = [contact for operation in operations for contact in operation.contacts]
+    # with a space behind it, so that `a.px on b.n` is not found in `a.px on b.nx`
     named = [contact for contact in every if f"{contact} " in f"{row.get('sentence') or ''} "]
     stopped = operations[k - 1].contacts if k and row["failure_code"] == "force_stop" else ()
     return next(iter(named or stopped), None)

@@ -52,7 +52,9 @@ def draw_fit(residuals: Residuals, measured: MeasuredNoise, path: Path) -> None:
 def _histogram(axis: Any, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> None:
     top = min(limit, max(float(np.quantile(sizes, _SHOWN)) * 1.05, 1e-3 * limit))
     edges = np.linspace(0.0, top, _BINS + 1)
+    # a density of all sizes, also of those beyond the last bin: each counts 1 / (n * width of a bin)
     axis.hist(sizes, edges, weights=np.full(len(sizes), _BINS / (top * len(sizes))), color=_SEEN, label="seen")
+    # the fitted density is the slope of its distribution
     fine = np.linspace(0.0, top, 401)
     axis.plot((fine[1:] + fine[:-1]) / 2, np.diff(cdf(fine)) / np.diff(fine), color=_FITTED, label="fitted")
     axis.set_xlim(0.0, top)
@@ -63,6 +65,7 @@ def _quantiles(axis: Any, sizes: Array, cdf: Callable[[Array], Array], limit: fl
     """Every seen size against the one that the fit has at its rank; on the line they are alike."""
     grid = limit * np.linspace(0.0, 1.0, 2001) ** 2
     chance = np.maximum.accumulate(cdf(grid))
+    # the i-th of n sizes has the share (i - 1/2) / n below it; where the fit has that share is read backwards
     rank = (np.arange(len(sizes)) + 0.5) / len(sizes)
     axis.plot([0.0, limit], [0.0, limit], color=_FITTED, linewidth=1.0)
     axis.plot(np.interp(rank, chance, grid), np.sort(sizes), ".", color="#33557a", markersize=3)

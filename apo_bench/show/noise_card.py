@@ -162,6 +162,7 @@ def draw_histogram(drawn: Drawn, path: Path) -> None:
 
 def _histogram(drawn: Drawn) -> list[str]:
     """Bars over bins of half a stated standard deviation, and below them the deviations found and stated."""
+    # in stated deviations; bins of half of one about 0, the outermost open
     unit = drawn.errors / np.where(drawn.stated > 0.0, drawn.stated, 1.0)
     edges = 0.5 * (np.arange(_BINS - 1) - (_BINS - 2) / 2)
     counts = np.array([np.bincount(np.digitize(column, edges), minlength=_BINS) for column in unit.T])

@@ -148,6 +148,7 @@ def _cost(rows: _Rows, links: Links) -> tuple[int, float]:
     """Crossings, then the squared lengths of all links from left to right."""
     place = {item: (j, k - (len(row) - 1) / 2) for j, row in enumerate(rows) for k, item in enumerate(row)}
     ends = [(place[a][0], place[a][1], place[b][1]) for a, b in links]
+    # two links between the same rows cross if their ends stand in opposite order above and below
     crossings = sum(
         row == other and (top - top_other) * (end - end_other) < 0
         for i, (row, top, end) in enumerate(ends)

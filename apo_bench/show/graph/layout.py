@@ -110,6 +110,7 @@ def _ports(
     ports: dict[int, float] = {}
     for node, arcs in meeting.items():
         arcs.sort(key=lambda i: x[neighbour(chains[i])])
+        # at the middles of equal parts of 0.8 of the box, from left to right
         aside = 0.8 * unit * ((np.arange(len(arcs)) + 0.5) / len(arcs) - 0.5)
         ports.update(zip(arcs, (x[node] + aside).tolist(), strict=True))
     return ports
@@ -159,6 +160,7 @@ def _hidden(room: Rectangle, others: Sequence[Rectangle]) -> float:
 
 def shared_area(a: Rectangle, b: Rectangle) -> float:
     """The area that two rectangles have in common, [square inches]."""
+    # how far the sides reach over each other, at most the whole of the smaller one
     wide = (a.width + b.width) / 2 - abs(a.x - b.x)
     high = (a.height + b.height) / 2 - abs(a.y - b.y)
     return max(0.0, min(wide, a.width, b.width)) * max(0.0, min(high, a.height, b.height))
