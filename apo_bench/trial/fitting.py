@@ -4,8 +4,8 @@ A plan that fits is left as it is. So is one whose contacts are off, which no fr
 no choice was found. What is believed of contacts is what the corrector was told.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple, final
 
 import numpy as np
@@ -29,8 +29,7 @@ where the first cannot be."""
 _SLACK = 0.01
 """What had less room than that keeps it, but for so much [mm]."""
 _ROOMY = ("on_way", "from_above")
-_STANDS = ("falls", "leans")
-"""Measures of the room between parts, and of how they stand."""
+"""Measures of the room between parts."""
 _EXACT_M = 1e-9
 """Contacts that hold this well hold as before."""
 _LEAST_MM = 0.01
@@ -71,25 +70,6 @@ class FittingPlan:
         return f"moved where contacts leave it free: {', '.join(named)}; otherwise {self.why}"
 
 
-class _Surroundings(NamedTuple):
-    """What a plan is carried out in."""
-
-    scene: Scene
-
-    def measured(self, plan: Plan, room_mm: float = 0.0) -> Iterator[Measure]:
-        """Everything that a plan is measured by, as `predict` does it."""
-        scenario = self.scene.scenario
-        return measures(plan, self.scene.clearance_mm, scenario.thresholds, scenario.attach, room_mm)
-
-    def fault(self, plan: Plan) -> str | None:
-        """What is foretold to fail, or out of reach; empty where contacts are off, None if nothing is wrong."""
-        scenario = self.scene.scenario
-        prediction = predict(plan, self.scene.clearance_mm, scenario.thresholds, scenario.attach)
-        if prediction.fails:
-            return prediction.sentence if prediction.mendable else ""
-        return None if in_reach(plan, self.scene) else "the arm would not reach all of it"
-
-
 def fitting_plan(
     correction: Correction,
     observation: Observation,
@@ -115,15 +95,29 @@ def fitting_plan(
         if not predict(believed_plan, where.clearance_mm, where.thresholds, where.attach).fails:
             return FittingPlan(plan)
         where = build_scene(where)
-    around = _Surroundings(where)
-    why = around.fault(believed_plan)
-    goals = _goals_that_fit(believed_plan, correction.believed or corrector_input, around) if why else None
+    why = _fault(where, believed_plan)
+    goals = _goals_that_fit(believed_plan, correction.believed or corrector_input, where) if why else None
     if why is None or goals is None:
         return FittingPlan(plan)
     return FittingPlan(_moved(plan, goals), _moves(plan.goals, goals), why)
 
 
-def _goals_that_fit(plan: Plan, believed: Observation, around: _Surroundings) -> Array | None:
+def _fault(scene: Scene, plan: Plan) -> str | None:
+    """What is foretold to fail, or out of reach; empty where contacts are off, None if nothing is wrong."""
+    scenario = scene.scenario
+    prediction = predict(plan, scene.clearance_mm, scenario.thresholds, scenario.attach)
+    if prediction.fails:
+        return prediction.sentence if prediction.mendable else ""
+    return None if in_reach(plan, scene) else "the arm would not reach all of it"
+
+
+def _measured(scene: Scene, plan: Plan, room_mm: float = 0.0) -> tuple[Measure, ...]:
+    """Everything that a plan is measured by, as `predict` does it."""
+    scenario = scene.scenario
+    return tuple(measures(plan, scene.clearance_mm, scenario.thresholds, scenario.attach, room_mm))
+
+
+def _goals_that_fit(plan: Plan, believed: Observation, scene: Scene) -> Array | None:
     """Goals near those of a plan that does not fit at which it does, (n, 4, 4); None if none were found."""
     try:
         space = free_space(believed, plan.goals)
@@ -131,7 +125,7 @@ def _goals_that_fit(plan: Plan, believed: Observation, around: _Surroundings) ->
         return None
     if space is None:
         return None
-    before = tuple(around.measured(plan))
+    before = _measured(scene, plan)
     allowed = _earlier_gaps(plan)
 
     def fits(goals: Array) -> bool:
@@ -139,29 +133,19 @@ def _goals_that_fit(plan: Plan, believed: Observation, around: _Surroundings) ->
         held = all(
             (now <= np.maximum(most, _EXACT_M)).all() for now, most in zip(_earlier_gaps(moved), allowed, strict=True)
         )
-        return held and around.fault(moved) is None
+        return held and _fault(scene, moved) is None
 
     for room_mm in ROOMS_MM:
-        limits = _limits(before, tuple(around.measured(plan, room_mm)), room_mm)
-        fitting_goals = nearest_fitting(space, fits, _Excess(plan, around, room_mm, limits))
+        limits = _limits(before, _measured(scene, plan, room_mm), room_mm)
+        fitting_goals = nearest_fitting(space, fits, partial(_excess, plan, scene, room_mm, limits))
         if fitting_goals is not None:
             return fitting_goals
     return None
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class _Excess:
+def _excess(plan: Plan, scene: Scene, room_mm: float, limits: Array, goals: Array) -> Array:
     """By how much each measure of a plan with other goals is too large."""
-
-    plan: Plan
-    around: _Surroundings
-    room_mm: float
-    limits: Array
-
-    def __call__(self, goals: Array) -> Array:
-        sizes = self.around.measured(_moved(self.plan, goals), self.room_mm)
-        return np.array([measure.size for measure in sizes]) - self.limits
+    return np.array([measure.size for measure in _measured(scene, _moved(plan, goals), room_mm)]) - limits
 
 
 def _limits(before: tuple[Measure, ...], with_room: tuple[Measure, ...], room_mm: float) -> Array:
