@@ -16,9 +16,9 @@ import numpy as np
 
 from apo_bench.errors import InputError, one_line
 from apo_bench.geometry.arrays import Array
+from apo_bench.io.lossless_json import unique_members
 from apo_bench.io.plain_text import UNSHOWN
 from apo_bench.io.reading import decoded, read_bytes, read_text
-from apo_bench.io.whole_json import unique_members
 
 DEEPEST_NESTING = 32
 """Levels of nesting; no file of ours has more than 6."""

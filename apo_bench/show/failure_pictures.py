@@ -21,9 +21,9 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.solid import world_bounds
 from apo_bench.io.reading import each_line
 from apo_bench.records.row import Row
-from apo_bench.records.run.checked import row_of
 from apo_bench.records.run.own_code import left_out, own_code
 from apo_bench.records.run.replay_command import Files
+from apo_bench.records.run.validation import row_of
 from apo_bench.records.salt import Salt
 from apo_bench.records.setting_columns import row_key, settings_of
 from apo_bench.records.settings import TrialSettings

@@ -9,9 +9,9 @@ from typing import Literal
 from apo_bench.errors import InputError
 from apo_bench.io.reading import each_line
 from apo_bench.records.row import Row
-from apo_bench.records.run.checked import row_of
 from apo_bench.records.run.own_code import own_code
 from apo_bench.records.run.run_file import read_run
+from apo_bench.records.run.validation import row_of
 from apo_bench.records.salt import read_salt
 from apo_bench.records.setting_columns import settings_of
 from apo_bench.report.run.facts import scenario_files

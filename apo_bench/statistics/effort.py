@@ -12,7 +12,7 @@ import numpy as np
 
 from apo_bench.io.reading import each_line
 from apo_bench.records.row import Row
-from apo_bench.records.run.checked import timing_of
+from apo_bench.records.run.validation import timing_of
 from apo_bench.statistics.rates import by_method
 
 _PARTS = ("compile_s", "demonstrate_s", "trial_s")

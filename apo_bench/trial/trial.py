@@ -11,7 +11,7 @@ from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.observation.relations import make_relations, with_relations
 from apo_bench.records import RANGE, RECOGNISED, Row, TrialSettings, knows_relations, knows_truth, parsed
-from apo_bench.records.run.checked import unwritable
+from apo_bench.records.run.validation import unwritable
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.by_heart import nominal_where_seen

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from apo_bench.records.row import REQUIRED, ROW_FIELDS
-from apo_bench.records.run.checked import TIMING_FIELDS, row_of, timing_of, unwritable
+from apo_bench.records.run.validation import TIMING_FIELDS, row_of, timing_of, unwritable
 from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import build_scene

@@ -11,7 +11,7 @@ from apo_bench.errors import InputError
 from apo_bench.io.reading import read_bytes
 from apo_bench.io.writing import to_write
 from apo_bench.records.limits import USUAL_LIMITS, Limits
-from apo_bench.records.run.checked import run_of
+from apo_bench.records.run.validation import run_of
 from apo_bench.records.salt import Salt
 
 _RUN = "apo-bench/run/3"

@@ -17,8 +17,8 @@ from apo_bench.errors import InputError
 from apo_bench.io.reading import each_line
 from apo_bench.io.writing import check_target, is_there, put_back, to_write
 from apo_bench.records.row import Row
-from apo_bench.records.run.checked import row_of, unwritable
 from apo_bench.records.run.run_file import check_same, write_run
+from apo_bench.records.run.validation import row_of, unwritable
 from apo_bench.records.salt import check_same_salt
 from apo_bench.records.setting_columns import Key, row_key
 

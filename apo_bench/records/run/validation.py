@@ -12,8 +12,8 @@ import msgspec
 from msgspec import Meta
 
 from apo_bench.errors import InputError
+from apo_bench.io.lossless_json import HALF_BUT_OF_FILES, HALF_LETTER, WHOLE_LETTERS, half_letter, is_whole, read_whole
 from apo_bench.io.plain_text import CONTROL, clean
-from apo_bench.io.whole_json import HALF_BUT_OF_FILES, HALF_LETTER, WHOLE_LETTERS, half_letter, is_whole, read_whole
 from apo_bench.records.row import REQUIRED, ROW_FIELDS, Row
 from apo_bench.records.setting_columns import KEY
 from apo_bench.records.settings import ROW, Name
