@@ -13,9 +13,9 @@ import numpy as np
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.kinds import contact_kind
 from apo_bench.assembly.topology import Assembly, Contact, PartFace
+from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.overlap import overlap
-from apo_bench.geometry.pose import apply
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Face
 
@@ -70,7 +70,7 @@ def outline_points(assembly: Assembly, of: PartFace, poses: Poses) -> Array:
     x = face.frame[:3, 0]
     y = face.frame[:3, 1]
     ring = np.outer(np.cos(_RING), x) + np.outer(np.sin(_RING), y)
-    return apply(T, np.concatenate([end + r * ring for end, r in zip(face.ends, face.radii, strict=True)]))
+    return pose.apply(T, np.concatenate([end + r * ring for end, r in zip(face.ends, face.radii, strict=True)]))
 
 
 def mouth(assembly: Assembly, moved: PartFace, rests: PartFace, poses: Poses, way: Array) -> float:
@@ -91,10 +91,10 @@ def _touched(assembly: Assembly, contact: Contact, rests: PartFace, poses: Poses
     elif isinstance(still, Face):
         assert isinstance(moved, RoundFace)
         n = T[:3, :3] @ still.normal
-        yield TouchedContact(contact, rests.part, n, apply(T_moved, moved.ends) - moved.radius * n)
+        yield TouchedContact(contact, rests.part, n, pose.apply(T_moved, moved.ends) - moved.radius * n)
     elif isinstance(moved, Face):
         n = -T_moved[:3, :3] @ moved.normal
-        yield TouchedContact(contact, rests.part, n, apply(T, still.ends) + still.radius * n)
+        yield TouchedContact(contact, rests.part, n, pose.apply(T, still.ends) + still.radius * n)
     else:
         for n, points in _around(still, T, moved, T_moved):
             yield TouchedContact(contact, rests.part, n, points)
@@ -106,11 +106,11 @@ def _around(still: RoundFace, T: Array, moved: RoundFace, T_moved: Array) -> Ite
     kind = contact_kind(still, moved)
     out = -1.0 if still.hole else 1.0
     axis = T[:3, :3] @ still.axis
-    at = apply(T, still.ends)
+    at = pose.apply(T, still.ends)
     if kind == "cone on rim":
-        at = at.mean(axis=0)[None] if still.kind == "rim" else apply(T_moved, moved.ends[:1])
+        at = at.mean(axis=0)[None] if still.kind == "rim" else pose.apply(T_moved, moved.ends[:1])
     else:
-        ends = [np.sort((points - at[0]) @ axis) for points in (at, apply(T_moved, moved.ends))]
+        ends = [np.sort((points - at[0]) @ axis) for points in (at, pose.apply(T_moved, moved.ends))]
         common = np.array([max(ends[0][0], ends[1][0]), min(ends[0][1], ends[1][1])])
         at = at[0] + np.outer(common if common[0] < common[1] else [common.mean()], axis)
     for d in _directions(still, T, moved, T_moved):

@@ -1,7 +1,6 @@
 """Where two flat pads that come from above can hold a part: its thickness along level rays, and the places it offers.
 
-Rays go through a part along the direction in which the pads close, in rows and columns. Where what they pass through
-begins and ends at the same places over some length, pads hold it: opposite flat faces, the wall of a shaft.
+Pads hold what begins and ends at the same places along all rays of some length: opposite flat faces, a shaft's wall.
 """
 
 from collections.abc import Iterator, Sequence
@@ -108,7 +107,8 @@ def holds(solid: Solid, up: Array, opening_m: float, over_m: float = 0.0) -> tup
         opening_m: Of each finger, [m].
         over_m: So far over the top of the part tips may be; pads reach below them.
     """
-    return _holds(solid, tuple(map(float, up)), opening_m, over_m)
+    asks = solid, tuple(map(float, up)), opening_m, over_m
+    return _places(*asks, _RAY_M) or _places(*asks, _FINE_M)
 
 
 def _axes_within(pieces: tuple[Piece, ...], axis: Array, low: float, high: float) -> list[float]:
@@ -117,16 +117,16 @@ def _axes_within(pieces: tuple[Piece, ...], axis: Array, low: float, high: float
     return [x for x in middles if low < x < high]
 
 
-@lru_cache(maxsize=64)
-def _holds(solid: Solid, vertical: tuple[float, ...], opening_m: float, over_m: float) -> tuple[PadPlace, ...]:
+@lru_cache(maxsize=128)
+def _places(
+    solid: Solid, vertical: tuple[float, ...], opening_m: float, over_m: float, ray_m: float
+) -> tuple[PadPlace, ...]:
+    """`holds`, with rows of rays so far apart, [m]."""
     up = np.array(vertical)
-    return _places(solid, up, opening_m, over_m, _RAY_M) or _places(solid, up, opening_m, over_m, _FINE_M)
-
-
-def _places(solid: Solid, up: Array, opening_m: float, over_m: float, ray_m: float) -> tuple[PadPlace, ...]:
-    """With rows of rays so far apart, [m]."""
     bottom, top = extent(solid.pieces, up)
     best = max(bottom + _HEIGHT * (top - bottom), bottom + _OVER_M, top - _PALM_M)
+    heights = _lines(bottom, max(top + over_m, best), [best])
+    tips = heights[(heights >= bottom + _OVER_M) & (heights >= top - _PALM_M)]
     candidates: list[tuple[float, PadPlace]] = []
     for across in _directions(solid, up):
         along = np.cross(up, across)
@@ -134,8 +134,7 @@ def _places(solid: Solid, up: Array, opening_m: float, over_m: float, ray_m: flo
         t = _lines(low, high, [float(f.point @ along) for f in solid.rounds.values() if abs(f.axis @ up) > 1 - _LEVEL])
         level = [float(f.point @ up) for f in solid.rounds.values() if abs(f.axis @ up) < _LEVEL]
         rays = _cast(solid.pieces, across, up, t, _lines(bottom, top, level, ray_m))
-        tips = _lines(bottom, max(top + over_m, best), [best])
-        for tip in tips[(tips >= bottom + _OVER_M) & (tips >= top - _PALM_M)]:
+        for tip in tips:
             for place in t:
                 for low, high, uneven in _offers(rays, place, tip, opening_m):
                     point = (low + high) / 2 * across + place * along + tip * up

@@ -11,7 +11,6 @@ from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.exact_turns import carries_faces, exact_turns, fills_the_same
 from apo_bench.geometry.polygon import across_axis
-from apo_bench.geometry.pose import apply
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Solid, all_boxes
 
@@ -214,7 +213,7 @@ def _same(a: list[tuple[Array, Array]], b: list[tuple[Array, Array]]) -> bool:
 def _keeps_fit(solid: Solid, g: Array) -> bool:
     """Whether a displacement that leaves the space as it is carries every fit face onto a fit face."""
     fit = [face for face in solid.faces.values() if face.fit]
-    return all(any(_same_corners(apply(g, face.outline), other.outline) for other in fit) for face in fit)
+    return all(any(_same_corners(pose.apply(g, face.outline), other.outline) for other in fit) for face in fit)
 
 
 def _same_corners(a: Array, b: Array) -> bool:

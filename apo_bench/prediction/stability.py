@@ -17,7 +17,6 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.mate import mate
 from apo_bench.geometry.overlap import overlap
 from apo_bench.geometry.polygon import across_axis
-from apo_bench.geometry.pose import apply
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Face, all_boxes
 
@@ -205,5 +204,5 @@ def _radii(moved: RoundFace, T: Array, rests: RoundFace, T_rests: Array, at: Arr
     """How far the wall is from the axis at points of it, (k,), [m]."""
     if rests.kind == "rim" or moved.kind == "rim":
         return np.full(len(at), rests.radius if rests.kind == "rim" else moved.radius)
-    heights = (at - apply(T_rests, rests.point[None])) @ (T_rests[:3, :3] @ rests.axis)
+    heights = (at - pose.apply(T_rests, rests.point[None])) @ (T_rests[:3, :3] @ rests.axis)
     return np.asarray(rests.radii[0] + rests.slope * (heights - rests.span[0]))
