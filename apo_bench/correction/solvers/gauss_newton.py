@@ -148,6 +148,7 @@ def _nearest(step: LinearStep, z: Array) -> NearestGoals:
     sure, following = step.settled
     step.linearise(z, rows)
     for turn in range(MOST_TURNS):
+        # Plain numbers of each observation: NumPy would take longer for so few. What is not finite is given up.
         gap_m, gap2, row_size = step.sizes.tolist()
         if not math.isfinite(sum(gap2) + sum(row_size)):
             finite[[o for o in going if not math.isfinite(gap2[o] + row_size[o])]] = False
@@ -156,10 +157,12 @@ def _nearest(step: LinearStep, z: Array) -> NearestGoals:
             break
         if len(going) < len(rows):
             rows = np.array(going)
-        # The step to the shortest z on the linearised contacts, J J^t damped by mu.
+        # The step to the shortest z on the linearised contacts, z' = J^t (J J^t + mu)^-1 (J z - f).
         most = min(1.0, FALL**turn)
         mu = np.array([damping(row_size[o], gap2[o], most) for o in going])
         change, length, turned = step.change(z, mu, rows)
+        # Rest where the next step would be too short to matter. A step that turns a goal far is shortened, since
+        # contacts are linear for small turns only.
         left = []
         for i, (o, size, angle) in enumerate(zip(going, length.tolist(), turned.tolist(), strict=True)):
             if size < sure and settles(size, traces[o][-1][1] if turn else math.inf, sure, following):

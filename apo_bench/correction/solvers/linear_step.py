@@ -98,6 +98,7 @@ class DenseStep:
         return self._system.forms(self.T) if self._kernels is None else self._forms
 
     def linearise(self, z: Array, rows: Rows) -> None:
+        # The kernel does what the lines below it do.
         if self._kernels is not None:
             seen = *self._contacts, self._observed, self._L, self._soft2
             out = self.T, self.B, self.e, self._J, self._forms, self.sizes
@@ -116,6 +117,7 @@ class DenseStep:
         self.sizes[2, some] = np.einsum("bij,bij->b", Jt, Jt) / m
 
     def change(self, z: Array, mu: Array, rows: Rows) -> tuple[Array, Array, Array]:
+        # As above, by a Cholesky decomposition.
         if self._kernels is not None:
             step = np.empty((len(rows), z.shape[1]))
             length = np.empty(len(rows))
