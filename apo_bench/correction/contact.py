@@ -70,16 +70,16 @@ class ContactCorrector:
             InputError: As of one.
         """
         observations = lowered_together(observations)
-        made = [None if observation.seen.all() else refused_correction(observation) for observation in observations]
-        whole = [i for i, correction in enumerate(made) if correction is None]
+        results = [None if observation.seen.all() else refused_correction(observation) for observation in observations]
+        whole = [i for i, correction in enumerate(results) if correction is None]
         alone = any(
             6 * len(observation.goals) > LARGEST_DENSE or observation.shared or observation.tails
             for observation in observations
         )
         for batch in ([i] for i in whole) if alone else [whole] if whole else []:
             for i, correction in zip(batch, self._corrected([observations[i] for i in batch]), strict=True):
-                made[i] = correction
-        return [correction for correction in made if correction is not None]
+                results[i] = correction
+        return [correction for correction in results if correction is not None]
 
     def leaving_out(self, observation: Observation, dropped: tuple[str, ...]) -> Correction:
         """Correct an observation by all contacts but those of some relations."""

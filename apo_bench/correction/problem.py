@@ -16,10 +16,7 @@ from apo_bench.assembly.equations import equations
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.pattern import pattern
 from apo_bench.assembly.topology import Assembly
-from apo_bench.correction.consistency import (
-    TEST_LEVEL,
-    fit_deviation,
-)
+from apo_bench.correction.consistency import TEST_LEVEL, fit_deviation
 from apo_bench.correction.play import fit_covariance
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
 from apo_bench.correction.solvers.gauss_newton import NearestGoals, batch_goals
