@@ -1,7 +1,8 @@
 """What one trial is made of: every setting, stated once and checked at the door.
 
 What else lists settings is made from this: columns and keys of rows, axes of sweeps, keys of sweep files, options and
-help of the command line, replay commands, and the tables of the documentation.
+help of the command line, replay commands, and the tables of the documentation. The file is long because all that
+is to be known of a setting stands in one place.
 """
 
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,4 +1,7 @@
-"""One trial as it is asked for: its settings, what is seen of it, its row, a film, a file."""
+"""One trial as it is asked for: its settings, what is seen of it, its row, a film, a file.
+
+The file is long, as all options of `replay` meet here.
+"""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -210,8 +213,12 @@ def _run_by(method: Any, request: Request, spec: TrialSettings, say: Say, show: 
     if request.observation:
         from apo_bench.files.observation import read_stated
 
-        seen = read_stated(request.observation, scene.scenario)
-        row = _measured(request.observation, seen, spec, scene, method, watch)
+        path = request.observation
+        seen = read_stated(path, scene.scenario)
+        aloft = in_the_air(seen.assembly, seen.start, _MEASURED_AIR_M)
+        if aloft is not None:
+            raise InputError(f"{path}, start, {aloft[0]}: {aloft[1]}; give the pose at which it stands.")
+        row = run_measured(spec, scene, seen, read_text(path, "observation file"), method=method, watch=watch)
     else:
         simulated = demonstration_of(spec, scene, KeptDemonstrations(request.cache) if request.cache else None)
         row = _drawn(request, spec, scene, simulated, method, watch)
@@ -251,10 +258,3 @@ def _drawn(
         write_form(observation_form(look(spec, scene, simulated), name), request.save_observation)
     content = content_hash(scene.scenario, spec.scenario, scene.arm.files)
     return trial_row(spec, scene, simulated, content, method=method, watch=watch)
-
-
-def _measured(path: Path, observation: Observation, spec: TrialSettings, scene: Scene, method: Any, watch: Any) -> Row:
-    aloft = in_the_air(observation.assembly, observation.start, _MEASURED_AIR_M)
-    if aloft is not None:
-        raise InputError(f"{path}, start, {aloft[0]}: {aloft[1]}; give the pose at which it stands.")
-    return run_measured(spec, scene, observation, read_text(path, "observation file"), method=method, watch=watch)
