@@ -51,12 +51,12 @@ FAULTS = (
     ),
     Fault("correction/solvers/newton.py", "ca * sg + sa * sb * cg", "ca * sg - sa * sb * cg", "a wrong sign in Eq. 4"),
     Fault(
-        "correction/solvers/posterior.py",
+        "correction/region.py",
         "chdtri(free.shape[1], ",
         "chdtri(known.rank, ",
         "directions that are fixed for those that are free",
     ),
-    Fault("correction/consistency.py", "play_m / sqrt(3.0)", "play_m / sqrt(12.0)", "half the play instead of all"),
+    Fault("correction/consistency.py", "unit_m / sqrt(3.0)", "unit_m / sqrt(12.0)", "half the play instead of all"),
     Fault(
         "correction/relation_equations.py",
         "self.operations[i] if j > k})",
