@@ -12,9 +12,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from apo_bench.records.row import Row
+from apo_bench.records import Row
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.statistics.rates import wilson
+from apo_bench.statistics import wilson
 
 PAGE = Path(__file__).parents[1] / "docs" / "results" / "arms.md"
 SAID = """\

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
-from apo_bench.records.row import Row
+from apo_bench.records import Row
 from apo_bench.records.run.run_folder import read_rows
 
 KEPT = Path(__file__).parent / "results" / "baselines.csv"

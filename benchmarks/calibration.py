@@ -26,12 +26,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.stats import kstest
 
-from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly import Demonstration, Observation
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.region import contains_truth
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.symmetry import symmetries
+from apo_bench.geometry import Array, pose, symmetries
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.fitted import MeasuredNoise, restated
 from apo_bench.observation.noise import NOISES, Level, make_noise

@@ -16,7 +16,7 @@ from pathlib import Path
 import gymnasium
 
 import apo_bench
-from apo_bench.records.settings import TrialSettings
+from apo_bench.records import TrialSettings
 from apo_bench.scenario.file import scenario_names
 from apo_bench.trial.stages import simulate_demonstration
 from apo_bench.trial.trial import run_trial

@@ -17,11 +17,10 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.assembly.goals import placements
+from apo_bench.assembly import placements
 from apo_bench.depth_camera.distance import join_shapes, shape_of, strike_distances
 from apo_bench.depth_camera.follow import Event
-from apo_bench.geometry import pose
-from apo_bench.geometry.clearance import physical_pieces
+from apo_bench.geometry import physical_pieces, pose
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.stages import OBSERVATION, SimulatedDemonstration, range_sensor, simulate_demonstration, stream

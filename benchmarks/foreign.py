@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from apo_bench.assembly.kinds import contact_kind
+from apo_bench.assembly import contact_kind
 from apo_bench.drafting.assembly_file import import_assembly
 from apo_bench.drafting.checking import check_file
 from apo_bench.drafting.draft import draft

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from apo_bench.assembly.goals import Plan
+from apo_bench.assembly import Plan
 from apo_bench.cli import app as cli
 from apo_bench.files import json_forms as files
 from apo_bench.files.csv_form import table

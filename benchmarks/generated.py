@@ -15,7 +15,7 @@ from apo_bench.drafting.draft import draft
 from apo_bench.drafting.posed import on_the_table, read_posed
 from apo_bench.drafting.writing import scenario_text
 from apo_bench.parts.making import Body, Frustum, bore, extrude, join, polygon, rectangle, shaft, turned, write_part
-from apo_bench.records.settings import TrialSettings
+from apo_bench.records import TrialSettings
 from apo_bench.trial.stages import scene_of
 from apo_bench.trial.trial import run_trial
 

@@ -20,15 +20,15 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import imageio.v3 as imageio
 import numpy as np
 
-from apo_bench.assembly.goals import placements
+from apo_bench.assembly import placements
 from apo_bench.drafting.checking import check_file
 from apo_bench.drafting.posed import TABLE
-from apo_bench.records.settings import TrialSettings
+from apo_bench.records import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.render import camera_view, picture
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.statistics.rates import wilson
+from apo_bench.statistics import wilson
 from apo_bench.trial.stages import scene_of, simulate_demonstration
 from apo_bench.trial.trial import run_trial
 from benchmarks.generated import FAMILIES, generated, scenario_of

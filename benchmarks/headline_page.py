@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from apo_bench.records.settings import TrialSettings
-from apo_bench.statistics.paired import Paired
-from apo_bench.statistics.rates import Cell
+from apo_bench.records import TrialSettings
+from apo_bench.statistics import Cell, Paired
 from apo_bench.sweeps.grid import described, load_all
 from apo_bench.sweeps.sweep_file import read_sweep
 from benchmarks.headline_look import TOLD_LEVEL, Look, block, robot_scenarios

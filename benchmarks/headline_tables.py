@@ -6,11 +6,9 @@ from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from apo_bench.records.method import as_seen
+from apo_bench.records import as_seen
 from apo_bench.report.comparison.compare import compare
-from apo_bench.statistics.effort import read_timing
-from apo_bench.statistics.paired import Paired
-from apo_bench.statistics.rates import Cell, Rate, wilson
+from apo_bench.statistics import Cell, Paired, Rate, read_timing, wilson
 
 Of = Callable[[Cell], Hashable]
 

@@ -26,12 +26,10 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import expit, ndtr, ndtri
 
+from apo_bench.statistics import mean_surprise, tango, threshold, wilson
 from apo_bench.statistics.levels.curves import reach, weights
 from apo_bench.statistics.levels.falling import profile
 from apo_bench.statistics.levels.half_level import sure
-from apo_bench.statistics.over_seeds import mean_surprise, threshold
-from apo_bench.statistics.paired import tango
-from apo_bench.statistics.rates import wilson
 
 LONG = ("area", "area difference", "half level", "sure bounds")
 SEEDS = (50, 100, 200)

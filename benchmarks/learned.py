@@ -21,11 +21,10 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly import Demonstration, Observation
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.region import contains_truth
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.fitted import ConstantError, Fitted, MeasuredNoise, ViewNoise, restated
 from apo_bench.observation.models.level import Level

@@ -23,16 +23,15 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.records.relations import RECOGNISED
+from apo_bench.records import RECOGNISED
 from apo_bench.report.figures.levels import recognition_figure
 from apo_bench.report.figures.sheet import draw
 from apo_bench.report.tables.forecasts import recognition_table
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.statistics.contacts import Recognition, recognitions
-from apo_bench.statistics.forecasts import ALL
+from apo_bench.statistics import ALL, Recognition, recognitions
 from apo_bench.trial.recognised_contacts import count_contacts, recognise_by
 from apo_bench.trial.stages import observe_demonstration, simulate_demonstration
 

@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly import Demonstration, Observation
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.scenario.layout import draw_layout

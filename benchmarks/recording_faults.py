@@ -14,8 +14,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from apo_bench.cli.app import main
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.recording.log import MOST_POSES
 from benchmarks.recording_demos import Errors, first_places, tracked, watched
 from benchmarks.recording_forms import Tracked, camera_text, known_text, objects_text

@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 
 RATE_HZ = 30.0
 

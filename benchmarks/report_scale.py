@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
+from apo_bench.records import ROW
 from apo_bench.records.run.report_rows import NUMBERS
-from apo_bench.records.settings import ROW
 from apo_bench.report.report import report
 
 SCENARIOS = ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table")

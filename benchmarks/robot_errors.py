@@ -10,9 +10,9 @@ import argparse
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from apo_bench.records.row import Row
+from apo_bench.records import Row
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.statistics.rates import Cell, tally, wilson
+from apo_bench.statistics import Cell, tally, wilson
 
 PAGE = Path(__file__).parents[1] / "docs" / "results" / "robot-errors.md"
 SAID = """\

@@ -19,16 +19,11 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import kstest
 
-from apo_bench.assembly.equations import largest_gap
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.topology import Assembly, Contact, Operation, PartFace
+from apo_bench.assembly import Assembly, Contact, Observation, Operation, PartFace, largest_gap
 from apo_bench.correction.explanation import explain
 from apo_bench.correction.many import correct_many
 from apo_bench.correction.region import contains_truth
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Solid
+from apo_bench.geometry import Array, RoundFace, Solid, pose
 from apo_bench.parts.making import Frustum, bore, extrude, rectangle, solid_of, turned
 
 PAGE = Path(__file__).parent.parent / "docs" / "how" / "contact.md"

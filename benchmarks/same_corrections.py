@@ -18,7 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 LEVELS = ((0.5, 0.25), (2.0, 1.0), (5.0, 3.0), (10.0, 8.0))
 """Noise in mm and degrees."""

@@ -22,7 +22,7 @@ import mujoco
 import numpy as np
 
 import apo_bench  # noqa: F401
-from apo_bench.assembly.goals import Plan
+from apo_bench.assembly import Plan
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.scene.scene import Scene, build_scene

@@ -9,12 +9,10 @@ from dataclasses import MISSING
 from pathlib import Path
 from typing import Any
 
-from apo_bench.records.row import ROW_FIELDS
-from apo_bench.records.settings import SETTINGS
+from apo_bench.records import ROW_FIELDS, SETTINGS
 from apo_bench.report.tables.forecasts import calibration_table, confusion_table
-from apo_bench.statistics.forecasts import calibrations, confusions
+from apo_bench.statistics import Cell, calibrations, confusions, tally
 from apo_bench.statistics.paired import paired
-from apo_bench.statistics.rates import Cell, tally
 
 ROOT = Path(__file__).parents[1]
 ROWS = ROOT / "benchmarks" / "results" / "rows.jsonl.gz"

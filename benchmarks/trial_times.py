@@ -85,7 +85,7 @@ def ask(process: Any, told: Told) -> Told:
 
 def serve(asked: IO[str], answers: IO[str]) -> None:
     """Run one trial after the other; what is imported and compiled is at hand from the second of a scenario on."""
-    from apo_bench.records.settings import TrialSettings
+    from apo_bench.records import TrialSettings
     from apo_bench.scenario.file import load_scenario
     from apo_bench.simulation.scene.scene import build_scene
     from apo_bench.trial.trial import run_trial

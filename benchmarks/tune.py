@@ -23,7 +23,7 @@ from pathlib import Path
 from statistics import mean
 from typing import Any, NamedTuple
 
-from apo_bench.assembly.goals import Plan
+from apo_bench.assembly import Plan
 from apo_bench.correction.baselines.least_squares import least_squares
 from apo_bench.correction.baselines.penalty import penalty
 from apo_bench.correction.baselines.snap import snap

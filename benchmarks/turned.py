@@ -24,12 +24,9 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.goals import Demonstration, Layout, Observation, placements
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly, Correction, Demonstration, Layout, Observation, placements
 from apo_bench.correction.correctors import correct
-from apo_bench.geometry import pose
-from apo_bench.geometry.solid import all_boxes
+from apo_bench.geometry import all_boxes, pose
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.scenario.layout import draw_layout

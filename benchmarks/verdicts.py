@@ -18,20 +18,16 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Layout, placements
-from apo_bench.assembly.joint_play import joint_play_mm
-from apo_bench.assembly.topology import Contact
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Contact, Layout, joint_play_mm, placements
+from apo_bench.geometry import Array, nearest_alike, pose
 from apo_bench.geometry.overlap import overlap
-from apo_bench.geometry.symmetry import nearest_alike
 from apo_bench.judging.rules import fixtures
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.statistics.rates import rank
+from apo_bench.statistics import rank
 from apo_bench.trial.stages import LAYOUT, stream
 
 ROOT = Path(__file__).parents[1]

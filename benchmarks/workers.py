@@ -23,7 +23,7 @@ from collections import deque
 from pathlib import Path
 from threading import Thread
 
-from apo_bench.records.row import Row
+from apo_bench.records import Row
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.sweeps.local.pool import run_locally

@@ -9,7 +9,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from apo_bench.assembly.graph import relation_graph
+from apo_bench.assembly import relation_graph
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.show.card import cards
 from apo_bench.show.graph.drawing import draw_graph

@@ -17,9 +17,8 @@ matplotlib.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from apo_bench.assembly.goals import Plan
-from apo_bench.assembly.reached import ReplayResult
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Plan, ReplayResult
+from apo_bench.geometry import Array
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.render import SceneCamera, camera_view, picture_with_arm

@@ -24,11 +24,19 @@ from msgspec.inspect import (
 )
 
 from apo_bench.cli.setting_options import axis_flag
-from apo_bench.records.outcomes import CODES, STAGES
-from apo_bench.records.row import LARGEST_NUMBER, REQUIRED, ROW_FIELDS, Row
-from apo_bench.records.setting_columns import KEY
-from apo_bench.records.setting_info import SettingInfo
-from apo_bench.records.settings import ROW, SETTINGS, TrialSettings
+from apo_bench.records import (
+    CODES,
+    KEY,
+    LARGEST_NUMBER,
+    REQUIRED,
+    ROW,
+    ROW_FIELDS,
+    SETTINGS,
+    STAGES,
+    Row,
+    SettingInfo,
+    TrialSettings,
+)
 
 SETTINGS_HEAD = """# Settings of a trial
 

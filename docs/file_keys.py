@@ -28,8 +28,7 @@ from apo_bench.observation.noise_file import noise_text, read_noise
 from apo_bench.observation.presets import presets
 from apo_bench.parts.allowed import ELEMENT_RULES
 from apo_bench.parts.stated import PART_SCHEMA, read_stated_part
-from apo_bench.records.setting_info import SettingInfo
-from apo_bench.records.settings import SETTINGS
+from apo_bench.records import SETTINGS, SettingInfo
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.sweeps.grid import AXES, SHARED

@@ -9,7 +9,7 @@ from pathlib import Path
 import imageio.v3 as imageio
 from top_picture import ARM, FITS, JAMS, draw_top, shot
 
-from apo_bench.assembly.goals import Plan
+from apo_bench.assembly import Plan
 from apo_bench.correction.correctors import correct
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.scenario.file import load_scenario

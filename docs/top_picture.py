@@ -22,8 +22,8 @@ from numpy.typing import NDArray
 from shapely.geometry import MultiPoint
 from shapely.ops import unary_union
 
-from apo_bench.assembly.goals import Plan
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Plan
+from apo_bench.geometry import Array
 from apo_bench.simulation.scene.render import camera_view, picture_with_arm
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.stages import replay_and_judge

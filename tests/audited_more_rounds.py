@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from apo_bench.assembly.topology import Operation
+from apo_bench.assembly import Operation
 from apo_bench.parts import load_part
 from tests.audited_rounds import DOWN
 from tests.audited_states import HALF_Z, Seen

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.topology import Operation
+from apo_bench.assembly import Operation
 from apo_bench.geometry import pose
 from tests import scenes
 from tests.end_states import (

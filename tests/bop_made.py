@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 HEADER = "scene_id,im_id,obj_id,score,R,t,time"
 

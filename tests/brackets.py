@@ -6,11 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from apo_bench.assembly.topology import Operation
-from apo_bench.geometry import pose
-from apo_bench.geometry.hull import Cylinder, Hull, cylinder_hull
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Box, Face, Solid
+from apo_bench.assembly import Operation
+from apo_bench.geometry import Box, Cylinder, Face, Hull, RoundFace, Solid, cylinder_hull, pose
 from tests import rounds
 from tests.scenes import Scene, box_faces, mm, scene, table, touch
 

@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-from apo_bench.assembly.goals import placements
-from apo_bench.assembly.reached import Reached, Snapshot
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Reached, Snapshot, placements
+from apo_bench.geometry import Array, pose
 from apo_bench.judging.judgement import Judgement
 from apo_bench.judging.verdict import Verdict, judge
-from apo_bench.records.thresholds import Criteria, Thresholds
+from apo_bench.records import Criteria, Thresholds
 from tests import scenes
 
 CLEARANCE_MM = 0.25

@@ -7,8 +7,7 @@ from functools import cache
 
 import numpy as np
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.recording.log import PoseTrack
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import layout_at

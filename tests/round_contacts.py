@@ -7,12 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.topology import Assembly, Contact, Gap, Operation, PartFace
-from apo_bench.geometry import pose
-from apo_bench.geometry.hull import Cylinder, Hull, cylinder_hull, sides_of
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Box, Face, Piece, Solid
+from apo_bench.assembly import Assembly, Contact, Gap, Observation, Operation, PartFace
+from apo_bench.geometry import Box, Cylinder, Face, Hull, Piece, RoundFace, Solid, cylinder_hull, pose, sides_of
 
 Z = np.array([0.0, 0.0, 1.0])
 MM = 1e-3

@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.assembly.topology import Assembly, Contact, Operation, PartFace
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Assembly, Contact, Operation, PartFace
+from apo_bench.geometry import Array, pose
 from apo_bench.insertion.line import Preference
 from apo_bench.parts import load_part, part_path
 from apo_bench.parts.making import Body, bore, extrude, rectangle, shaft, write_part
-from apo_bench.records.thresholds import Thresholds
+from apo_bench.records import Thresholds
 from apo_bench.scenario.nominal import with_attach_lines
 from apo_bench.scenario.scenario import Grasp, Scenario, Site
 

@@ -7,10 +7,8 @@ from dataclasses import fields
 
 import numpy as np
 
-from apo_bench.assembly.topology import Operation
-from apo_bench.geometry.hull import Cylinder, Hull, cylinder_hull
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Box, Face, Solid, world_bounds
+from apo_bench.assembly import Operation
+from apo_bench.geometry import Box, Cylinder, Face, Hull, RoundFace, Solid, cylinder_hull, world_bounds
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 from tests.scenes import Scene, mm, scene, table, touch

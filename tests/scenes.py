@@ -7,11 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, Observation, placements
-from apo_bench.assembly.topology import Assembly, Contact, Operation, PartFace
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import Box, Face, Solid
+from apo_bench.assembly import Assembly, Contact, Demonstration, Observation, Operation, PartFace, placements
+from apo_bench.geometry import Array, Box, Face, Solid, pose
 
 AXES = {"x": 0, "y": 1, "z": 2}
 

@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.assembly.goals import Observation, Plan, Step
 from apo_bench.assembly.topology import Contact
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array, copyable, freeze
+from apo_bench.geometry import Array, copyable, freeze
 
 
 class Iterate(NamedTuple):

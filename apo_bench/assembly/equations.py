@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.pattern import cross_rows, pattern
 from apo_bench.assembly.topology import Assembly, product
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 
 
 @final

@@ -7,12 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly.facing_round import Facing, measure_round, round_pairs
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import ball_around
-from apo_bench.geometry.overlap import face_area, overlap
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Face, Solid
+from apo_bench.geometry import Array, Face, RoundFace, Solid, ball_around, face_area, pose
+from apo_bench.geometry.overlap import overlap
 
 
 def opposed(a: Face, T_a: Array, b: Face, T_b: Array, angle_rad: float) -> bool:

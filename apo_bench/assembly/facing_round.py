@@ -14,11 +14,8 @@ from typing import final
 import numpy as np
 
 from apo_bench.assembly.kinds import contact_kind, geometric_play
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, Face, RoundFace, Solid, pose
 from apo_bench.geometry.mate import mate
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Face, Solid
 
 _TIGHTEST_M = -0.1e-3
 _LOOSEST_M = 0.6e-3

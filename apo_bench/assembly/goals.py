@@ -19,8 +19,7 @@ from apo_bench.assembly.shared_error import SharedError
 from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, copyable, freeze
+from apo_bench.geometry import Array, copyable, freeze, pose
 
 Poses = Mapping[str, Array]
 """Part name -> pose (4, 4) in the world, [m]."""

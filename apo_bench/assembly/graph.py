@@ -13,7 +13,7 @@ from apo_bench.assembly.goals import Observation, Poses
 from apo_bench.assembly.lowering import lowered
 from apo_bench.assembly.topology import ODL, Assembly, Contact, Gap, Relation, inverted, simplified, spelled
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 ArcResiduals = Sequence[float | None]
 """The largest |e| of every arc, [m]; None where an operation was not seen."""

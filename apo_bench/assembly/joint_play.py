@@ -14,13 +14,9 @@ import numpy as np
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.kinds import contact_kind, play_mm
 from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, Face, RoundFace, across_axis, pose
 from apo_bench.geometry.mate import mate
 from apo_bench.geometry.overlap import overlap
-from apo_bench.geometry.polygon import across_axis
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Face
 
 _WALLS = 16
 """Directions in which a shaft is stopped by its hole: the walls of a polygon whose corners lie on the disc of play."""

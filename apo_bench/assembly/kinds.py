@@ -2,8 +2,7 @@
 
 from typing import Literal, get_args
 
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Face
+from apo_bench.geometry import Face, RoundFace
 
 ContactKind = Literal["plane on plane", "shaft in hole", "shaft on plane", "cone in cone", "cone on rim"]
 CONTACT_KINDS: tuple[ContactKind, ...] = get_args(ContactKind)

@@ -26,9 +26,7 @@ from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.kinds import WALLS, contact_kind
 from apo_bench.assembly.topology import Assembly, Contact, Gap, PartFace
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array, remembered
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Face
+from apo_bench.geometry import Array, Face, RoundFace, remembered
 
 _BEHIND = "|"
 """Between the name of a face and what a sheet adds to it: no name of a face has it."""

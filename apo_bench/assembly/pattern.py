@@ -16,8 +16,7 @@ from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.kinds import OPPOSING, contact_kind
 from apo_bench.assembly.lowering import lowered
 from apo_bench.assembly.topology import ODL, Assembly, Contact, Operation, inverted, simplified
-from apo_bench.geometry.arrays import Array, remembered
-from apo_bench.geometry.solid import Face
+from apo_bench.geometry import Array, Face, remembered
 
 _MOST_CORNERS = 8
 """Of an outline with more, such as a circle, those farthest out in so many directions say as much."""

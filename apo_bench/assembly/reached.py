@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import final
 
 from apo_bench.assembly.goals import Poses, Step
-from apo_bench.geometry.arrays import copyable, freeze
+from apo_bench.geometry import copyable, freeze
 
 
 @final

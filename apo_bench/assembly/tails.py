@@ -10,7 +10,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array, copyable, freeze
+from apo_bench.geometry import Array, copyable, freeze
 
 _COLUMNS = ((0, 1), (2,), (3, 4), (5,))
 """Of an error (x, y, along; rx, ry, about): across, along, tilt, turn about."""

@@ -16,10 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.kinds import WALLS, contact_kind, geometric_play
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, copyable, remembered
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Face, Solid
+from apo_bench.geometry import Array, Face, RoundFace, Solid, copyable, pose, remembered
 
 
 class PartFace(NamedTuple):

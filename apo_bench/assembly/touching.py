@@ -13,11 +13,8 @@ import numpy as np
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.kinds import contact_kind
 from apo_bench.assembly.topology import Assembly, Contact, PartFace
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import WHOLE_TURN, Array, Face, RoundFace, pose
 from apo_bench.geometry.overlap import overlap
-from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
-from apo_bench.geometry.solid import Face
 
 _QUARTER = np.pi / 2
 _RING = 2 * np.pi * np.arange(16) / 16

@@ -6,11 +6,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.cad.raw_solid import RawSolid, Region, square_to
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.hull import sides_of
-from apo_bench.geometry.polygon import straightened
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Face
+from apo_bench.geometry import Array, Face, RoundFace, sides_of, straightened
 from apo_bench.parts.making.outline import COARSE_SIDES
 
 _THINNEST_MM = 0.05

@@ -20,10 +20,7 @@ from apo_bench.cad.solid_moments import solid_moments
 from apo_bench.cad.step.step_file import STEP_SUFFIXES, read_step
 from apo_bench.cad.time_limit import time_limit
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.hull import Hull
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Face, Solid
+from apo_bench.geometry import Array, Face, Hull, RoundFace, Solid
 from apo_bench.parts import load_part
 from apo_bench.parts.agreement import check_faces, supported
 from apo_bench.parts.allowed import HEAVIEST_KG, LIGHTEST_KG, MOST_CORNERS_IN_ALL, MOST_FACES

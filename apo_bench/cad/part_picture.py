@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.cad.raw_solid import RawSolid, Region
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.io.figures import default_looks
 
 _VIEWS = ((28.0, -55.0), (-28.0, 125.0))

@@ -5,8 +5,7 @@ from typing import Annotated, Any, cast
 
 import typer
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.goals import Observation, Plan
+from apo_bench.assembly import Correction, Observation, Plan
 from apo_bench.cli.arguments import NO_RESULT, check_outputs, writing
 from apo_bench.cli.printing import print_json, print_lines, print_tables
 from apo_bench.cli.setting_options import AsJson, ScenarioArgument

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from apo_bench.assembly.goals import Plan
+from apo_bench.assembly import Plan
 from apo_bench.cli.arguments import check_outputs, writing
 from apo_bench.cli.printing import print_json
 from apo_bench.cli.setting_options import AsJson, ScenarioArgument, StatedDeg, StatedMm, takes, trial_options
@@ -27,7 +27,7 @@ def graph_command(
     as_json: AsJson = False,
 ) -> None:
     """Print the relation graph: parts at their placements with their ODLs, contacts made and lost."""
-    from apo_bench.assembly.graph import observed_residuals, relation_graph
+    from apo_bench.assembly import observed_residuals, relation_graph
     from apo_bench.files.observation import read_observation
     from apo_bench.scenario.file import load_scenario
     from apo_bench.show.graph.drawing import draw_graph

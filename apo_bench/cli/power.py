@@ -44,7 +44,7 @@ def power_rate(
     as_json: AsJson = False,
 ) -> None:
     """Trials for a success rate: until Wilson's 95 % interval is narrow enough."""
-    from apo_bench.statistics.power import rate_trials, wilson_half_width
+    from apo_bench.statistics import rate_trials, wilson_half_width
 
     n = rate_trials(rate, half_width)
     reached = wilson_half_width(rate, n)
@@ -67,8 +67,7 @@ def power_pairs(
     as_json: AsJson = False,
 ) -> None:
     """Seeds, met by both methods, until McNemar's exact test shows which one is better."""
-    from apo_bench.statistics.power import ERROR, paired_power, paired_trials
-    from apo_bench.statistics.rate_text import percent
+    from apo_bench.statistics import ERROR, paired_power, paired_trials, percent
 
     win, lose = _shares(win, lose, rates, agree)
     n = paired_trials(win, lose, power, comparisons)
@@ -93,8 +92,7 @@ def power_margin(
     as_json: AsJson = False,
 ) -> None:
     """Seeds, met by both methods, until Tango's 95 % interval shows that one is not worse by a margin."""
-    from apo_bench.statistics.power import margin_power, margin_trials
-    from apo_bench.statistics.rate_text import percent
+    from apo_bench.statistics import margin_power, margin_trials, percent
 
     win, lose = (0.0, 0.0) if all(x is None for x in (win, lose, rates, agree)) else _shares(win, lose, rates, agree)
     n = margin_trials(margin, win, lose, power)
@@ -117,7 +115,7 @@ def power_shows(
     as_json: AsJson = False,
 ) -> None:
     """What so many trials per cell can show at best."""
-    from apo_bench.statistics.power import ERROR, evidence, least_discordant
+    from apo_bench.statistics import ERROR, evidence, least_discordant
 
     s = evidence(trials, power, comparisons)
     if s.discordant is None or s.least_win is None:
@@ -148,7 +146,7 @@ def power_shows(
 
 
 def _shares(win: float | None, lose: float | None, rates: str | None, agree: float | None) -> tuple[float, float]:
-    from apo_bench.statistics.power import shares
+    from apo_bench.statistics import shares
 
     if rates is None and win is not None and lose is not None and agree is None:
         return win, lose

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Observation
 from apo_bench.cli.arguments import check_writable, path_given
 from apo_bench.cli.setting_options import ScenarioArgument, StatedDeg, StatedMm, takes, trial_options
 from apo_bench.errors import InputError

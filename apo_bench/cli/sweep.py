@@ -87,7 +87,7 @@ def sweep_command(
 ) -> None:
     """Run every combination, or the grids of a file, and print success rates with Wilson 95 % intervals."""
     from apo_bench.cli.terminal import print_cells, print_prediction
-    from apo_bench.statistics.rates import tally
+    from apo_bench.statistics import tally
     from apo_bench.sweeps.sweep import run_sweep
 
     options |= {"trials": trials, "seed": seed}

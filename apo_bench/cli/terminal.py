@@ -15,9 +15,7 @@ from apo_bench.report.tables.forecasts import prediction_summary
 from apo_bench.report.tables.table import Column
 from apo_bench.report.tables.table import Table as Data
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.statistics.forecasts import confusions
-from apo_bench.statistics.rate_text import level_label
-from apo_bench.statistics.rates import Cell
+from apo_bench.statistics import Cell, confusions, level_label
 
 if TYPE_CHECKING:
     from apo_bench.report.comparison.compare import Comparison

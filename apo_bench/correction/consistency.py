@@ -10,11 +10,11 @@ from math import isfinite, sqrt
 import numpy as np
 from scipy.special import chdtrc
 
+from apo_bench.assembly import Assembly
 from apo_bench.assembly.pattern import pattern
-from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.play import plays
 from apo_bench.correction.solvers.gauss_newton import SMALLEST
-from apo_bench.geometry.arrays import Array, frozen, remembered
+from apo_bench.geometry import Array, frozen, remembered
 
 TEST_LEVEL = 0.01
 """False alarms that are accepted."""

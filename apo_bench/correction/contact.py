@@ -10,9 +10,7 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.correction_record import Consistency, Correction, Iterate, Suspect
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.lowering import lowered_together
+from apo_bench.assembly import Consistency, Correction, Iterate, Observation, Suspect, lowered_together
 from apo_bench.correction.consistency import TEST_LEVEL
 from apo_bench.correction.problem import Problem, problem_of
 from apo_bench.correction.solved import Solved, solve

@@ -6,12 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Consistency, Correction, Try
-from apo_bench.assembly.goals import SCHEDULE_REMEDY, Step, schedule_fault
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import SCHEDULE_REMEDY, Assembly, Consistency, Correction, Step, Try, schedule_fault
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.pose import FARTHEST_M, is_rigid
+from apo_bench.geometry import FARTHEST_M, Array, is_rigid
 from apo_bench.io.plain_text import UNSHOWN
 
 RIGID = "return a rotation matrix, a position [m] and the last row (0, 0, 0, 1)"

@@ -7,19 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction, Look, LookingCorrector
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.lowering import lowered_observation
+from apo_bench.assembly import Correction, Look, LookingCorrector, Observation, lowered_observation
 from apo_bench.correction.baselines.measured import gap_of, goals_as_given
 from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.correction_checks import RIGID, check_correction, check_near
 from apo_bench.correction.observation_checks import check_observations
 from apo_bench.correction.status import opposing
 from apo_bench.errors import InputError, failed, kind
-from apo_bench.geometry.arrays import Array, NotReal, real
-from apo_bench.geometry.pose import is_rigid
+from apo_bench.geometry import Array, NotReal, is_rigid, real
 from apo_bench.names import resolve
-from apo_bench.records.short_names import CORRECTOR, CORRECTORS
+from apo_bench.records import CORRECTOR, CORRECTORS
 
 _Corrector = Callable[[Observation], Correction]
 """Any function of this shape; one that returns nothing but goals (n, 4, 4) is accepted too."""

@@ -11,7 +11,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry import Array, frozen
 
 SHIFT_NAMES = ("x", "y", "z")
 TURN_NAMES = ("roll", "pitch", "yaw")

@@ -16,10 +16,8 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.goals import Observation, Poses, placements
-from apo_bench.assembly.lowering import lowered_observation
+from apo_bench.assembly import ODL, Assembly, Observation, Operation, Poses, lowered_observation, placements
 from apo_bench.assembly.pattern import pattern
-from apo_bench.assembly.topology import ODL, Assembly, Operation
 from apo_bench.correction.directions import Direction, directions, held
 from apo_bench.correction.problem import problem_of
 from apo_bench.correction.relation_equations import RelationHold, by_relation, relation_holds
@@ -28,9 +26,7 @@ from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR, Freedom, freedom
 from apo_bench.correction.solvers.whitened import twists_of
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.twist import right_jacobian
+from apo_bench.geometry import Array, pose, right_jacobian
 
 _ZERO = 1e-7
 """Components of an orthonormal basis below this are rounding."""

@@ -8,11 +8,10 @@ their Application", 1997, Section 4.2).
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.shared_error import joint_covariance
+from apo_bench.assembly import Observation, joint_covariance
 from apo_bench.correction.consistency import ROUNDING
 from apo_bench.correction.solvers.whitened import coordinates_of
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 DRAWS = 2000
 

@@ -12,13 +12,9 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.kinds import contact_kind
+from apo_bench.assembly import Assembly, Contact, Observation, contact_kind, product
 from apo_bench.assembly.pattern import pattern
-from apo_bench.assembly.topology import Assembly, Contact, product
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, remembered
-from apo_bench.geometry.symmetry import quarter_turns
+from apo_bench.geometry import Array, pose, quarter_turns, remembered
 
 _APART = 0.1
 """Normals with a smaller singular value are in one plane, or along one line."""

@@ -4,8 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Correction, Observation
 from apo_bench.correction.contact import ContactCorrector, contact
 from apo_bench.correction.observation_checks import check_observations
 from apo_bench.errors import InputError

@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Observation
 from apo_bench.errors import InputError, kind
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.pose import FARTHEST_M, is_rigid
+from apo_bench.geometry import FARTHEST_M, Array, is_rigid
 
 _ASYMMETRY = 1e-9
 """How far a covariance may be from symmetric, as a part of its largest entry."""

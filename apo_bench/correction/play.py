@@ -12,9 +12,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from apo_bench.assembly import Assembly, Contact, PartFace
 from apo_bench.assembly.pattern import pattern
-from apo_bench.assembly.topology import Assembly, Contact, PartFace
-from apo_bench.geometry.arrays import Array, frozen, remembered
+from apo_bench.geometry import Array, frozen, remembered
 
 LARGEST_CORRELATED = 300
 """Contacts above which the play of each is taken for its own: a covariance of all of them is a dense matrix."""

@@ -12,10 +12,9 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.assembly import Assembly, Observation
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.pattern import pattern
-from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.consistency import TEST_LEVEL, fit_deviation
 from apo_bench.correction.play import fit_covariance
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
@@ -24,7 +23,7 @@ from apo_bench.correction.solvers.inequalities import Inequalities, bounded
 from apo_bench.correction.solvers.kernels import Kernels, kernels
 from apo_bench.correction.solvers.laid import Laid, laid_contacts
 from apo_bench.correction.solvers.whitened import correction_to, noise_factor, scales
-from apo_bench.geometry.arrays import Array, remembered
+from apo_bench.geometry import Array, remembered
 
 
 class _Demands(NamedTuple):

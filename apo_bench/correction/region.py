@@ -3,17 +3,13 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.lowering import lowered_observation
+from apo_bench.assembly import Correction, Observation, lowered_observation
 from apo_bench.correction.heavy_tails import drawn_radius
 from apo_bench.correction.problem import seen_system
 from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.posterior import freedom
 from apo_bench.correction.solvers.whitened import coordinates_of, noise_factor
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.twist import right_jacobian
+from apo_bench.geometry import Array, pose, right_jacobian
 
 
 def contains_truth(observation: Observation, correction: Correction, truth: Array, level: float = 0.95) -> bool | None:

@@ -12,10 +12,10 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.topology import ODL, Assembly, inverted, simplified
+from apo_bench.assembly import ODL, Assembly, inverted, simplified
 from apo_bench.correction.solvers.compact import CompactEquations
 from apo_bench.correction.solvers.posterior import RANK_CUT_OFF
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 
 @final

@@ -5,14 +5,12 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.shared_error import SharedError, joint_covariance
+from apo_bench.assembly import Observation, SharedError, joint_covariance
 from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
 from apo_bench.correction.solvers.posterior import freedom
 from apo_bench.correction.solvers.whitened import noise_factor, twists_of
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 
 
 @final

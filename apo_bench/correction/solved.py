@@ -7,15 +7,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.correction_record import Consistency
-from apo_bench.assembly.equations import largest
+from apo_bench.assembly import Consistency, largest
 from apo_bench.correction.consistency import CONTRADICTION_M, p_value, softened_length
 from apo_bench.correction.heavy_tails import drawn_lengths, drawn_p_value
 from apo_bench.correction.problem import Problem
 from apo_bench.correction.solvers.gauss_newton import NearestGoals
 from apo_bench.correction.solvers.inequalities import active_rank, nearest_between
 from apo_bench.correction.solvers.posterior import jacobian_rank, marginals, projections
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 FAR_DEG = 45.0
 """A goal that is turned further is turned far. Of 320 corrections at 8 mm and degrees, over the eight scenarios, none

@@ -10,8 +10,8 @@ from collections.abc import Collection, Iterator
 
 import numpy as np
 
-from apo_bench.assembly.equations import largest
-from apo_bench.assembly.pattern import looking_away, pattern
+from apo_bench.assembly import largest, looking_away
+from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.inferred import inferred_goals
 from apo_bench.correction.problem import Problem, problem_of
 from apo_bench.correction.solved import FAR_DEG, Solved, solve
@@ -20,8 +20,7 @@ from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE, nearest_goa
 from apo_bench.correction.solvers.laid import laid_contacts
 from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR
 from apo_bench.correction.solvers.whitened import correction_to, scales
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.symmetry import symmetries
+from apo_bench.geometry import Array, symmetries
 
 _SHORTER = 1.0 - 1e-6
 """Squared lengths of two corrections differ if their ratio is below: the rest is rounding."""

@@ -4,10 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.equations import largest_gap
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.pattern import looking_away
+from apo_bench.assembly import Correction, Observation, largest_gap, looking_away
 from apo_bench.correction.solvers.newton import Solution
 from apo_bench.records import outcomes
 

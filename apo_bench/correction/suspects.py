@@ -10,8 +10,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.correction_record import Suspect
-from apo_bench.assembly.topology import Contact
+from apo_bench.assembly import Contact, Suspect
 from apo_bench.correction.problem import Problem
 from apo_bench.correction.solved import pull, tested
 

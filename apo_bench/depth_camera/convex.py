@@ -4,8 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.hull import Cylinder, Hull
+from apo_bench.geometry import Array, Cylinder, Hull
 
 _ON_M = 1e-9
 

@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.depth_camera.convex import Convex, convex_distance, convex_of, convex_passage, least_distance
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.hull import Hull
-from apo_bench.geometry.solid import Piece
+from apo_bench.geometry import Array, Hull, Piece
 
 
 class Shape(NamedTuple):

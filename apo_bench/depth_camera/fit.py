@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.depth_camera.distance import Shape, signed_distance
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.symmetry import quarter_turns
+from apo_bench.geometry import Array, frozen, pose, quarter_turns
 
 _ARM_M = 0.04
 """Length by which turns are weighed against shifts: half a part."""

@@ -7,17 +7,13 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly, Poses
 from apo_bench.depth_camera.convex import alike
 from apo_bench.depth_camera.distance import Shape, join_shapes, shape_of, strike_distances
 from apo_bench.depth_camera.locate import ALIKE, Appearance, LocatedModel, Model, locate, model_shares
 from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder
 from apo_bench.depth_camera.regions import Regions, regions
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.symmetry import nearest_symmetric_pose, symmetries, turned_alike
+from apo_bench.geometry import Array, nearest_symmetric_pose, physical_pieces, pose, symmetries, turned_alike
 
 _GONE = 0.5
 """A part has moved if so much of what was seen of it has vanished."""

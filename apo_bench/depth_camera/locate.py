@@ -11,7 +11,7 @@ from apo_bench.depth_camera.distance import Shape, signed_distance
 from apo_bench.depth_camera.fit import Points, ShapeFits, covariance, refine, starts
 from apo_bench.depth_camera.range_finder import PinholeView
 from apo_bench.depth_camera.regions import Mask, median_filtered, share_explained
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry import Array, frozen
 
 _COARSE = 150
 _MIDDLE = 500

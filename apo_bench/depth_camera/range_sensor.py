@@ -6,11 +6,10 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, Observation
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly, Demonstration, Observation
 from apo_bench.depth_camera.follow import Event, Expected, follow_demonstration
 from apo_bench.depth_camera.range_finder import RangeFinder, RangeImage
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry import Array, frozen
 from apo_bench.observation.models.isotropic import floored
 
 _UNSEEN = frozen(np.diag(np.repeat([0.1, 1.0], 3) ** 2), 6, 6)

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from apo_bench.depth_camera.distance import Shape, strike_distances
 from apo_bench.depth_camera.range_finder import PinholeView
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 
 Mask = NDArray[np.bool_]
 _LEAST_M = 0.010

@@ -10,8 +10,7 @@ from apo_bench.cad.naming import free_name, part_name
 from apo_bench.cad.poses_file import named_places, write_places
 from apo_bench.cad.raw_solid import Mesh, RawSolid, Region, SolidPlace
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 
 _UPRIGHT = 1.0 - 1e-9
 _NEAR = 0.005

@@ -10,15 +10,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Plan, placements
-from apo_bench.assembly.kinds import contact_kind
+from apo_bench.assembly import Plan, contact_kind, placements
 from apo_bench.drafting.posed import TABLE
 from apo_bench.drafting.touching import walls_without_play
 from apo_bench.drafting.waiting import stance
 from apo_bench.errors import InputError
-from apo_bench.geometry.solid import extent
+from apo_bench.geometry import extent
 from apo_bench.io.reading import read_bytes
-from apo_bench.records.settings import TrialSettings
+from apo_bench.records import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.nominal import nominal_operations

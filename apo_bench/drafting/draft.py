@@ -6,17 +6,14 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
+from apo_bench.assembly import Poses
 from apo_bench.drafting.ordering import OrderSearch, Placing
 from apo_bench.drafting.posed import TABLE, PosedPart
 from apo_bench.drafting.touching import clashes, closed, found_contacts, walls_without_play
 from apo_bench.drafting.waiting import Stance, laid_out, reach_of, site_of, stance
 from apo_bench.errors import InputError, unknown
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.holds import PadPlace, holds
-from apo_bench.geometry.intrusion import intrusion_depths
-from apo_bench.geometry.solid import Box, Solid, extent
+from apo_bench.geometry import Array, Box, PadPlace, Solid, extent, intrusion_depths, pose
+from apo_bench.geometry.holds import holds
 from apo_bench.parts import load_part
 from apo_bench.scenario.scenario import Site
 

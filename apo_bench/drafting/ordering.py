@@ -12,15 +12,12 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Assembly, Contact, Operation
+from apo_bench.assembly import Assembly, Contact, Operation, Poses
 from apo_bench.drafting.posed import TABLE
 from apo_bench.drafting.touching import found_contacts
 from apo_bench.drafting.waiting import stance
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, Solid, extent, pose
 from apo_bench.geometry.drop import drop
-from apo_bench.geometry.solid import Solid, extent
 from apo_bench.insertion.arrival import arrive
 from apo_bench.prediction.stability import BALANCED, imbalance
 

@@ -9,9 +9,7 @@ import numpy as np
 
 from apo_bench.cad.naming import free_name
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import Solid, world_bounds
+from apo_bench.geometry import Array, Solid, pose, world_bounds
 from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.parts import load_part, part_path
 from apo_bench.parts.allowed import FACE_OR_PART_NAME

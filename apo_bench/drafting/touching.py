@@ -11,16 +11,11 @@ from itertools import combinations, product
 
 import numpy as np
 
+from apo_bench.assembly import Assembly, Contact, Facing, PartFace, Poses, contact_kind, geometric_play, play_mm
 from apo_bench.assembly.facing import facing
-from apo_bench.assembly.facing_round import Facing
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.kinds import contact_kind, geometric_play, play_mm
-from apo_bench.assembly.topology import Assembly, Contact, PartFace
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, Solid, pose
 from apo_bench.geometry.intrusion import intrusion
 from apo_bench.geometry.mate import mate
-from apo_bench.geometry.solid import Solid
 
 _NEAR_M = 5e-5
 _NEAR_RAD = 2e-3

@@ -5,11 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
+from apo_bench.assembly import Poses
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.hull import Hull
-from apo_bench.geometry.solid import Piece, Solid, extent
+from apo_bench.geometry import Array, Hull, Piece, Solid, extent
 from apo_bench.scenario.scenario import Site
 
 _LOW_M = 2e-5

@@ -7,15 +7,13 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.assembly.topology import Contact
+from apo_bench.assembly import Contact
 from apo_bench.drafting.draft import Draft
 from apo_bench.drafting.ordering import Placing
 from apo_bench.drafting.posed import TABLE, PosedPart
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.holds import PadPlace
+from apo_bench.geometry import Array, PadPlace, pose
 from apo_bench.parts import part_names, part_path
-from apo_bench.records.thresholds import Thresholds
+from apo_bench.records import Thresholds
 
 _WIDTH = 118
 _LEVEL = 1e-9

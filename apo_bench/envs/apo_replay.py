@@ -8,15 +8,12 @@ from typing import Any, final
 import gymnasium
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.goals import Observation, Plan, Poses, Step
-from apo_bench.assembly.reached import Outcome
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Poses, Step
 from apo_bench.envs.episode import Episode, Scenes, Settings, with_options
 from apo_bench.envs.infos import step_info
 from apo_bench.envs.spaces import Action, Seen, action_space, as_seen_entries, moved, observation_space
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.records import (

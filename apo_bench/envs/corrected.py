@@ -7,7 +7,7 @@ import gymnasium
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.spaces import Action, Seen, packed
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.records import CORRECTOR, CORRECTORS, SIMULATED
 
 

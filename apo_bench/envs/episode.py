@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, final
 
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Observation
 from apo_bench.errors import InputError, unknown
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level

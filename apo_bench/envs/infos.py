@@ -7,7 +7,7 @@ that holds nothing but ints, and a None of the next one raises; numbers of these
 from collections.abc import Mapping
 from typing import Any, final
 
-from apo_bench.assembly.reached import Outcome
+from apo_bench.assembly import Outcome
 from apo_bench.records import Predicted
 
 

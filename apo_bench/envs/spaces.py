@@ -7,10 +7,9 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from apo_bench.assembly.goals import Observation, Plan
+from apo_bench.assembly import Observation, Plan
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 
 ROOM_M = 2.0
 """Every goal lies within this of the origin, per axis; a gross outlier beyond is given at the wall of this room."""

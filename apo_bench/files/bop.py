@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.io.reading import opened
 from apo_bench.io.strict_csv import check_separator
 

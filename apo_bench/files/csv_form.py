@@ -16,13 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly, Observation
 from apo_bench.errors import InputError
 from apo_bench.files.deviations import DEVIATION_DEG, DEVIATION_MM, SHIFT_M, TURN_RAD, is_within
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.pose import FARTHEST_M
+from apo_bench.geometry import FARTHEST_M, Array, pose
 from apo_bench.io.strict_csv import Columns, CsvRow, read_csv
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario

@@ -5,7 +5,7 @@ from math import pi
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 DEVIATION_MM = 1.0
 DEVIATION_DEG = 1.0

@@ -12,14 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation, Plan, Poses, Step
-from apo_bench.assembly.outlier_model import OutlierModel
-from apo_bench.assembly.shared_error import SharedError
-from apo_bench.assembly.tails import Tails
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly, Observation, OutlierModel, Plan, Poses, SharedError, Step, Tails
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 
 OBSERVATION_SCHEMA = "apo-bench/observation/2"
 PLAN_SCHEMA = "apo-bench/plan/2"

@@ -5,16 +5,22 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.assembly.goals import SCHEDULE_REMEDY, Observation, Plan, Poses, Step, schedule_fault
-from apo_bench.assembly.outlier_model import OutlierModel
-from apo_bench.assembly.shared_error import SharedError
-from apo_bench.assembly.tails import Tails
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import (
+    SCHEDULE_REMEDY,
+    Assembly,
+    Observation,
+    OutlierModel,
+    Plan,
+    Poses,
+    SharedError,
+    Step,
+    Tails,
+    schedule_fault,
+)
 from apo_bench.errors import InputError, unknown
 from apo_bench.files.deviations import ALLOWED_DEVIATIONS, SHIFT_M, TURN_RAD, is_sensible, is_within
 from apo_bench.files.json_forms import OBSERVATION_SCHEMA, OUTLIER_KEYS, PLAN_SCHEMA, TO_MM_DEG
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.io.documents import JsonNode, read_json
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario

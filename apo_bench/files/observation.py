@@ -6,11 +6,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Observation
 from apo_bench.errors import InputError
 from apo_bench.files.csv_form import read_table
 from apo_bench.files.deviations import DEVIATION_DEG, DEVIATION_MM, check_deviations
-from apo_bench.geometry.pose import FARTHEST_M
+from apo_bench.geometry import FARTHEST_M
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Scenario
 

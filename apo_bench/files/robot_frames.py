@@ -6,7 +6,7 @@ from typing import Literal, cast, final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.io.documents import read_toml
 from apo_bench.scenario.keys import read_any_pose
 

@@ -1,1 +1,97 @@
 """Poses, faces, solids and the overlap of facing faces: numpy and shapely only."""
+
+from apo_bench.geometry.arrays import Array, Ints, NotReal, copyable, freeze, frozen, real, remembered
+from apo_bench.geometry.clearance import physical_pieces
+from apo_bench.geometry.convex import ball_around, separating_axes, shadow
+from apo_bench.geometry.drop import TOUCH_M, drop_depths
+from apo_bench.geometry.holds import FINGER_ROOM_M, PAD_M, PadPlace, held_span, held_width, holds_whole
+from apo_bench.geometry.hull import SAGITTA_M, Cylinder, Hull, cylinder_hull, first_of_each, sides_of
+from apo_bench.geometry.intrusion import intrusion_depths, upright_bounds, ways_out
+from apo_bench.geometry.mate import Mate
+from apo_bench.geometry.overlap import Overlap, beside, face_area, overlap_area
+from apo_bench.geometry.polygon import across_axis, flat_area, plane_across, polygons_of, rings_of, straightened
+from apo_bench.geometry.pose import FARTHEST_M, is_rigid
+from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
+from apo_bench.geometry.solid import Box, Face, Piece, Solid, all_boxes, extent, world_bounds
+from apo_bench.geometry.swept import Posed, exit_distance, is_way_free
+from apo_bench.geometry.symmetry import (
+    folds,
+    nearest_alike,
+    nearest_symmetric_pose,
+    quarter_turns,
+    revolution,
+    symmetries,
+    turn_about,
+    turned_alike,
+)
+from apo_bench.geometry.twist import ADJOINTS, GENERATORS, SERIES, exp_and_jacobian, right_jacobian
+
+__all__ = (
+    "ADJOINTS",
+    "FARTHEST_M",
+    "FINGER_ROOM_M",
+    "GENERATORS",
+    "PAD_M",
+    "SAGITTA_M",
+    "SERIES",
+    "TOUCH_M",
+    "WHOLE_TURN",
+    "Array",
+    "Box",
+    "Cylinder",
+    "Face",
+    "Hull",
+    "Ints",
+    "Mate",
+    "NotReal",
+    "Overlap",
+    "PadPlace",
+    "Piece",
+    "Posed",
+    "RoundFace",
+    "Solid",
+    "across_axis",
+    "all_boxes",
+    "ball_around",
+    "beside",
+    "copyable",
+    "cylinder_hull",
+    "drop_depths",
+    "exit_distance",
+    "exp_and_jacobian",
+    "extent",
+    "face_area",
+    "first_of_each",
+    "flat_area",
+    "folds",
+    "freeze",
+    "frozen",
+    "held_span",
+    "held_width",
+    "holds_whole",
+    "intrusion_depths",
+    "is_rigid",
+    "is_way_free",
+    "nearest_alike",
+    "nearest_symmetric_pose",
+    "overlap_area",
+    "physical_pieces",
+    "plane_across",
+    "polygons_of",
+    "quarter_turns",
+    "real",
+    "remembered",
+    "revolution",
+    "right_jacobian",
+    "rings_of",
+    "separating_axes",
+    "shadow",
+    "sides_of",
+    "straightened",
+    "symmetries",
+    "turn_about",
+    "turned_alike",
+    "upright_bounds",
+    "ways_out",
+    "world_bounds",
+)

@@ -6,12 +6,8 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.assembly.touching import TouchedContact, corners, mouth, touched_contacts
-from apo_bench.geometry.arrays import Array, freeze
-from apo_bench.geometry.solid import extent
-from apo_bench.geometry.swept import Posed, exit_distance, is_way_free
+from apo_bench.assembly import Assembly, Contact, Poses, TouchedContact, corners, mouth, touched_contacts
+from apo_bench.geometry import Array, Posed, exit_distance, extent, freeze, is_way_free
 from apo_bench.insertion.line import Attach, Preference
 from apo_bench.insertion.macros import UP, Chain, Macro, Way, chain, departure
 from apo_bench.insertion.states import ANGLE_RAD, ContactState, Screw, classify, null_space, screw_state, snap_normals

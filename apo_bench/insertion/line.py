@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import NamedTuple, final
 
-from apo_bench.geometry.arrays import Array, copyable, freeze
+from apo_bench.geometry import Array, copyable, freeze
 
 
 @final

@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry import Array, frozen
 from apo_bench.insertion.states import ANGLE_RAD, Cone, ContactState, classify, evenly_open, null_space
 
 MacroName = Literal[

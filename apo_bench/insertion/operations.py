@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import final
 
-from apo_bench.assembly.goals import Poses, placements
-from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Assembly, Contact, Poses, placements
+from apo_bench.geometry import Array
 from apo_bench.insertion.arrival import ANY, Arrival, arrive
 from apo_bench.insertion.line import Preference
 from apo_bench.insertion.states import ANGLE_RAD

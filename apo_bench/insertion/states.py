@@ -12,7 +12,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry.arrays import Array, freeze
+from apo_bench.geometry import Array, freeze
 
 ANGLE_RAD = 1e-3
 """Directions nearer than this to each other, or to being opposite, are the same where poses are exact."""

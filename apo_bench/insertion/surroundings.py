@@ -2,12 +2,9 @@
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.assembly.touching import mouth, outline_points, touched_contacts
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Assembly, Contact, Poses, mouth, outline_points, touched_contacts
+from apo_bench.geometry import Array, Face, extent
 from apo_bench.geometry.overlap import overlap
-from apo_bench.geometry.solid import Face, extent
 from apo_bench.insertion.arrival import Arrival
 
 _SLOW_M = 0.003

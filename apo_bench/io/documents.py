@@ -15,7 +15,7 @@ from typing import Any, NoReturn, final
 import numpy as np
 
 from apo_bench.errors import InputError, one_line
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.io.lossless_json import unique_members
 from apo_bench.io.plain_text import UNSHOWN
 from apo_bench.io.reading import decoded, read_bytes, read_text

@@ -6,14 +6,11 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.joint_play import apart_limit_mm, deep_limit_mm
-from apo_bench.assembly.kinds import ContactKind, contact_kind
-from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.geometry.mate import Mate, mate
-from apo_bench.geometry.overlap import Overlap, overlap
-from apo_bench.geometry.solid import Face
-from apo_bench.records.thresholds import Thresholds
+from apo_bench.assembly import Assembly, Contact, ContactKind, Poses, apart_limit_mm, contact_kind, deep_limit_mm
+from apo_bench.geometry import Face, Mate, Overlap
+from apo_bench.geometry.mate import mate
+from apo_bench.geometry.overlap import overlap
+from apo_bench.records import Thresholds
 
 ContactMoment = Literal["made", "end"]
 _OFF: dict[ContactKind, str] = {

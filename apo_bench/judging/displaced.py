@@ -4,14 +4,8 @@ from collections.abc import Collection, Iterator, Sequence
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.reached import Snapshot
-from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.assembly.touching import corners, touched_contacts
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import Solid
-from apo_bench.geometry.symmetry import turned_alike
+from apo_bench.assembly import Assembly, Contact, Poses, Snapshot, corners, touched_contacts
+from apo_bench.geometry import Array, Solid, pose, turned_alike
 
 _ONE_WAY = 0.999
 """Cosine between the normals of faces that look the same way: together they are a plain support."""

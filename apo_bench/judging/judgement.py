@@ -7,9 +7,9 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.reached import Snapshot
+from apo_bench.assembly import Snapshot
 from apo_bench.judging.contacts import ContactVerdict, faults_in_words
-from apo_bench.records.thresholds import Thresholds
+from apo_bench.records import Thresholds
 
 FAULTS = ("not_made", "gap", "overlap", "penetration", "pushed", "not_released", "not_at_rest")
 """What the judge can find, in the order in which it names one."""

@@ -8,17 +8,12 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses, placements
-from apo_bench.assembly.reached import Reached, Snapshot
-from apo_bench.assembly.topology import Assembly, Contact, Relation
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.overlap import Overlap
-from apo_bench.geometry.symmetry import nearest_alike
+from apo_bench.assembly import Assembly, Contact, Poses, Reached, Relation, Snapshot, placements
+from apo_bench.geometry import Array, Overlap, nearest_alike, pose
 from apo_bench.judging.contacts import ContactJudge, ContactMoment, ContactVerdict
 from apo_bench.judging.displaced import displacements, faults_of_place, last_moves
 from apo_bench.judging.judgement import Judgement, judgement
-from apo_bench.records.thresholds import Thresholds
+from apo_bench.records import Thresholds
 
 
 def judge_finished(

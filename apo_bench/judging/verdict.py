@@ -5,12 +5,11 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.reached import Reached, Snapshot
-from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Assembly, Reached, Snapshot
+from apo_bench.geometry import Array
 from apo_bench.judging.judgement import Judgement
 from apo_bench.judging.rules import judge_demonstrated, judge_finished
-from apo_bench.records.thresholds import Criteria, Meaning
+from apo_bench.records import Criteria, Meaning
 
 
 @final

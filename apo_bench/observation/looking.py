@@ -6,12 +6,11 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, Observation
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly, Demonstration, Observation
 from apo_bench.errors import InputError
 from apo_bench.observation.noise import Noise
 from apo_bench.observation.observing import observe
-from apo_bench.records.settings import check
+from apo_bench.records import check
 
 
 @final

@@ -10,10 +10,9 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from apo_bench.assembly.goals import Demonstration, Observation
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly, Demonstration, Observation
 from apo_bench.errors import InputError, failed, unknown
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.names import resolve
 from apo_bench.observation.models.isotropic import floored
 from apo_bench.observation.models.level import Level

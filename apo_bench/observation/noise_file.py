@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.empirical import Empirical, empirical_noise
@@ -21,7 +20,7 @@ from apo_bench.observation.models.fitted import (
 from apo_bench.observation.models.level import Level
 from apo_bench.observation.models.tails import Split, Tail
 from apo_bench.observation.presets import noise_path
-from apo_bench.records.short_names import RESIDUALS
+from apo_bench.records import RESIDUALS
 from apo_bench.scenario.keys import read_pose
 
 _SCHEMA = "apo-bench/noise/2"

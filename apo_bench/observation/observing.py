@@ -5,12 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly import Demonstration, Observation
 from apo_bench.errors import InputError, failed
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.pose import is_rigid
+from apo_bench.geometry import Array, is_rigid
 from apo_bench.observation.noise import Level, Noise, make_noise
-from apo_bench.records.settings import level_pair
+from apo_bench.records import level_pair
 
 
 def observe(

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from apo_bench.records.short_names import RESIDUALS
+from apo_bench.records import RESIDUALS
 from apo_bench.resources import folder
 
 

@@ -14,20 +14,27 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly.facing import height, opposed
-from apo_bench.assembly.facing_round import measure_round, round_pairs
-from apo_bench.assembly.goals import Observation, Poses, placements
-from apo_bench.assembly.graph import relation_graph
-from apo_bench.assembly.kinds import contact_kind
-from apo_bench.assembly.topology import Assembly, Contact, Gap, Operation, PartFace
+from apo_bench.assembly import (
+    Assembly,
+    Contact,
+    Gap,
+    Observation,
+    Operation,
+    PartFace,
+    Poses,
+    contact_kind,
+    height,
+    measure_round,
+    opposed,
+    placements,
+    relation_graph,
+    round_pairs,
+)
 from apo_bench.errors import InputError, failed
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, Face, RoundFace, Solid
 from apo_bench.geometry.overlap import overlap
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Face, Solid
 from apo_bench.names import resolve
-from apo_bench.records.relations import GIVEN, SHIFT_MM, relations_name
-from apo_bench.records.short_names import WRONG_RELATIONS
+from apo_bench.records import GIVEN, SHIFT_MM, WRONG_RELATIONS, relations_name
 
 Relations = Callable[[Assembly, Poses, Array, np.random.Generator], Assembly]
 """Any function `(assembly, start, goals, rng) -> Assembly`: right relations and poses in, wrong relations out."""

@@ -11,12 +11,19 @@ from typing import Any, NamedTuple, NoReturn
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.hull import SAGITTA_M
-from apo_bench.geometry.polygon import flat_area, plane_across, rings_of
-from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
-from apo_bench.geometry.solid import Face, Piece, Solid
+from apo_bench.geometry import (
+    SAGITTA_M,
+    WHOLE_TURN,
+    Array,
+    Face,
+    Piece,
+    RoundFace,
+    Solid,
+    flat_area,
+    physical_pieces,
+    plane_across,
+    rings_of,
+)
 
 _IN_PLANE_M = 1e-6
 _PARALLEL = 1e-7

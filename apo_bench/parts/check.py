@@ -7,9 +7,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.convex import separating_axes, shadow
-from apo_bench.geometry.overlap import face_area
-from apo_bench.geometry.solid import Box, Piece, Solid
+from apo_bench.geometry import Box, Piece, Solid, face_area, separating_axes, shadow
 
 _TOUCHING_M = 2e-5
 """Thinner layers of a solid may be left out between its pieces."""

@@ -11,9 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.polygon import polygons_of, rings_of, straightened
-from apo_bench.geometry.solid import Box
+from apo_bench.geometry import Array, Box, polygons_of, rings_of, straightened
 
 _SAME_PLANE_M = 1e-9
 """Sides of boxes this near to each other lie in one plane."""

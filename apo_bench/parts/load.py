@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.errors import InputError, unknown
-from apo_bench.geometry.solid import Box, Face, Solid
+from apo_bench.geometry import Box, Face, Solid
 from apo_bench.parts.agreement import check_faces, check_receding
 from apo_bench.parts.allowed import HEAVIEST_KG, LIGHTEST_KG, MOST_FACES
 from apo_bench.parts.check import check_matter, check_one_piece, check_solid

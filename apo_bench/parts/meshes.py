@@ -7,8 +7,7 @@ from xml.etree.ElementTree import Element
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.hull import Hull
+from apo_bench.geometry import Array, Hull
 from apo_bench.io.reading import read_bytes
 
 _SAME_M = 1e-7

@@ -10,9 +10,7 @@ from xml.etree.ElementTree import Element, tostring
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.hull import Cylinder, cylinder_hull
-from apo_bench.geometry.solid import Box, Piece, all_boxes
+from apo_bench.geometry import Array, Box, Cylinder, Piece, all_boxes, cylinder_hull
 from apo_bench.parts.allowed import MOST_BOXES, MOST_CORNERS_IN_ALL, WIDEST_M
 from apo_bench.parts.meshes import checked_hull, dress_picture, is_picture
 from apo_bench.parts.stated import USUAL_DENSITY, StatedPart, read_stated_part

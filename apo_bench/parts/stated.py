@@ -8,10 +8,7 @@ from typing import final
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.polygon import flat_area, plane_across
-from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
-from apo_bench.geometry.solid import Face
+from apo_bench.geometry import WHOLE_TURN, Array, Face, RoundFace, flat_area, plane_across
 from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.parts.allowed import FACE_OR_PART_NAME, FRICTION, LONGEST_FACE_NAME, MOST_FACES
 

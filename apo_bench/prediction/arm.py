@@ -5,7 +5,7 @@ from typing import Literal, final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 Refused = Literal["unreachable_start", "unreachable"]
 

@@ -9,11 +9,11 @@ from itertools import groupby
 from types import MappingProxyType
 from typing import Literal, final
 
-from apo_bench.assembly.goals import Plan
+from apo_bench.assembly import Plan
 from apo_bench.insertion.line import Attach
 from apo_bench.prediction.arm import ArmMove
 from apo_bench.prediction.measures import MeasureCode, measures
-from apo_bench.records.thresholds import Thresholds
+from apo_bench.records import Thresholds
 
 ARM_CODES = ("unreachable_start", "unreachable", "gripper_room", "tip_error")
 """Of what another arm could do."""

@@ -4,14 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Assembly, Operation
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.convex import ball_around
-from apo_bench.geometry.intrusion import intrusion_depths
-from apo_bench.geometry.solid import Solid
+from apo_bench.assembly import Assembly, Operation, Poses
+from apo_bench.geometry import Array, Solid, ball_around, intrusion_depths, physical_pieces, pose
 from apo_bench.insertion.line import Attach
 
 _SPACING_M = 0.02

@@ -19,17 +19,24 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Plan, Poses, placements
-from apo_bench.assembly.joint_play import apart_limit_mm, deep_limit_mm
-from apo_bench.assembly.kinds import contact_kind
-from apo_bench.assembly.topology import Assembly, Contact, Operation
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import (
+    Assembly,
+    Contact,
+    Operation,
+    Plan,
+    Poses,
+    apart_limit_mm,
+    contact_kind,
+    deep_limit_mm,
+    placements,
+)
+from apo_bench.geometry import Array
 from apo_bench.insertion.line import Attach
 from apo_bench.prediction.arm import ArmMove
 from apo_bench.prediction.interference import depths_from_above, depths_on_way, physical_solids
 from apo_bench.prediction.resting import between, enters, is_support, residual, resting_poses
 from apo_bench.prediction.stability import BALANCED, imbalance
-from apo_bench.records.thresholds import Thresholds
+from apo_bench.records import Thresholds
 
 MeasureKind = Literal["falls", "fit", "side", "leans", "on_way", "from_above", "gripper", "own", "tip"]
 MeasureCode = Literal["residual", "interference", "unstable_goal", "gripper_room", "tip_error"]

@@ -8,14 +8,10 @@ from types import MappingProxyType
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Assembly, Contact, Operation
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.mate import Mate, mate
+from apo_bench.assembly import Assembly, Contact, Operation, Poses
+from apo_bench.geometry import Array, Face, Mate, RoundFace, pose
+from apo_bench.geometry.mate import mate
 from apo_bench.geometry.overlap import overlap
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Face
 
 _LEVEL = 0.5
 """A face whose normal makes a larger cosine with the vertical is a support, any other one a side."""

@@ -10,15 +10,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses, placements
-from apo_bench.assembly.topology import Assembly, Contact, Operation
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Assembly, Contact, Operation, Poses, placements
+from apo_bench.geometry import Array, Face, RoundFace, across_axis, all_boxes, pose
 from apo_bench.geometry.mate import mate
 from apo_bench.geometry.overlap import overlap
-from apo_bench.geometry.polygon import across_axis
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Face, all_boxes
 
 _LEVEL = float(np.cos(np.radians(30.0)))
 """A face whose normal is nearer to the vertical than this carries weight; a steeper one is a wall."""

@@ -12,11 +12,8 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation, Poses
-from apo_bench.assembly.shared_error import joint_covariance
-from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Assembly, Observation, Poses, joint_covariance
+from apo_bench.geometry import Array, pose
 
 
 class PartBeliefs(NamedTuple):

@@ -17,15 +17,10 @@ from typing import final
 
 import numpy as np
 
+from apo_bench.assembly import Assembly, Observation, joint_covariance, lowered
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.lowering import lowered
 from apo_bench.assembly.pattern import pattern
-from apo_bench.assembly.shared_error import joint_covariance
-from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.twist import right_jacobian
+from apo_bench.geometry import Array, frozen, pose, right_jacobian
 from apo_bench.recognition.thresholds import CONTACT_SOFT_M
 
 _ROOM = frozen(np.repeat([40e-3, radians(23.0)], 3), 6)

@@ -4,10 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import NamedTuple, final
 
-from apo_bench.assembly.facing import face_gap
-from apo_bench.assembly.facing_round import Facing
-from apo_bench.assembly.goals import Observation, Poses
-from apo_bench.assembly.topology import Assembly, Contact
+from apo_bench.assembly import Assembly, Contact, Facing, Observation, Poses, face_gap
 from apo_bench.errors import InputError, kind
 from apo_bench.recognition.thresholds import PairThresholds, Rules
 

@@ -17,9 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation, placements
-from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Assembly, Contact, Observation, placements
+from apo_bench.geometry import Array
 from apo_bench.recognition.estimate import estimate
 from apo_bench.recognition.evidence import Recognised, Rival, evidence_of, with_contacts, without_contacts
 from apo_bench.recognition.physics import IMPOSSIBLE, inside, physical_surprise, refusal

@@ -10,10 +10,8 @@ from math import exp, hypot, log, sqrt
 
 import numpy as np
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.intrusion import ways_out
-from apo_bench.geometry.overlap import Overlap, face_area, overlap
+from apo_bench.geometry import Array, Overlap, face_area, pose, ways_out
+from apo_bench.geometry.overlap import overlap
 from apo_bench.recognition.situation import Candidate, Situation
 from apo_bench.recognition.thresholds import Rules
 

@@ -8,13 +8,9 @@ from typing import NamedTuple, final
 
 import numpy as np
 
+from apo_bench.assembly import Contact, Facing, Observation, PartFace
 from apo_bench.assembly.facing import facing
-from apo_bench.assembly.facing_round import Facing
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.topology import Contact, PartFace
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import Solid
+from apo_bench.geometry import Array, Solid, pose
 from apo_bench.recognition.belief import Belief, PartBeliefs
 from apo_bench.recognition.estimate import GoalEstimate
 from apo_bench.recognition.thresholds import PairThresholds, Rules, pair_thresholds, reality, slack

@@ -7,9 +7,9 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly.facing_round import Facing
+from apo_bench.assembly import Facing
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 CONTACT_SOFT_M = 0.1e-3
 _SOFT_RAD = math.radians(0.1)

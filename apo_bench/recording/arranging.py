@@ -5,11 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly, Poses
 from apo_bench.errors import InputError, unknown
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.recording.averaging import Mean
 from apo_bench.recording.camera_file import CameraFile
 from apo_bench.recording.camera_pose import CameraPose, solve_camera

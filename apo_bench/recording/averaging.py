@@ -6,8 +6,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry import Array, frozen, pose
 
 _FRAME_FLOOR = frozen(np.repeat([2e-5, 2e-4], 3), 6)
 """No axis of one frame is surer than this, [m, rad]: what a file with rounded numbers can say."""

@@ -9,7 +9,7 @@ from typing import Any, Literal, final
 import numpy as np
 
 from apo_bench.errors import unknown
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.scenario.keys import read_any_pose, refuse
 

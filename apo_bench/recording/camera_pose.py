@@ -7,8 +7,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry import Array, frozen, pose
 from apo_bench.recording.averaging import Mean
 
 _ROUNDS = 50

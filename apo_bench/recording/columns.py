@@ -6,8 +6,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from apo_bench.errors import InputError, one_line, unknown
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.recording.camera_file import ANGLE_UNITS, LENGTH_UNITS, TIME_UNITS, Conventions
 
 _UNITS = {**LENGTH_UNITS, **ANGLE_UNITS, **TIME_UNITS}

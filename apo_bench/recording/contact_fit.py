@@ -4,12 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.facing import height
-from apo_bench.assembly.facing_round import measure_round
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.geometry.overlap import beside, face_area
-from apo_bench.geometry.round_face import RoundFace
+from apo_bench.assembly import Assembly, Contact, Poses, height, measure_round
+from apo_bench.geometry import RoundFace, beside, face_area
 
 
 class ContactFit(NamedTuple):

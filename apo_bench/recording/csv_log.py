@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.errors import InputError, one_line
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.io.reading import opened
 from apo_bench.io.strict_csv import check_separator
 from apo_bench.recording.camera_file import Conventions

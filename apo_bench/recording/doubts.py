@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.recording.arranging import Arrange, Arrangement
 from apo_bench.recording.averaging import per_axis
 from apo_bench.recording.camera_file import CameraFile

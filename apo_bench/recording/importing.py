@@ -7,11 +7,9 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation, Poses
-from apo_bench.assembly.shared_error import SharedError
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly, Observation, Poses, SharedError
 from apo_bench.errors import InputError, unknown
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.observation.models.isotropic import floored, with_shared
 from apo_bench.observation.models.outliers import UNSEEN_DEVIATION, last_seen
 from apo_bench.recording.arranging import Arrangement, arrangement_of, staying

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.errors import InputError, one_line
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 MOST_POSES = 1_000_000
 LARGEST_LOG_BYTES = 200_000_000

@@ -8,8 +8,7 @@ from itertools import permutations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.recording.camera_file import CameraFile
 from apo_bench.recording.rests import RestSpan
 from apo_bench.recording.stays import Stay, Stays

@@ -8,7 +8,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from apo_bench.errors import InputError, one_line, unknown
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.recording.log import Log, PoseTrack
 from apo_bench.scenario.keys import read_any_pose, refuse

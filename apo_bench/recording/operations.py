@@ -10,9 +10,8 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Assembly
+from apo_bench.geometry import Array, pose
 from apo_bench.recording.log import PoseTrack
 from apo_bench.recording.ordering import quiet, taken
 from apo_bench.recording.rests import RestSpan

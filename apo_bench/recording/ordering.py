@@ -11,10 +11,9 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly, Poses
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.recording.contact_fit import contact_fit
 from apo_bench.recording.stays import Stay, poses_at
 

@@ -11,8 +11,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry import Array, frozen, pose
 from apo_bench.recording.averaging import Mean, average, common_scatter, pooled_mean
 from apo_bench.recording.log import PoseTrack
 

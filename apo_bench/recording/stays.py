@@ -6,8 +6,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.recording.log import PoseTrack
 from apo_bench.recording.rests import RestSpan, rests_of
 

@@ -3,8 +3,7 @@
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.residuals import Residuals
 from apo_bench.recording.log import Log, PoseTrack

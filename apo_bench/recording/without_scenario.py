@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.recording.arranging import solved_camera, staying
 from apo_bench.recording.averaging import per_axis
 from apo_bench.recording.camera_file import CameraFile

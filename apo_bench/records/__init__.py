@@ -4,11 +4,12 @@ Other rooms import from here; the folder of a sweep is in `run`.
 """
 
 from apo_bench.records.limits import CORRECTOR_LIMIT_S, USUAL_LIMITS, Limits
-from apo_bench.records.method import is_own, knows_relations, knows_truth, may_look, parsed, with_simulated
-from apo_bench.records.outcomes import STAGES, sentence
+from apo_bench.records.method import as_seen, is_own, knows_relations, knows_truth, may_look, parsed, with_simulated
+from apo_bench.records.outcomes import CODES, STAGES, sentence
 from apo_bench.records.relations import GIVEN, RECOGNISED, SHIFT_MM, WRONG, relations_name
 from apo_bench.records.robot_error import NO_ROBOT_ERROR, checked_robot_error, robot_sigmas
 from apo_bench.records.row import (
+    LARGEST_NUMBER,
     LONGEST_SENTENCE,
     REQUIRED,
     ROW_FIELDS,
@@ -49,6 +50,7 @@ from apo_bench.records.short_names import (
 from apo_bench.records.thresholds import MEANINGS, Criteria, Meaning, Thresholds
 
 __all__ = (
+    "CODES",
     "CORRECTOR",
     "CORRECTORS",
     "CORRECTOR_LIMIT_S",
@@ -56,6 +58,7 @@ __all__ = (
     "FOREIGN_ARMS",
     "GIVEN",
     "KEY",
+    "LARGEST_NUMBER",
     "LEVEL",
     "LONGEST_SENTENCE",
     "MEANINGS",
@@ -89,6 +92,7 @@ __all__ = (
     "SettingInfo",
     "Thresholds",
     "TrialSettings",
+    "as_seen",
     "check",
     "check_same_salt",
     "check_together",

@@ -7,14 +7,10 @@ the difference is beyond chance, "as often" only where the interval lies close a
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from apo_bench.records.method import knows_relations, knows_truth
-from apo_bench.records.row import Row, look_up
-from apo_bench.records.short_names import CORRECTOR
+from apo_bench.records import CORRECTOR, Row, knows_relations, knows_truth, look_up
+from apo_bench.statistics import FEWEST_SEEDS, Contrast, Interval, Place, Results, contrast, percent, pooled_rate, rank
 from apo_bench.statistics.levels.half_level import HalfLevel
 from apo_bench.statistics.levels.summary import Summary
-from apo_bench.statistics.over_seeds import FEWEST_SEEDS, Contrast, Results, contrast, pooled_rate
-from apo_bench.statistics.rate_text import percent
-from apo_bench.statistics.rates import Interval, Place, rank
 
 ALIKE_WITHIN = 0.05
 """Two methods are alike only where the whole interval of their difference is within this, to either side of 0."""

@@ -9,11 +9,10 @@ from typing import NamedTuple
 from apo_bench.errors import InputError
 from apo_bench.io.tables import write_columns
 from apo_bench.io.writing import check_folders, check_target, to_write
-from apo_bench.records.row import Row
+from apo_bench.records import Row, check_same_salt, one_salt, read_salt
 from apo_bench.records.run.report_rows import COLUMNS as KEPT
 from apo_bench.records.run.report_rows import report_rows
 from apo_bench.records.run.run_file import read_run
-from apo_bench.records.salt import check_same_salt, one_salt, read_salt
 from apo_bench.report.answer import answer
 from apo_bench.report.figures.every import figures
 from apo_bench.report.page.report_page import report_page
@@ -30,12 +29,21 @@ from apo_bench.report.tables.methods import (
     work_table,
 )
 from apo_bench.report.tables.table import Table
-from apo_bench.statistics.contacts import gaps, recognitions
-from apo_bench.statistics.effort import efforts, read_timing, trial_times, work
-from apo_bench.statistics.forecasts import Confusion, calibrations, confusions
+from apo_bench.statistics import (
+    Cell,
+    Confusion,
+    calibrations,
+    confusions,
+    efforts,
+    gaps,
+    members,
+    read_timing,
+    recognitions,
+    trial_times,
+    work,
+)
 from apo_bench.statistics.levels.summary import Summary, summary
-from apo_bench.statistics.rates import Cell
-from apo_bench.statistics.settings import members, settings
+from apo_bench.statistics.settings import settings
 
 MOST_PANELS = 16
 """Of a PNG; drawing more takes minutes."""

@@ -6,16 +6,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Layout, Poses, placements
-from apo_bench.assembly.kinds import ContactKind, contact_kind, geometric_play, play_mm
-from apo_bench.assembly.topology import Assembly, Contact
+from apo_bench.assembly import (
+    Assembly,
+    Contact,
+    ContactKind,
+    Layout,
+    Poses,
+    contact_kind,
+    geometric_play,
+    placements,
+    play_mm,
+)
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, Face, pose
 from apo_bench.geometry.intrusion import intrusion
 from apo_bench.geometry.mate import mate
 from apo_bench.geometry.overlap import overlap
-from apo_bench.geometry.solid import Face
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.order import check_order
 from apo_bench.scenario.scenario import Scenario

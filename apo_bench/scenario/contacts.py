@@ -13,10 +13,8 @@ from typing import get_args
 
 import numpy as np
 
-from apo_bench.assembly.kinds import CONTACT_KINDS, contact_kind, geometric_play
-from apo_bench.assembly.topology import Contact, Gap, GapKind, PartFace
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Face, Solid
+from apo_bench.assembly import CONTACT_KINDS, Contact, Gap, GapKind, PartFace, contact_kind, geometric_play
+from apo_bench.geometry import Face, RoundFace, Solid
 from apo_bench.io.documents import JsonNode
 from apo_bench.scenario.keys import LARGEST_LENGTH_MM, read_span, refuse, refuse_name
 

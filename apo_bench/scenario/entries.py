@@ -7,11 +7,9 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly.topology import Operation
+from apo_bench.assembly import Operation
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import Solid
+from apo_bench.geometry import Array, Solid, pose
 from apo_bench.insertion.line import Preference
 from apo_bench.io.documents import JsonNode
 from apo_bench.parts import load_part, part_path

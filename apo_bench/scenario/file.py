@@ -10,12 +10,12 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.assembly.topology import Assembly, Gap
+from apo_bench.assembly import Assembly, Gap
 from apo_bench.errors import InputError, unknown
 from apo_bench.insertion.line import Preference
 from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.io.plain_text import UNSHOWN
-from apo_bench.records.thresholds import MEANINGS, Meaning, Thresholds
+from apo_bench.records import MEANINGS, Meaning, Thresholds
 from apo_bench.resources import folder
 from apo_bench.scenario.checks import check_scenario
 from apo_bench.scenario.entries import OperationEntry, read_operations, read_parts

@@ -4,10 +4,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Layout, Poses, placements
-from apo_bench.assembly.topology import Assembly, Operation
-from apo_bench.assembly.touching import touched_contacts
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Assembly, Layout, Operation, Poses, placements, touched_contacts
+from apo_bench.geometry import Array
 from apo_bench.scenario.scenario import Scenario
 
 NOTHING_M = 1e-9

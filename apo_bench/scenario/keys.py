@@ -6,8 +6,7 @@ from typing import NoReturn
 import numpy as np
 
 from apo_bench.errors import InputError, unknown
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.io.documents import JsonNode
 
 LARGEST_LENGTH_MM = 2000.0

@@ -4,11 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from apo_bench.assembly.goals import Layout
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.solid import extent
+from apo_bench.assembly import Layout
+from apo_bench.geometry import Array, extent, physical_pieces, pose
 from apo_bench.scenario.scenario import Scenario
 
 

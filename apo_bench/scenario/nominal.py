@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
+from apo_bench.assembly import Poses
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.insertion.arrival import Arrival

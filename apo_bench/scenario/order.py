@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Assembly, Contact, Operation
+from apo_bench.assembly import Assembly, Contact, Operation, Poses
 from apo_bench.errors import InputError
 
 _SAME = 1e-9

@@ -8,12 +8,10 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, copyable, freeze
+from apo_bench.assembly import Assembly, Poses
+from apo_bench.geometry import Array, copyable, freeze, pose
 from apo_bench.insertion.line import Attach
-from apo_bench.records.thresholds import Meaning, Thresholds
+from apo_bench.records import Meaning, Thresholds
 
 
 @final

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry.drop import TOUCH_M, drop, drop_depths
+from apo_bench.assembly import Assembly, Poses
+from apo_bench.geometry import TOUCH_M, drop_depths
+from apo_bench.geometry.drop import drop
 
 AIR_M = 1e-4
 """Lower above what is below it, a part settles within the first steps and is where it was said to be."""

@@ -5,11 +5,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.round_face import RoundFace
+from apo_bench.assembly import Assembly, Contact, Poses
+from apo_bench.geometry import Array, RoundFace, pose
 
 _BEYOND_M = 0.02
 """How far a line goes on beyond the faces."""

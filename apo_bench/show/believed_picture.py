@@ -7,10 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation, Poses, placements
-from apo_bench.assembly.graph import arc_residuals, relation_graph
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import world_bounds
+from apo_bench.assembly import Observation, Poses, arc_residuals, placements, relation_graph
+from apo_bench.geometry import Array, world_bounds
 from apo_bench.io.figures import default_looks, save_figure
 from apo_bench.io.words import listed_words
 from apo_bench.judging.contacts import face_overlap

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.show.stepping import COLOR_NAMES, COLORS, FACES, Cursor
 from apo_bench.simulation.film.film import FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG, framing
 from apo_bench.simulation.film.meshes import BodyMesh, body_meshes, body_poses, part_meshes

@@ -6,11 +6,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from apo_bench.assembly.goals import Layout, placements
-from apo_bench.assembly.graph import Arc, Graph, relation_graph
-from apo_bench.assembly.joint_play import joint_play_mm
-from apo_bench.assembly.touching import touched_contacts
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Arc, Graph, Layout, joint_play_mm, placements, relation_graph, touched_contacts
+from apo_bench.geometry import Array
 from apo_bench.insertion.states import classify
 from apo_bench.io.words import listed_words
 from apo_bench.judging.rules import fixtures

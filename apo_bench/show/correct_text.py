@@ -4,12 +4,10 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Consistency, Correction
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Consistency, Correction, Observation
 from apo_bench.correction.explanation import Explanation
 from apo_bench.files.json_forms import covariance_form, pose_form
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.show.explain_text import explanation_form, sentences, total
 
 _CORRECTION = "apo-bench/correction/1"

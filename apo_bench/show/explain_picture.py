@@ -5,11 +5,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Observation
 from apo_bench.correction.directions import Direction
 from apo_bench.correction.explanation import Explanation, OperationExplanation
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import Solid, extent, world_bounds
+from apo_bench.geometry import Array, Solid, extent, world_bounds
 from apo_bench.io.figures import default_looks, save_figure
 from apo_bench.io.words import listed_words, with_article
 from apo_bench.scenario.scenario import Scenario

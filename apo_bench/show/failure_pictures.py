@@ -13,20 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Contact
-from apo_bench.assembly.touching import outline_points
+from apo_bench.assembly import Contact, Poses, outline_points
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.solid import world_bounds
+from apo_bench.geometry import pose, world_bounds
 from apo_bench.io.reading import each_line
-from apo_bench.records.row import Row
+from apo_bench.records import Row, Salt, TrialSettings, row_key, settings_of
 from apo_bench.records.run.own_code import left_out, own_code
 from apo_bench.records.run.replay_command import Files
 from apo_bench.records.run.validation import row_of
-from apo_bench.records.salt import Salt
-from apo_bench.records.setting_columns import row_key, settings_of
-from apo_bench.records.settings import TrialSettings
 from apo_bench.report.run.trials import FailurePicture
 from apo_bench.show.axes import axis_marks
 

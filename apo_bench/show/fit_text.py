@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.io.words import columns
 from apo_bench.observation.fitting.fit import PERCENTILES, Figures, outliers_by_score
 from apo_bench.observation.models.fitted import MeasuredNoise

@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, placements
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Demonstration, placements
+from apo_bench.geometry import Array, pose
 from apo_bench.io.figures import default_looks
 from apo_bench.names import resolve
 from apo_bench.observation.models.camera import Camera

@@ -9,11 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Plan, placements
-from apo_bench.assembly.topology import spelled
+from apo_bench.assembly import Plan, placements, spelled
 from apo_bench.files.json_forms import pose_form
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.insertion.arrival import Arrival, turning_state
 from apo_bench.insertion.macros import Macro
 from apo_bench.insertion.operations import OperationMacros

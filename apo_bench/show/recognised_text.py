@@ -3,8 +3,7 @@
 from math import degrees
 from typing import Any
 
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.topology import Assembly, Contact
+from apo_bench.assembly import Assembly, Contact, Observation
 from apo_bench.recognition.evidence import Evidence, Recognised
 from apo_bench.trial.recognised_contacts import count_contacts
 

@@ -10,10 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.goals import Plan, placements
+from apo_bench.assembly import Plan, placements
 from apo_bench.files.robot_frames import RobotFrames
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.scenario.scenario import Grasp, Scenario
 from apo_bench.show.plan_text import PlanLine
 

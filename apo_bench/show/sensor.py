@@ -8,15 +8,14 @@ from typing import Any, final
 
 import numpy as np
 
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly
 from apo_bench.depth_camera.distance import strike_distances
 from apo_bench.depth_camera.follow import Event
 from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.io.figures import default_looks, save_figure
-from apo_bench.records.settings import RANGE, check
+from apo_bench.records import RANGE, check
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.simulation.sensor.watch import DemonstrationImages

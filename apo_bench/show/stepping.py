@@ -5,8 +5,7 @@ from typing import Literal, final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses, placements
-from apo_bench.assembly.topology import PartFace
+from apo_bench.assembly import PartFace, Poses, placements
 from apo_bench.geometry import pose
 from apo_bench.simulation.film.film import operation_words
 from apo_bench.simulation.film.still import Chapter, Color, FilmMoment, Ghost, Still, part_poses

@@ -8,12 +8,10 @@ from typing import Literal
 
 from apo_bench.errors import InputError
 from apo_bench.io.reading import each_line
-from apo_bench.records.row import Row
+from apo_bench.records import Row, read_salt, settings_of
 from apo_bench.records.run.own_code import own_code
 from apo_bench.records.run.run_file import read_run
 from apo_bench.records.run.validation import row_of
-from apo_bench.records.salt import read_salt
-from apo_bench.records.setting_columns import settings_of
 from apo_bench.report.run.facts import scenario_files
 from apo_bench.show.browser import PORT, no_browser, serve_story
 from apo_bench.show.stepping import Cursor

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 
 def frame(R: ArrayLike, position: ArrayLike) -> Array:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, NamedTuple, final
 
-from apo_bench.assembly.goals import Plan, Step
+from apo_bench.assembly import Plan, Step
 
 TICK_S = 0.02
 """How often the arm looks for trouble and a film takes a picture."""

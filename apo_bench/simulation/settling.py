@@ -15,13 +15,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.goals import Observation
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.solid import Solid
-from apo_bench.records.outcomes import sentence
+from apo_bench.assembly import Correction, Observation
+from apo_bench.geometry import Array, Solid, physical_pieces, pose
+from apo_bench.records import sentence
 from apo_bench.simulation.physics import Physics, physics, set_contact, set_options
 from apo_bench.simulation.scene.geoms import add_pieces, set_mass
 from apo_bench.simulation.scene.world import World, has_failed, initial_state, part_pose, place, world

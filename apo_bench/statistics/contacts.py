@@ -7,9 +7,7 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.records.method import knows_relations
-from apo_bench.records.relations import RECOGNISED
-from apo_bench.records.row import Row, look_up
+from apo_bench.records import RECOGNISED, Row, knows_relations, look_up
 from apo_bench.statistics.forecasts import ALL
 from apo_bench.statistics.rates import Place, Rate, order, place_of
 

@@ -6,8 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import final
 
-from apo_bench.records.method import knows_truth
-from apo_bench.records.row import Row
+from apo_bench.records import Row, knows_truth
 from apo_bench.statistics.rates import Rate, by_method, rank, rank_relations
 
 ALL = "all"

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.statistics.paired import mcnemar, tango
 from apo_bench.statistics.power import ERROR, least_discordant, paired_trials
 from apo_bench.statistics.rates import CONFIDENCE, Interval, wilson

@@ -8,9 +8,8 @@ from typing import Any, TypeVar, final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
-from apo_bench.records.method import knows_relations, knows_truth, may_look
-from apo_bench.records.row import Row
+from apo_bench.geometry import Array
+from apo_bench.records import Row, knows_relations, knows_truth, may_look
 from apo_bench.statistics.rates import CONFIDENCE, Interval, Place, Rate, by_place, order
 
 K = TypeVar("K", bound=Hashable)

@@ -13,7 +13,7 @@ from typing import final
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.statistics.paired import normal_quantile, score
 from apo_bench.statistics.rates import Interval, wilson
 

@@ -1,6 +1,6 @@
 """How rates, differences and levels are said."""
 
-from apo_bench.records.settings import RANGE
+from apo_bench.records import RANGE
 from apo_bench.statistics.rates import Cell, Interval, Rate
 
 

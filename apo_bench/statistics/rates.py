@@ -10,10 +10,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar, final
 
 from apo_bench.errors import InputError
-from apo_bench.records.method import parsed
-from apo_bench.records.row import Row
-from apo_bench.records.salt import one_salt
-from apo_bench.records.settings import TrialSettings
+from apo_bench.records import Row, TrialSettings, one_salt, parsed
 
 CONFIDENCE = 0.95
 Line = TypeVar("Line", bound=Mapping[str, Any])

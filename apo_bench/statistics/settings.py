@@ -3,9 +3,7 @@
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
-from apo_bench.records.method import knows_relations, knows_truth, may_look
-from apo_bench.records.robot_error import NO_ROBOT_ERROR
-from apo_bench.records.settings import RANGE, USUAL
+from apo_bench.records import NO_ROBOT_ERROR, RANGE, USUAL, knows_relations, knows_truth, may_look
 from apo_bench.statistics.rate_text import level_label
 from apo_bench.statistics.rates import Place, rank_relations
 

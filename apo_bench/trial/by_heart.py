@@ -7,9 +7,8 @@ goals of a layout are, it builds the same assembly.
 import numpy as np
 from scipy.optimize import least_squares
 
-from apo_bench.assembly.goals import Observation
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Observation
+from apo_bench.geometry import Array, pose
 
 
 def goals_by_heart(nominal: Array, observation: Observation) -> Array:

@@ -10,12 +10,10 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly import Correction, Observation, Plan, goals_in_force
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Observation, Plan, goals_in_force
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.prediction.failure import predict
 from apo_bench.prediction.measures import Measure, measures
 from apo_bench.scenario.scenario import Scenario

@@ -14,16 +14,15 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.equations import Equations, equations
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Equations, Observation
+from apo_bench.assembly.equations import equations
 from apo_bench.correction.robust.hypotheses import UNKNOWN
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
 from apo_bench.correction.solvers.gauss_newton import nearest_goals
 from apo_bench.correction.solvers.inequalities import Inequalities, demanded, violations
 from apo_bench.correction.solvers.posterior import freedom
 from apo_bench.correction.solvers.whitened import noise_factor, twists_of
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 
 _TRIED = 32
 _BEGUN = 4

@@ -19,7 +19,7 @@ from typing import final
 import numpy as np
 
 from apo_bench import __version__
-from apo_bench.assembly.goals import Demonstration, Layout
+from apo_bench.assembly import Demonstration, Layout
 from apo_bench.errors import InputError
 from apo_bench.io.documents import parse_json
 from apo_bench.io.reading import read_text

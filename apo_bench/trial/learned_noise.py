@@ -9,13 +9,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Observation
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.learning.evidence import UNITS, readings
 from apo_bench.correction.learning.likelihood import LearnedNoise, ObservedErrors, learn_noise
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.observation.fitting.components import COMPONENTS, component_factors, view_ways
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.fitted import ConstantError, MeasuredNoise, ViewNoise, view_frame

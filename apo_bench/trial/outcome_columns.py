@@ -3,12 +3,9 @@
 import math
 from collections.abc import Iterable
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.goals import Observation, Plan
-from apo_bench.assembly.reached import InHand, Snapshot
+from apo_bench.assembly import Correction, InHand, Observation, Plan, Snapshot
 from apo_bench.correction.region import contains_truth
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.observation.relations import culprit
 from apo_bench.records import MovedInHand, Row, finite
 from apo_bench.trial.planning import MethodResult

@@ -6,12 +6,9 @@ from typing import Any, final
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction, Look
-from apo_bench.assembly.equations import largest_gap
-from apo_bench.assembly.goals import Observation, Plan
-from apo_bench.assembly.reached import Outcome
+from apo_bench.assembly import Correction, Look, Observation, Outcome, Plan, largest_gap
 from apo_bench.correction.own_code.own import correct_named
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.prediction.failure import predict
 from apo_bench.records import with_simulated
 from apo_bench.scenario.layout import layout_at

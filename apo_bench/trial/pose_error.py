@@ -2,14 +2,10 @@
 
 import numpy as np
 
+from apo_bench.assembly import Assembly, Poses, Reached
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.reached import Reached
-from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.solvers.newton import LENGTH_M
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.symmetry import turned_alike
+from apo_bench.geometry import Array, pose, turned_alike
 
 _RANK_CUT_OFF = 1e-7
 """At consistent goals the singular values of free directions are rounding; those of fixed ones are far above this."""

@@ -11,8 +11,7 @@ The truth, the robot and the judge keep the relations of the scenario.
 
 from dataclasses import replace
 
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.topology import Assembly, Contact
+from apo_bench.assembly import Assembly, Contact, Observation
 from apo_bench.correction.correctors import correct
 from apo_bench.observation.models.isotropic import floored
 from apo_bench.recognition.contacts import recognise

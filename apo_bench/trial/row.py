@@ -8,7 +8,7 @@ from dataclasses import asdict
 from itertools import dropwhile
 from typing import cast
 
-from apo_bench.assembly.reached import Outcome
+from apo_bench.assembly import Outcome
 from apo_bench.io.plain_text import clean
 from apo_bench.records import ENV_ID, LONGEST_SENTENCE, ROW, ROW_FIELDS, Row, TrialSettings, sentence, setting_columns
 from apo_bench.scenario.file import load_scenario

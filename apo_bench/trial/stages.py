@@ -11,11 +11,8 @@ from typing import TYPE_CHECKING, Any, final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, Layout, Observation, Plan
-from apo_bench.assembly.reached import Outcome, ReplayResult
-from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Assembly, Demonstration, Layout, Observation, Outcome, Plan, ReplayResult
+from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import Verdict, judge
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Noise

@@ -6,8 +6,8 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation, Poses, placements
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Observation, Poses, placements
+from apo_bench.geometry import Array
 from apo_bench.records import RANGE, Row, TrialSettings
 from apo_bench.scenario.layout import layout_at
 from apo_bench.simulation.film.still import Chapter, FilmTrack, scenario_chapter

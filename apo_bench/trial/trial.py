@@ -2,11 +2,11 @@
 
 from typing import Any, cast
 
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Observation
 from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.correction.own_code.own import CorrectorLost
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.observation.relations import make_relations, with_relations

@@ -9,8 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from benchmarks.corrector_bench.problems import Problem
 
 LEVELS = {"2/1": (2.0, 1.0), "5/3": (5.0, 3.0), "10/8": (10.0, 8.0), "20/20": (20.0, 20.0)}

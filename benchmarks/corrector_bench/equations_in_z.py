@@ -7,9 +7,9 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.equations import Equations
+from apo_bench.assembly import Equations
 from apo_bench.correction.solvers.whitened import Whitened
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 
 @final

@@ -10,9 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.twist import right_jacobian
+from apo_bench.geometry import Array, pose, right_jacobian
 from benchmarks.corrector_bench.draws import Draw, factors
 from benchmarks.corrector_bench.problems import Problem
 

@@ -11,11 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly, Correction, Observation
 from apo_bench.correction.solvers.compact import CompactEquations
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from benchmarks.corrector_bench.draws import Draw, factors
 from benchmarks.corrector_bench.peers import Run, Task
 from benchmarks.corrector_bench.problems import Problem

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from apo_bench.assembly.equations import Equations
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Equations
+from apo_bench.geometry import Array
 from benchmarks.corrector_bench.problems import Problem
 
 

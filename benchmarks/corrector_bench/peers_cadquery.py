@@ -20,14 +20,10 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.equations import largest_gap
-from apo_bench.assembly.goals import Observation, Poses, placements
-from apo_bench.assembly.topology import Assembly, PartFace, Relation
+from apo_bench.assembly import Assembly, Correction, Observation, PartFace, Poses, Relation, largest_gap, placements
 from apo_bench.correction.baselines.measured import as_it_ends
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import all_boxes
+from apo_bench.geometry import Array, all_boxes
 from apo_bench.records import outcomes
 
 _MM = 1e3

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
+from apo_bench.assembly import Observation
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Observation
 from apo_bench.correction.baselines.least_squares import CONTACT_M, EVALUATIONS
 from apo_bench.correction.solvers.whitened import whitened
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 TOLERANCE = 1e-12
 

@@ -17,14 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.equations import Equations, equations
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Correction, Equations, Observation
+from apo_bench.assembly.equations import equations
 from apo_bench.correction.baselines.least_squares import CONTACT_M
 from apo_bench.correction.baselines.measured import as_it_ends
 from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 _TOLERANCE = 1e-12
 TURNS = 100

@@ -19,12 +19,9 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.equations import Equations, equations
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Assembly, Contact, Operation, PartFace
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import Box, Face, Solid
+from apo_bench.assembly import Assembly, Contact, Equations, Operation, PartFace, Poses
+from apo_bench.assembly.equations import equations
+from apo_bench.geometry import Array, Box, Face, Solid, pose
 from apo_bench.parts.load import load_part
 from apo_bench.scenario.file import load_scenario
 

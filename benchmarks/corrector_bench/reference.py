@@ -12,10 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.equations import Equations
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.twist import right_jacobian
+from apo_bench.assembly import Equations
+from apo_bench.geometry import Array, pose, right_jacobian
 from benchmarks.corrector_bench.draws import Draw, factors
 from benchmarks.corrector_bench.measures import lengths
 from benchmarks.corrector_bench.problems import Problem

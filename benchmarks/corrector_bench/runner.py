@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 ROOT = Path(__file__).resolve().parents[2]
 LIMIT_S = 60.0

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from apo_bench.correction.region import contains_truth
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from benchmarks.corrector_bench.draws import Draw, draw, factors
 from benchmarks.corrector_bench.measures import free_basis, lengths, spread
 from benchmarks.corrector_bench.own import corrected, observation

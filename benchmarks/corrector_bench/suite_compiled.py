@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import apo_bench
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Observation
 from apo_bench.geometry import pose
 from apo_bench.scenario.scenario import Scenario
 from benchmarks.corrector_bench.draws import LEVELS

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from benchmarks.corrector_bench.door import CONTACT, MANY, OPEN_M, UNCOMPILED, YARDSTICK
 from benchmarks.corrector_bench.problems import FIGURES
 from benchmarks.corrector_bench.rows import Row

@@ -9,12 +9,9 @@ from functools import cache
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.topology import Assembly, Operation
+from apo_bench.assembly import Assembly, Correction, Observation, Operation
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from benchmarks.corrector_bench.draws import draw
 from benchmarks.corrector_bench.own import corrected, observation
 from benchmarks.corrector_bench.problems import lined_up, problem

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from benchmarks.corrector_bench import own
 from benchmarks.corrector_bench.draws import Draw, draw
 from benchmarks.corrector_bench.measures import quality

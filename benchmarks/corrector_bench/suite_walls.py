@@ -13,9 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import nnls
 
-from apo_bench.assembly.topology import Assembly, Contact, Gap
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Assembly, Contact, Gap
+from apo_bench.geometry import Array, pose
 from benchmarks.corrector_bench.draws import Draw, draw, factors
 from benchmarks.corrector_bench.equations_in_z import InZ
 from benchmarks.corrector_bench.measures import lengths

@@ -12,8 +12,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry.solid import Face
+from apo_bench.assembly import Assembly
+from apo_bench.geometry import Face
 from benchmarks.corrector_bench.draws import LEVELS, draw
 from benchmarks.corrector_bench.own import corrected, observation
 from benchmarks.corrector_bench.problems import FIGURES, Problem, problem

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from benchmarks.corrector_bench.draws import draw
 from benchmarks.corrector_bench.peers import Peer, Task, peers
 from benchmarks.corrector_bench.problems import problem

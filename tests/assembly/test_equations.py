@@ -8,13 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench.assembly.equations import Equations, equations, largest_gap
-from apo_bench.assembly.goals import placements
-from apo_bench.assembly.lowering import lowered
-from apo_bench.assembly.topology import Assembly, Contact, Operation, PartFace
+from apo_bench.assembly import Assembly, Contact, Equations, Operation, PartFace, largest_gap, lowered, placements
+from apo_bench.assembly.equations import equations
 from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, displacement, least_step
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.geometry.overlap import overlap
 from tests import rounds, scenes
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from apo_bench.assembly.equations import largest_gap
-from apo_bench.assembly.graph import Graph, arc_residuals, relation_graph
-from apo_bench.assembly.topology import product, simplified, spelled
+from apo_bench.assembly import Graph, arc_residuals, largest_gap, product, relation_graph, simplified, spelled
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from tests import scenes

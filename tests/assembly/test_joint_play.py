@@ -8,16 +8,11 @@ from math import radians, sin
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Poses, placements
-from apo_bench.assembly.joint_play import joint_play_mm
-from apo_bench.assembly.kinds import contact_kind
-from apo_bench.assembly.topology import Contact
-from apo_bench.geometry import pose
-from apo_bench.geometry.intrusion import intrusion_depths
-from apo_bench.geometry.overlap import Overlap
+from apo_bench.assembly import Contact, Poses, contact_kind, joint_play_mm, placements
+from apo_bench.geometry import Overlap, intrusion_depths, pose
 from apo_bench.judging.contacts import ContactJudge
 from apo_bench.prediction.interference import physical_solids
-from apo_bench.records.thresholds import Thresholds
+from apo_bench.records import Thresholds
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 from tests.end_states import CASTLES, CLEARANCE_MM

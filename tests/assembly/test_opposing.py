@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import placements
+from apo_bench.assembly import looking_away, placements
 from apo_bench.assembly.kinds import OPPOSING
-from apo_bench.assembly.pattern import looking_away
 from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.many import correct_many

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly.shared_error import SharedError, first_order, joint_covariance
+from apo_bench.assembly import SharedError, first_order, joint_covariance
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise
 from tests import scenes

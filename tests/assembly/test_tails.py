@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench.assembly.tails import Tails
+from apo_bench.assembly import Tails
 from apo_bench.geometry import pose
 
 FRAMES = np.array([pose.at((0.0, 0.0, 0.0), turn)[:3, :3] for turn in ((20.0, -30.0, 70.0), (0.0, 90.0, 10.0))])

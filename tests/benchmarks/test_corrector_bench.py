@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 
 from apo_bench.assembly.equations import equations
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.twist import right_jacobian
+from apo_bench.geometry import Array, pose, right_jacobian
 from benchmarks.corrector_bench import door, suite_door, suite_walls
 from benchmarks.corrector_bench.draws import draw
 from benchmarks.corrector_bench.measures import free_basis, freedom_error, lengths, quality, spread

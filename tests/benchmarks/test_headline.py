@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from apo_bench.records.settings import ROW
-from apo_bench.statistics.rates import Cell, tally
+from apo_bench.records import ROW
+from apo_bench.statistics import Cell, tally
 from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.sweeps.sweep_file import read_sweep
 from benchmarks import headline

@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from apo_bench.cli import app as cli
+from apo_bench.records import ROW
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.records.settings import ROW
 from apo_bench.scenario.file import load_scenario, scenario_names
 
 TRIAL = ("replay", "stick_in_tower", "--seed", "5", "--grasp", "weld", "--method", "none")
@@ -100,7 +100,7 @@ def test_a_graph_says_what_was_not_seen(capsys: pytest.CaptureFixture[str], tmp_
 
 def _castle_aside(folder: Path, mm: float) -> Path:
     """An observation of example 5.1 that is right but for the upper castle, which stands aside along y."""
-    from apo_bench.assembly.goals import Observation
+    from apo_bench.assembly import Observation
     from apo_bench.files.json_forms import observation_form, write_form
     from apo_bench.geometry import pose
 
@@ -146,8 +146,7 @@ def test_the_method_that_is_not_named_is_the_same_everywhere() -> None:
     from apo_bench.cli.show import show_command
     from apo_bench.correction.correctors import correct
     from apo_bench.envs.corrected import Corrected
-    from apo_bench.records.settings import TrialSettings
-    from apo_bench.records.short_names import CORRECTOR
+    from apo_bench.records import CORRECTOR, TrialSettings
     from apo_bench.sweeps.grid import SweepSettings
 
     asked = signature(correct_command, eval_str=True).parameters["method"]

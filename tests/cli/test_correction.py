@@ -11,9 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly.correction_record import Consistency, Correction
-from apo_bench.assembly.equations import largest_gap
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Consistency, Correction, Observation, largest_gap
 from apo_bench.cli import app as cli
 from apo_bench.files.json_forms import observation_form, write_form
 from apo_bench.files.json_reading import read_plan

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Plan, Step, placements
+from apo_bench.assembly import Plan, Step, placements
 from apo_bench.cli import app as cli
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose

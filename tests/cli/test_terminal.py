@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from apo_bench.assembly.reached import Outcome
+from apo_bench.assembly import Outcome
 from apo_bench.cli.terminal import print_cells, print_row
-from apo_bench.statistics.rates import tally
+from apo_bench.statistics import tally
 from apo_bench.trial.row import result
 from tests.statistics.test_rates import row
 

@@ -9,16 +9,14 @@ from typing import Any
 import numpy as np
 import pytest
 
+from apo_bench.assembly import Assembly, Observation, Operation
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.topology import Assembly, Operation
 from apo_bench.correction.baselines.intruding import intruding, meeting
 from apo_bench.correction.baselines.least_squares import least_squares
 from apo_bench.correction.baselines.penalty import loss
 from apo_bench.correction.correctors import correct
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.geometry.intrusion import intrusion
 from apo_bench.simulation.settling import settle
 from tests import scenes

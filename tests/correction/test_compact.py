@@ -11,12 +11,10 @@ from hypothesis import assume, example, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench.assembly.equations import Equations, equations
-from apo_bench.assembly.goals import placements
-from apo_bench.assembly.topology import product
+from apo_bench.assembly import Equations, placements, product
+from apo_bench.assembly.equations import equations
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, moments
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from tests import scenes
 from tests.assembly.test_equations import long_words, random_scene
 

@@ -10,10 +10,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly import Assembly, Correction, Observation
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.topology import Assembly
 from apo_bench.correction.contact import ContactCorrector, Doubt
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.many import correct_many
@@ -22,8 +20,7 @@ from apo_bench.correction.solvers.compact import CompactEquations, compact_equat
 from apo_bench.correction.solvers.gauss_newton import NearestGoals, nearest_goals
 from apo_bench.correction.solvers.linear_step import DenseStep
 from apo_bench.correction.solvers.whitened import coordinates_of
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.scenario.file import load_scenario
 from tests import scenes
 

@@ -8,16 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from apo_bench.assembly import Assembly, Gap, Observation, placements
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Observation, placements
-from apo_bench.assembly.topology import Assembly, Gap
 from apo_bench.correction.contact import contact
 from apo_bench.correction.directions import Direction, directions, held
 from apo_bench.correction.explanation import Explanation, explain
 from apo_bench.correction.solvers.newton import solve_newton
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.scenario.scenario import Scenario
 from benchmarks.corrector_bench import problems

@@ -10,15 +10,13 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.sparse import csr_array
 
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.topology import Assembly, Operation
+from apo_bench.assembly import Assembly, Observation, Operation
 from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.solvers import posterior, sparse
 from apo_bench.correction.solvers.compact import CompactEquations
 from apo_bench.correction.solvers.gauss_newton import NearestGoals, batch_goals, nearest_goals
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import Solid
+from apo_bench.geometry import Array, Solid
 from benchmarks.corrector_bench.draws import draw
 from benchmarks.corrector_bench.problems import problem
 from tests import scenes

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly import Demonstration, Observation
 from apo_bench.cli.app import main
 from apo_bench.correction.learning import likelihood
 from apo_bench.correction.learning.evidence import UNITS, readings

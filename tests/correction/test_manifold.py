@@ -9,13 +9,12 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import least_squares, minimize
 
-from apo_bench.assembly.equations import Equations, equations
-from apo_bench.assembly.topology import Operation
+from apo_bench.assembly import Equations, Operation
+from apo_bench.assembly.equations import equations
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
 from apo_bench.correction.solvers.gauss_newton import LARGEST_TURN, STEP, NearestGoals, nearest_goals, shortened_step
 from apo_bench.correction.solvers.posterior import jacobian_rank
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from tests import scenes
 
 pytestmark = pytest.mark.numeric

@@ -9,18 +9,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly import Correction, Gap, Observation
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.pattern import pattern
-from apo_bench.assembly.topology import Gap
 from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.many import BATCH, correct_many
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
 from apo_bench.correction.solvers.laid import laid_contacts
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from tests import scenes
 from tests.assembly.test_equations import random_scene
 from tests.correction.test_consistency import shifted

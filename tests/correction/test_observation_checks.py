@@ -10,14 +10,12 @@ import numpy as np
 import pytest
 
 import apo_bench
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.equations import largest_gap
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Correction, Observation, largest_gap
 from apo_bench.correction.contact import contact
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.many import correct_many
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from tests import scenes
 
 pytestmark = pytest.mark.numeric

@@ -19,8 +19,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.goals import Layout, Observation
+from apo_bench.assembly import Correction, Layout, Observation
 from apo_bench.correction.correctors import CorrectorMisbehaved, correct
 from apo_bench.correction.own_code import own
 from apo_bench.correction.own_code import process as own_process
@@ -35,7 +34,7 @@ from apo_bench.correction.own_code.own import CorrectorLost, OwnCorrectors
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.io.processes import descendants
-from apo_bench.records.settings import TrialSettings
+from apo_bench.records import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.sweeps.work.environment_lock import EnvironmentLock

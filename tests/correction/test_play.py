@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from apo_bench.assembly import Demonstration, Observation
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Demonstration, Observation
 from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.consistency import fit_deviation, softened_length
 from apo_bench.correction.contact import contact_refuse

@@ -11,16 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.topology import Gap, Operation
+from apo_bench.assembly import Correction, Gap, Observation, Operation
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.many import correct_many
 from apo_bench.correction.region import contains_truth
 from apo_bench.correction.solvers.gauss_newton import nearest_goals
 from apo_bench.correction.solvers.posterior import freedom, jacobian_rank, marginals
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from tests import scenes
 from tests.correction.test_manifold import RANKS, crooked, jacobian, scales, system_of, twisted
 

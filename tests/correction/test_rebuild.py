@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Plan, Step
+from apo_bench.assembly import Plan, Step
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise

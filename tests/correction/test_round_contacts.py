@@ -9,11 +9,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from apo_bench.assembly.equations import equations, largest_gap
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.lowering import lowered
-from apo_bench.assembly.shared_error import SharedError
-from apo_bench.assembly.topology import Assembly, Gap, PartFace
+from apo_bench.assembly import Assembly, Gap, Observation, PartFace, SharedError, largest_gap, lowered
+from apo_bench.assembly.equations import equations
 from apo_bench.correction.contact import ContactCorrector, contact
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.explanation import explain
@@ -24,7 +21,7 @@ from apo_bench.correction.play import fit_covariance
 from apo_bench.correction.region import contains_truth
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
-from apo_bench.records.method import with_simulated
+from apo_bench.records import with_simulated
 from apo_bench.show.explain_text import sentences
 from tests.correction.robust.test_robust import shown
 from tests.round_contacts import CONTACTS, IN_BORE, LYING, MM, PLATE_AT, scene, seen, tilted, touching

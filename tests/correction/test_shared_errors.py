@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly.goals import Demonstration, Observation
-from apo_bench.assembly.shared_error import SharedError
-from apo_bench.assembly.topology import Gap
+from apo_bench.assembly import Demonstration, Gap, Observation, SharedError
 from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.explanation import explain

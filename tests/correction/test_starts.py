@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from apo_bench.assembly.equations import equations, largest_gap
-from apo_bench.assembly.pattern import looking_away
+from apo_bench.assembly import largest_gap, looking_away
+from apo_bench.assembly.equations import equations
 from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.many import correct_many

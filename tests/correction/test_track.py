@@ -11,15 +11,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.equations import largest_gap
-from apo_bench.assembly.goals import Observation, once_each
+from apo_bench.assembly import Correction, Observation, largest_gap
+from apo_bench.assembly.goals import once_each
 from apo_bench.correction.baselines.paper import paper
 from apo_bench.correction.baselines.track import nested, paper_track, reached_back
 from apo_bench.correction.correctors import correct
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.pose import is_rigid
-from apo_bench.records.outcomes import CODES
+from apo_bench.geometry import Array, is_rigid
+from apo_bench.records import CODES
 from tests import scenes
 from tests.correction.test_paper import contradiction
 

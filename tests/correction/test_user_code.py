@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly.topology import Contact, PartFace
+from apo_bench.assembly import Contact, PartFace
 from apo_bench.cli.app import main
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.errors import InputError, failed

@@ -8,9 +8,7 @@ from scipy.optimize import minimize
 from scipy.spatial import ConvexHull
 
 from apo_bench.depth_camera.distance import shape_of, signed_distance, strike_distances
-from apo_bench.geometry import pose
-from apo_bench.geometry.hull import Cylinder, Hull, cylinder_hull
-from apo_bench.geometry.solid import Box
+from apo_bench.geometry import Box, Cylinder, Hull, cylinder_hull, pose
 
 T = pose.at((0.03, -0.02, 0.05), (20.0, -40.0, 70.0))
 BOXES = (Box("a", np.array([0.01, 0.0, 0.0]), np.array([0.03, 0.01, 0.02])), Box("b", np.zeros(3), np.full(3, 0.012)))

@@ -13,17 +13,14 @@ import gymnasium
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Observation
 from apo_bench.cli.app import main
 from apo_bench.depth_camera.distance import join_shapes, shape_of, strike_distances
 from apo_bench.depth_camera.range_finder import RangeFinder
 from apo_bench.depth_camera.range_sensor import RangeSensor
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.symmetry import symmetries
-from apo_bench.records.settings import TrialSettings
+from apo_bench.geometry import Array, physical_pieces, pose, symmetries
+from apo_bench.records import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.scene.scene import Scene, build_scene

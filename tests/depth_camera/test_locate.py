@@ -7,15 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.assembly.topology import Assembly, Operation
+from apo_bench.assembly import Assembly, Operation
 from apo_bench.depth_camera.distance import Shape, join_shapes, shape_of, signed_distance, strike_distances
 from apo_bench.depth_camera.fit import PRIOR, Points, covariance, distinct, refine, starts
 from apo_bench.depth_camera.follow import Expected, follow_demonstration
 from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder, RangeImage, look_at
 from apo_bench.depth_camera.regions import median_filtered, regions, share_explained, without_small
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.symmetry import nearest_symmetric_pose, quarter_turns, symmetries
+from apo_bench.geometry import Array, nearest_symmetric_pose, pose, quarter_turns, symmetries
 from tests.scenes import block, castle, cube, mm, stick
 
 SEEDS = st.integers(0, 2**32 - 1)

@@ -13,14 +13,13 @@ import numpy as np
 import pytest
 
 import apo_bench
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Correction, Observation
 from apo_bench.envs import episode
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.spaces import as_seen_entries
 from apo_bench.errors import InputError
 from apo_bench.observation.noise import NOISES, Level, make_noise
-from apo_bench.records.settings import TrialSettings
+from apo_bench.records import TrialSettings
 from apo_bench.trial.trial import run_trial
 
 SEED = 5

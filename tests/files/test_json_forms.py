@@ -14,10 +14,7 @@ import pytest
 from hypothesis import HealthCheck, event, given, settings
 from hypothesis import strategies as st
 
-from apo_bench.assembly.goals import Observation, Plan, Step
-from apo_bench.assembly.outlier_model import OutlierModel
-from apo_bench.assembly.shared_error import SharedError, first_order
-from apo_bench.assembly.tails import Tails
+from apo_bench.assembly import Observation, OutlierModel, Plan, SharedError, Step, Tails, first_order
 from apo_bench.errors import InputError
 from apo_bench.files import json_forms as files
 from apo_bench.files import json_reading

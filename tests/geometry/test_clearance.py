@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.solid import Face, Solid
+from apo_bench.geometry import Face, Solid, physical_pieces
 from apo_bench.parts import load_part
 from apo_bench.parts.faces import SIDES, unite
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.drop import TOUCH_M, drop
-from apo_bench.geometry.solid import Box, Solid
+from apo_bench.geometry import TOUCH_M, Box, Solid, pose
+from apo_bench.geometry.drop import drop
 
 
 def cuboid(*half: float) -> Solid:

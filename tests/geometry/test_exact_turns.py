@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.hull import Hull
-from apo_bench.geometry.solid import Box, Face, Solid
-from apo_bench.geometry.symmetry import nearest_alike, nearest_symmetry, revolution, symmetries, turn_about
+from apo_bench.geometry import Box, Face, Hull, Solid, nearest_alike, pose, revolution, symmetries, turn_about
+from apo_bench.geometry.symmetry import nearest_symmetry
 from apo_bench.observation.models.level import Level
 from apo_bench.observation.models.symmetric import AnyTurn, Symmetric
 from apo_bench.trial.pose_error import goal_errors

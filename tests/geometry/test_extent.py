@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from apo_bench.geometry.solid import extent
+from apo_bench.geometry import extent
 from tests import scenes
 
 pytestmark = pytest.mark.numeric

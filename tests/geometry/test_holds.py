@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from apo_bench.geometry.holds import PAD_M, held_span, holds, holds_whole
-from apo_bench.geometry.intrusion import intrusion_depths
-from apo_bench.geometry.solid import Box, Solid
+from apo_bench.geometry import PAD_M, Box, Solid, held_span, holds_whole, intrusion_depths
+from apo_bench.geometry.holds import holds
 from apo_bench.parts.making import Frustum, bore, extrude, polygon, rectangle, shaft, solid_of, turned
 
 OPENING_M = 0.046

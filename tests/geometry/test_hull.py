@@ -8,13 +8,23 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.convex import separating_axes
-from apo_bench.geometry.hull import SAGITTA_M, Cylinder, Hull, cylinder_hull, sides_of
-from apo_bench.geometry.intrusion import intrusion, intrusion_depths
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Box, Solid, extent
-from apo_bench.geometry.swept import Posed, overlap_intervals
+from apo_bench.geometry import (
+    SAGITTA_M,
+    Box,
+    Cylinder,
+    Hull,
+    Posed,
+    RoundFace,
+    Solid,
+    cylinder_hull,
+    extent,
+    intrusion_depths,
+    physical_pieces,
+    separating_axes,
+    sides_of,
+)
+from apo_bench.geometry.intrusion import intrusion
+from apo_bench.geometry.swept import overlap_intervals
 
 
 def posed(rng: np.random.Generator, reach: float = 0.05) -> np.ndarray:

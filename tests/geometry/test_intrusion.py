@@ -7,10 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.intrusion import intrusion, intrusion_depths
-from apo_bench.geometry.solid import Box, Solid
+from apo_bench.geometry import Array, Box, Solid, intrusion_depths, pose
+from apo_bench.geometry.intrusion import intrusion
 from tests import scenes
 
 coordinates = st.floats(-0.1, 0.1)

@@ -7,10 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.geometry import pose
+from apo_bench.geometry import Face, RoundFace, pose
 from apo_bench.geometry.mate import mate
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Face
 from tests.rounds import Z, cone, cylinder, rim, square, up
 from tests.scenes import mm
 

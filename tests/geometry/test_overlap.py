@@ -7,10 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.overlap import NO_OVERLAP, beside, face_area, overlap
-from apo_bench.geometry.solid import Face
+from apo_bench.geometry import Array, Face, beside, face_area, pose
+from apo_bench.geometry.overlap import NO_OVERLAP, overlap
 from apo_bench.parts import load_part
 
 pytestmark = pytest.mark.numeric

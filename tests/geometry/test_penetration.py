@@ -8,8 +8,7 @@ from scipy.optimize import linprog
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry.hull import Cylinder, Hull, cylinder_hull
-from apo_bench.geometry.intrusion import intrusion_depths
+from apo_bench.geometry import Cylinder, Hull, cylinder_hull, intrusion_depths
 
 
 def random_hull(rng: np.random.Generator) -> Hull:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from apo_bench.geometry.polygon import straightened
+from apo_bench.geometry import straightened
 
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 

@@ -9,9 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.pose import is_rigid
+from apo_bench.geometry import Array, is_rigid, pose
 
 pytestmark = pytest.mark.numeric
 

@@ -9,9 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.solid import Box, Solid
-from apo_bench.geometry.symmetry import revolution, turned_alike
+from apo_bench.geometry import Box, Solid, pose, revolution, turned_alike
 from tests import rounds, scenes
 
 

@@ -7,12 +7,8 @@ import pytest
 from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.hull import Hull
-from apo_bench.geometry.intrusion import intrusion_depths
-from apo_bench.geometry.solid import Box, Solid
-from apo_bench.geometry.swept import Posed, exit_distance, is_way_free, overlap_intervals
+from apo_bench.geometry import Array, Box, Hull, Posed, Solid, exit_distance, intrusion_depths, is_way_free, pose
+from apo_bench.geometry.swept import overlap_intervals
 from tests import scenes
 
 X, Y, Z = np.eye(3)

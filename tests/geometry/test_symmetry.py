@@ -10,10 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import Box, Solid
-from apo_bench.geometry.symmetry import folds, nearest_symmetry, quarter_turns, symmetries
+from apo_bench.geometry import Array, Box, Solid, folds, pose, quarter_turns, symmetries
+from apo_bench.geometry.symmetry import nearest_symmetry
 from apo_bench.scenario.file import load_scenario
 from tests import scenes
 

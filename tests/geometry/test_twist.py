@@ -10,9 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.twist import GENERATORS, exp_and_jacobian, right_jacobian
+from apo_bench.geometry import GENERATORS, Array, exp_and_jacobian, pose, right_jacobian
 
 pytestmark = pytest.mark.numeric
 

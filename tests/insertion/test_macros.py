@@ -7,9 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from apo_bench.assembly.topology import Assembly, Operation
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import Solid
+from apo_bench.assembly import Assembly, Operation
+from apo_bench.geometry import Array, Solid
 from apo_bench.insertion.arrival import Arrival, arrive
 from apo_bench.insertion.line import Preference
 from apo_bench.insertion.macros import Chain, Way, chain, departure, peel

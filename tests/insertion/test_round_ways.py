@@ -8,11 +8,8 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import placements
-from apo_bench.assembly.topology import Assembly, Operation
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Box, Solid
+from apo_bench.assembly import Assembly, Operation, placements
+from apo_bench.geometry import Array, Box, RoundFace, Solid
 from apo_bench.insertion.arrival import Arrival, arrive, turning_state
 from apo_bench.insertion.line import Preference
 from apo_bench.insertion.macros import Way, chain

@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.symmetry import revolution, symmetries
+from apo_bench.geometry import pose, revolution, symmetries
 from apo_bench.judging.rules import fixtures
 from tests import audited_more_rounds, audited_rounds, audited_wholes, rounds, scenes
 from tests.audited_states import DIFFERS as FLAT_DIFFERS

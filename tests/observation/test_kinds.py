@@ -9,11 +9,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly import Demonstration, Observation
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.symmetry import symmetries
+from apo_bench.geometry import Array, pose, symmetries
 from apo_bench.observation.models import shared
 from apo_bench.observation.models.anisotropic import Sighted, line_of_sight
 from apo_bench.observation.models.camera import CAMERA_DISTANCE_M, WORKSPACE_MIDDLE_M, Camera

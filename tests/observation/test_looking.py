@@ -5,7 +5,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Demonstration
+from apo_bench.assembly import Demonstration
 from apo_bench.errors import InputError
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level, make_noise

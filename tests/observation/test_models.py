@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench.assembly.goals import Observation
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Observation
+from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.anisotropic import (
     ACROSS_SIGHT,
     ALONG_SIGHT,

@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench.assembly.goals import Demonstration, Observation
+from apo_bench.assembly import Demonstration, Observation
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.isotropic import COVARIANCE_FLOOR, Isotropic, floored
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.observing import observe

@@ -12,8 +12,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench.cli.app import main
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.isotropic import COVARIANCE_FLOOR
 from apo_bench.observation.noise import NOISES, Level, Plain, make_noise
 from apo_bench.observation.observing import observe

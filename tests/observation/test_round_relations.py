@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from apo_bench.assembly.topology import Assembly, Contact, PartFace
+from apo_bench.assembly import Assembly, Contact, PartFace
 from apo_bench.correction.correctors import correct
 from apo_bench.errors import InputError
 from apo_bench.observation.relations import Shifted, culprit, false, missed, with_relations

@@ -11,7 +11,7 @@ import shapely
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry.solid import Solid
+from apo_bench.geometry import Solid
 from apo_bench.parts import load_part
 from apo_bench.parts.check import check_matter
 from apo_bench.parts.making import (

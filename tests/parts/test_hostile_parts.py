@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.solid import Box
+from apo_bench.geometry import Box
 from apo_bench.parts import load_part, part_names, part_path, read_part
 from apo_bench.parts.allowed import ELEMENT_RULES, LARGEST_PART_BYTES, MOST_FACES, MOST_PIECES, MOST_SITES
 from apo_bench.parts.check import check_solid
@@ -238,7 +238,7 @@ spans = st.lists(st.tuples(*[st.integers(0, 3)] * 3, *[st.integers(1, 3)] * 3), 
 @settings(max_examples=30, deadline=None)
 def test_a_mesh_of_the_same_boxes_agrees(spans: list[tuple[int, ...]]) -> None:
     """Also where the surface touches itself along an edge or in a corner."""
-    from apo_bench.geometry.solid import Solid
+    from apo_bench.geometry import Solid
     from apo_bench.parts.load import _face, _number
 
     boxes = [

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.solid import Box
+from apo_bench.geometry import Box, physical_pieces
 from apo_bench.parts import load_part
 from apo_bench.parts.making import (
     Body,

@@ -12,8 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.overlap import face_area
-from apo_bench.geometry.solid import Box, Face
+from apo_bench.geometry import Box, Face, face_area
 from apo_bench.parts import load_part, part_names, part_path
 from apo_bench.parts.faces import SIDES, unite
 

@@ -9,15 +9,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.assembly.goals import Plan, Step, placements
-from apo_bench.assembly.topology import Assembly, Operation
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Assembly, Operation, Plan, Step, placements
+from apo_bench.geometry import Array, pose
 from apo_bench.insertion.line import Attach
 from apo_bench.prediction.arm import ArmMove
 from apo_bench.prediction.failure import Prediction, predict
 from apo_bench.prediction.resting import is_support, residual, resting_poses
-from apo_bench.records.thresholds import Thresholds
+from apo_bench.records import Thresholds
 from apo_bench.scenario.file import load_scenario
 from tests import rounds, scenes
 from tests.scenes import touch

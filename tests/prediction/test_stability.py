@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from apo_bench.assembly.topology import Operation
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Operation
+from apo_bench.geometry import Array, pose
 from apo_bench.prediction.stability import first_unstable
 from tests import rounds, scenes
 

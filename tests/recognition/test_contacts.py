@@ -11,14 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from apo_bench.assembly import Assembly, Contact, Facing, Gap, Observation, Operation, placements
 from apo_bench.assembly.facing import facing
-from apo_bench.assembly.facing_round import Facing
-from apo_bench.assembly.goals import Observation, placements
-from apo_bench.assembly.topology import Assembly, Contact, Gap, Operation
 from apo_bench.correction.correctors import correct
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.solid import Solid
+from apo_bench.geometry import Solid, pose
 from apo_bench.observation.models.isotropic import floored
 from apo_bench.recognition.belief import Belief, initial_belief
 from apo_bench.recognition.contacts import recognise

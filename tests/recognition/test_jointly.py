@@ -10,14 +10,12 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal
 
+from apo_bench.assembly import Assembly, Contact, Observation, Operation, PartFace
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.topology import Assembly, Contact, Operation, PartFace
 from apo_bench.correction.contact import ContactCorrector
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.hull import Hull
-from apo_bench.geometry.intrusion import intrusion, ways_out
+from apo_bench.geometry import Hull, pose, ways_out
+from apo_bench.geometry.intrusion import intrusion
 from apo_bench.recognition.estimate import estimate
 from apo_bench.recognition.jointly import recognise_jointly
 from tests import rounds, scenes

@@ -10,14 +10,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from apo_bench.assembly import Facing, contact_kind, measure_round, placements, round_pairs
 from apo_bench.assembly.facing import facing
-from apo_bench.assembly.facing_round import Facing, measure_round, round_pairs
-from apo_bench.assembly.goals import placements
-from apo_bench.assembly.kinds import contact_kind
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Face
+from apo_bench.geometry import Array, Face, RoundFace, pose
 from apo_bench.recognition.contacts import recognise
 from apo_bench.recognition.thresholds import FIXED_RULES, Rules, pair_thresholds, reality, slack
 from tests import rounds, scenes

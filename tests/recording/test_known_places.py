@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.recording.averaging import Mean
 from apo_bench.recording.camera_pose import CameraPose, solve_camera
 from apo_bench.recording.contact_fit import contact_fit

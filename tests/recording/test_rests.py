@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.recording.log import PoseTrack
 from apo_bench.recording.rests import LEAST_REST_S, rests_of
 from apo_bench.recording.stays import poses_at, stays_of

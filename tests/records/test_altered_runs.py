@@ -17,7 +17,7 @@ from apo_bench.records.run.run_file import read_run
 from apo_bench.report import report as reports
 from apo_bench.report.comparison.compare import compare
 from apo_bench.report.comparison.text import comparison_form
-from apo_bench.statistics.effort import read_timing
+from apo_bench.statistics import read_timing
 from tests.altered import FILES, altered
 
 KEPT = Path(__file__).parents[1] / "kept" / "row7"

@@ -8,9 +8,8 @@ from typing import Any
 
 import pytest
 
-from apo_bench.records.row import REQUIRED, ROW_FIELDS
+from apo_bench.records import REQUIRED, ROW_FIELDS, TrialSettings
 from apo_bench.records.run.validation import TIMING_FIELDS, row_of, timing_of, unwritable
-from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.sweeps.work.worker import timing

@@ -19,13 +19,12 @@ from typing import Any
 
 import pytest
 
-from apo_bench.assembly.reached import Outcome
+from apo_bench.assembly import Outcome
 from apo_bench.errors import InputError
+from apo_bench.records import KEY, ROW
 from apo_bench.records.run import run_folder
 from apo_bench.records.run.run_file import run_record
 from apo_bench.records.run.run_folder import RunFolder, read_rows
-from apo_bench.records.setting_columns import KEY
-from apo_bench.records.settings import ROW
 from apo_bench.sweeps.work.environment_lock import versions
 from apo_bench.trial.fingerprint import code_files
 from apo_bench.trial.row import result

@@ -16,10 +16,18 @@ from apo_bench.cli import app as cli
 from apo_bench.cli.setting_options import sweep_options, trial_options
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.errors import InputError
-from apo_bench.records.row import REQUIRED, ROW_FIELDS, look_up
+from apo_bench.records import (
+    KEY,
+    LEVEL,
+    REQUIRED,
+    ROW_FIELDS,
+    SETTINGS,
+    TrialSettings,
+    look_up,
+    setting_columns,
+    settings_of,
+)
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.records.setting_columns import KEY, setting_columns, settings_of
-from apo_bench.records.settings import LEVEL, SETTINGS, TrialSettings
 from apo_bench.report.comparison.compare import compare
 from apo_bench.sweeps.grid import SweepSettings
 from apo_bench.sweeps.sweep_file import SWEEP_KEYS

@@ -10,10 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench.report.answer import ALIKE_WITHIN, answer
+from apo_bench.statistics import FEWEST_SEEDS, contrast, tango, wilson
 from apo_bench.statistics.levels.summary import Summary, summary
-from apo_bench.statistics.over_seeds import FEWEST_SEEDS, contrast
-from apo_bench.statistics.paired import tango
-from apo_bench.statistics.rates import wilson
 from tests.statistics.test_rates import row
 
 METHODS = ("contact", "none", "paper", "snap")

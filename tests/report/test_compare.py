@@ -13,8 +13,7 @@ from apo_bench.cli import app as cli
 from apo_bench.errors import InputError
 from apo_bench.report.comparison.compare import compare
 from apo_bench.report.comparison.text import comparison_form, in_words
-from apo_bench.statistics.rate_text import percent
-from apo_bench.statistics.rates import wilson
+from apo_bench.statistics import percent, wilson
 from tests import pages
 from tests.browser import browser, opened, overflow
 from tests.statistics.test_rates import row, write

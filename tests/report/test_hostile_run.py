@@ -26,7 +26,7 @@ from apo_bench.report.report import report
 from apo_bench.report.run.trials import sample
 from apo_bench.report.tables.table import Column, Table
 from apo_bench.show.failure_pictures import failure_pictures
-from apo_bench.statistics.rates import tally
+from apo_bench.statistics import tally
 from apo_bench.sweeps.progress import Rates
 from tests import pages
 from tests.statistics.test_rates import row, write
@@ -169,7 +169,7 @@ def test_a_terminal_shows_what_it_would_obey(tmp_path: Path, capsys: pytest.Capt
 
 
 def test_a_sentence_of_a_row_is_only_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    from apo_bench.assembly.reached import Outcome
+    from apo_bench.assembly import Outcome
     from apo_bench.cli.terminal import print_row
     from apo_bench.trial.row import result
 

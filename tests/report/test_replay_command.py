@@ -11,9 +11,8 @@ from typing import Any
 import pytest
 
 from apo_bench.cli import app as cli
+from apo_bench.records import TrialSettings, settings_of
 from apo_bench.records.run.replay_command import milli, number, replay_command
-from apo_bench.records.setting_columns import settings_of
-from apo_bench.records.settings import TrialSettings
 from apo_bench.report.report import report
 from apo_bench.report.run.trials import sample
 from apo_bench.scenario.file import load_scenario

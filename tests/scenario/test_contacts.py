@@ -8,9 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.graph import relation_graph
-from apo_bench.assembly.topology import Contact, Gap, PartFace
+from apo_bench.assembly import Contact, Gap, Observation, PartFace, relation_graph
 from apo_bench.correction.baselines.no_history import no_history
 from apo_bench.correction.correctors import correct
 from apo_bench.errors import InputError

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
-from apo_bench.records.thresholds import Thresholds
+from apo_bench.records import Thresholds
 from apo_bench.resources import folder
 from apo_bench.scenario.file import load_scenario, scenario_names
 

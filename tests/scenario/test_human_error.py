@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.assembly.goals import Layout, placements
+from apo_bench.assembly import Layout, placements
 from apo_bench.geometry import pose
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.scenario.human_error import NOTHING_M, careless_covariance, spread_error

@@ -9,14 +9,10 @@ import numpy as np
 import pytest
 from shapely import MultiPoint
 
-from apo_bench.assembly.equations import largest_gap
-from apo_bench.assembly.goals import Poses, placements
-from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Assembly, Contact, Poses, largest_gap, placements
+from apo_bench.geometry import Array, Solid, pose
 from apo_bench.geometry.intrusion import intrusion
 from apo_bench.geometry.overlap import overlap
-from apo_bench.geometry.solid import Solid
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout, layout_at
 from apo_bench.scenario.scenario import Grasp, Scenario, Site, Turn

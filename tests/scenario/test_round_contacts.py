@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly.topology import Contact, Gap, PartFace
+from apo_bench.assembly import Contact, Gap, PartFace
 from apo_bench.errors import InputError
 from apo_bench.io.documents import JsonNode
 from apo_bench.scenario.checks import check_clearance, check_scenario

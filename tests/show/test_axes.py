@@ -7,9 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import placements
-from apo_bench.assembly.graph import relation_graph
-from apo_bench.assembly.topology import Contact
+from apo_bench.assembly import Contact, placements, relation_graph
 from apo_bench.show.axes import axes_of
 from apo_bench.show.graph.drawing import draw_graph
 from tests import rounds, scenes

@@ -9,8 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.assembly.graph import Graph, relation_graph
-from apo_bench.assembly.topology import Assembly, Operation
+from apo_bench.assembly import Assembly, Graph, Operation, relation_graph
 from apo_bench.show.graph.drawing import draw_graph
 from apo_bench.show.graph.layers import Links, arrange_layers, links_of
 from apo_bench.show.graph.layout import Rectangle, layout_graph, shared_area

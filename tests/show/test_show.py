@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Observation
 from apo_bench.cli import app as cli
 from apo_bench.correction.correctors import correct
 from apo_bench.files.observation import as_planned

@@ -11,10 +11,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from apo_bench.assembly.correction_record import Consistency, Correction
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.graph import relation_graph
-from apo_bench.assembly.topology import Contact, PartFace
+from apo_bench.assembly import Consistency, Contact, Correction, Observation, PartFace, relation_graph
 from apo_bench.correction.learning.likelihood import EstimatedNumber
 from apo_bench.geometry import pose
 from apo_bench.observation.fitting.components import COMPONENTS

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
+from apo_bench.records import TrialSettings
 from apo_bench.records.run.own_code import own_code
-from apo_bench.records.settings import TrialSettings
 from apo_bench.resources import folder
 from apo_bench.scenario.file import load_scenario
 from apo_bench.show.arm_text import check_lines

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from apo_bench import simulation
-from apo_bench.assembly.goals import Demonstration, Layout, Plan, Step
-from apo_bench.assembly.reached import ReplayResult
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Demonstration, Layout, Plan, ReplayResult, Step
+from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import Verdict, judge
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.execution.controller import replay

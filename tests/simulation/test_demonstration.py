@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import placements
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import placements
+from apo_bench.geometry import Array, pose
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.human import demonstration
 from apo_bench.simulation.human.hands import Hands

@@ -8,11 +8,10 @@ import mujoco
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Plan
+from apo_bench.assembly import Plan
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.intrusion import intrusion_depths
-from apo_bench.records.settings import TrialSettings
+from apo_bench.geometry import intrusion_depths, pose
+from apo_bench.records import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.controller import LOOK_S, PATIENCE_S, _until_rest, replay
 from apo_bench.simulation.execution.prepare import moves

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Plan
+from apo_bench.assembly import Plan
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.robot.forces import WRIST_S, ForceSensors, LowPass

@@ -5,13 +5,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Plan, Poses, Step, placements
-from apo_bench.assembly.topology import Operation
+from apo_bench.assembly import Operation, Plan, Poses, Step, placements
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.intrusion import intrusion_depths
-from apo_bench.geometry.solid import Box
+from apo_bench.geometry import Array, Box, intrusion_depths, pose
 from apo_bench.parts.making import Body, extrude, polygon, rectangle
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import layout_at

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Layout, Plan, Step
+from apo_bench.assembly import Layout, Plan, Step
 from apo_bench.geometry import pose
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout

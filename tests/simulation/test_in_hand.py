@@ -6,9 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Plan, Step
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Plan, Step
+from apo_bench.geometry import Array, pose
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.execution.controller import replay

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Plan, Step
+from apo_bench.assembly import Plan, Step
 from apo_bench.geometry import pose
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Plan
+from apo_bench.assembly import Plan
 from apo_bench.geometry import pose
 from apo_bench.prediction.failure import Prediction, predict
 from apo_bench.scenario.file import load_scenario

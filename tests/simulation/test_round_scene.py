@@ -7,12 +7,8 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from apo_bench.assembly.goals import Plan
-from apo_bench.assembly.topology import Operation
-from apo_bench.geometry import pose
-from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.hull import SAGITTA_M, Hull
-from apo_bench.geometry.solid import Piece
+from apo_bench.assembly import Operation, Plan
+from apo_bench.geometry import SAGITTA_M, Hull, Piece, physical_pieces, pose
 from apo_bench.parts.making import shaft, solid_of
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout

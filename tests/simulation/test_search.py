@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Plan
+from apo_bench.assembly import Plan
 from apo_bench.geometry import pose
-from apo_bench.records.settings import TrialSettings
+from apo_bench.records import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution import search
 from apo_bench.simulation.execution.prepare import moves

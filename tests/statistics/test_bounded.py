@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from statsmodels.emplike.descriptive import DescStat
 
-from apo_bench.statistics.over_seeds import mean_interval, mean_surprise, threshold
+from apo_bench.statistics import mean_surprise, threshold
+from apo_bench.statistics.over_seeds import mean_interval
 
 STEPS = st.lists(st.integers(0, 20), min_size=2, max_size=40)
 """Numbers from 0 to 1 in twentieths: such that ties and bounds happen."""

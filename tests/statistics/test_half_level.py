@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 from scipy.special import expit, ndtri, xlogy
 from scipy.stats import binomtest
 
+from apo_bench.statistics import threshold
 from apo_bench.statistics.levels.curves import Curve, CurveSetting, curves
 from apo_bench.statistics.levels.falling import CURVE_SHAPES, curve, misfit, profile, variation
 from apo_bench.statistics.levels.half_level import HalfLevel, half_level, half_levels, sure
-from apo_bench.statistics.over_seeds import threshold
 from tests.statistics.test_rates import row
 
 LEVELS = (0.0, 0.1, 0.25, 0.5, 1.0, 2.0, 4.0)

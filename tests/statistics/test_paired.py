@@ -18,8 +18,8 @@ from statsmodels.stats.multitest import multipletests
 
 from apo_bench.report.report import report
 from apo_bench.report.tables.cells import pair_table
-from apo_bench.statistics.paired import holm, mcnemar, paired, tango
-from apo_bench.statistics.rates import wilson
+from apo_bench.statistics import tango, wilson
+from apo_bench.statistics.paired import holm, mcnemar, paired
 from tests import pages
 from tests.statistics.test_rates import row, write
 

@@ -12,8 +12,7 @@ from scipy.stats import binom, multinomial
 
 from apo_bench.cli.app import main
 from apo_bench.errors import InputError
-from apo_bench.statistics.paired import mcnemar, tango
-from apo_bench.statistics.power import (
+from apo_bench.statistics import (
     evidence,
     margin_power,
     margin_trials,
@@ -21,9 +20,11 @@ from apo_bench.statistics.power import (
     paired_trials,
     rate_trials,
     shares,
+    tango,
+    wilson,
     wilson_half_width,
 )
-from apo_bench.statistics.rates import wilson
+from apo_bench.statistics.paired import mcnemar
 
 
 @pytest.mark.parametrize(

@@ -21,10 +21,9 @@ import pytest
 
 from apo_bench.cli.app import main
 from apo_bench.errors import InputError
-from apo_bench.records.limits import USUAL_LIMITS, Limits
+from apo_bench.records import USUAL_LIMITS, Limits, TrialSettings
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_file import read_run
-from apo_bench.records.settings import TrialSettings
 from apo_bench.report.report import report
 from apo_bench.report.run.facts import limits_of
 from apo_bench.scenario.file import load_scenario

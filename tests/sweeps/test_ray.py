@@ -23,8 +23,7 @@ import pytest
 
 from apo_bench.cli.app import main
 from apo_bench.errors import InputError
-from apo_bench.records.row import Row
-from apo_bench.records.setting_columns import row_key
+from apo_bench.records import Row, row_key
 from apo_bench.resources import folder
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps.grid import SweepSettings, load_all, units

@@ -20,12 +20,10 @@ from typing import Any
 
 import pytest
 
-from apo_bench.assembly.reached import Outcome
+from apo_bench.assembly import Outcome
 from apo_bench.errors import InputError
+from apo_bench.records import CORRECTORS, ENV_ID, ROW, row_key, setting_columns, trial_key
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.records.setting_columns import row_key, setting_columns, trial_key
-from apo_bench.records.settings import ENV_ID, ROW
-from apo_bench.records.short_names import CORRECTORS
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps import sweep as runner

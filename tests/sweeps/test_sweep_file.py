@@ -8,8 +8,7 @@ import pytest
 
 from apo_bench.cli.app import main
 from apo_bench.errors import InputError
-from apo_bench.records.setting_columns import trial_key
-from apo_bench.records.short_names import CORRECTOR
+from apo_bench.records import CORRECTOR, trial_key
 from apo_bench.resources import folder
 from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.sweeps.sweep import run_sweep

@@ -7,10 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from apo_bench.assembly.goals import Observation
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.records.settings import TrialSettings
+from apo_bench.assembly import Observation
+from apo_bench.geometry import Array, pose
+from apo_bench.records import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import layout_at
 from apo_bench.simulation.scene.scene import Scene, build_scene

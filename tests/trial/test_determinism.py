@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 
 from apo_bench.cli.app import main
+from apo_bench.records import TrialSettings
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.records.settings import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.sweeps.grid import SweepSettings

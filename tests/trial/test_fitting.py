@@ -9,16 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly import Correction, Observation, Plan, Step
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Observation, Plan, Step
 from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.solvers.whitened import correction_to, noise_factor
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.prediction.failure import Prediction, predict
-from apo_bench.records.settings import TrialSettings
+from apo_bench.records import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.prepare import in_reach
 from apo_bench.simulation.scene.scene import Scene, build_scene

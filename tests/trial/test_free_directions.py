@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from apo_bench.assembly import Observation
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Observation
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.trial.free_directions import FreeSpace, even_points, free_space, nearest_fitting, shortest_above
 from tests import scenes
 

@@ -14,8 +14,7 @@ import pytest
 
 from apo_bench.cli.app import main
 from apo_bench.errors import InputError
-from apo_bench.records.salt import Salt
-from apo_bench.records.settings import RANGE, TrialSettings
+from apo_bench.records import RANGE, Salt, TrialSettings
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.sweeps.grid import SweepSettings
 from apo_bench.sweeps.sweep import run_sweep

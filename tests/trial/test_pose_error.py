@@ -9,12 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from apo_bench.assembly import Poses, Reached, Snapshot, placements
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Poses, placements
-from apo_bench.assembly.reached import Reached, Snapshot
 from apo_bench.correction.solvers.newton import solve_newton
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.trial.pose_error import goal_errors, pose_errors
 from tests import scenes
 

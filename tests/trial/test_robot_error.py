@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.records.row import Row, look_up
-from apo_bench.records.settings import TrialSettings
+from apo_bench.records import Row, TrialSettings, look_up
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.stages import draw_robot_error

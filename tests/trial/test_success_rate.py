@@ -19,8 +19,7 @@ from typing import NamedTuple
 import pytest
 from scipy.stats import binom
 
-from apo_bench.records.row import Row
-from apo_bench.records.settings import ROW, TrialSettings
+from apo_bench.records import ROW, Row, TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene, build_scene

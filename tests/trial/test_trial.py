@@ -10,16 +10,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly.correction_record import Consistency, Correction, Suspect, Try
-from apo_bench.assembly.goals import Observation, Step
-from apo_bench.assembly.graph import relation_graph
+from apo_bench.assembly import Consistency, Correction, Observation, Step, Suspect, Try, relation_graph
 from apo_bench.cli.terminal import print_row
 from apo_bench.correction.correctors import correct
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.records import outcomes
-from apo_bench.records.settings import ENV_ID, LARGEST_SEED, ROW, TrialSettings, level_pair
+from apo_bench.records import ENV_ID, ROW, TrialSettings, level_pair, outcomes
+from apo_bench.records.settings import LARGEST_SEED
 from apo_bench.resources import folder
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.cad.raw_solid import Mesh, connected
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 SMOOTH_RAD = np.radians(35.0)
 """Flat pieces of one round face meet at less: it has 11 of them in a turn, or more."""

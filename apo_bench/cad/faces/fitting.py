@@ -6,8 +6,7 @@ import numpy as np
 
 from apo_bench.cad.faces.facets import FLAT, SMOOTH_RAD, Facets
 from apo_bench.cad.raw_solid import Mesh, Region, square_to
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.round_face import WHOLE_TURN
+from apo_bench.geometry import WHOLE_TURN, Array
 
 _MOST_POINTS = 400
 _TURNED = 0.09

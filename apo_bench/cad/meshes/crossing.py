@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.cad.raw_solid import Mesh
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 _AT_ONCE = 200_000
 _OF_TWO = np.array([[0, 0], [0, 1], [1, 0], [1, 1]])

@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.cad.meshes.crossing import crossing
 from apo_bench.cad.raw_solid import Mesh, RawSolid, SolidPlace, connected, put_together
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 _SAME_CORNER = 1e-7
 """Corners are one within this part of the size."""

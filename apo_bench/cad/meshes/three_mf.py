@@ -16,7 +16,7 @@ import numpy as np
 
 from apo_bench.cad.raw_solid import Mesh
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 _UNITS = {"micron": "um", "millimeter": "mm", "centimeter": "cm", "meter": "m", "inch": "in", "foot": "ft"}
 _LARGEST_BYTES = 60_000_000

@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.cad.raw_solid import Mesh, square_to
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.hull import Hull
+from apo_bench.geometry import Array, Hull
 
 _MOST_CORNERS = 600
 _MOST_SIDES = 300

@@ -7,7 +7,7 @@ import numpy as np
 
 from apo_bench.cad.pieces.corners import SAME_CORNER_MM, corners_of, mesh_of
 from apo_bench.cad.raw_solid import Region
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 _MOST_CUTS = 400
 _TRIES = 6

@@ -12,8 +12,7 @@ import numpy as np
 
 from apo_bench.cad.pieces.corners import SAME_CORNER_MM, corners_of, extremes, is_thick, without_near
 from apo_bench.cad.raw_solid import Mesh, Region
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.hull import Cylinder, Hull, cylinder_hull, sides_of
+from apo_bench.geometry import Array, Cylinder, Hull, cylinder_hull, sides_of
 from apo_bench.parts.allowed import THINNEST_M, WIDEST_M
 
 _WIDER = 1.6

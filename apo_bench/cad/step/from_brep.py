@@ -15,7 +15,7 @@ from apo_bench.cad.step.open_cascade import TRIANGLES_RAD, BrepFace, BrepSolid
 from apo_bench.cad.step.strips import wall_strips
 from apo_bench.cad.step.surfaces import Flat, Wall, is_same, surface_of
 from apo_bench.errors import InputError
-from apo_bench.geometry.round_face import WHOLE_TURN
+from apo_bench.geometry import WHOLE_TURN
 from apo_bench.parts.making.moments import Moments
 
 _SAME_CORNER = 1e-7

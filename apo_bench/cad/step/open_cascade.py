@@ -13,7 +13,7 @@ import numpy as np
 
 from apo_bench.cad.raw_solid import SolidPlace
 from apo_bench.cad.step.step_tree import leaves_of, matrix_of, shapes_in
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 READER_BYTES = 2_000_000_000
 READER_S = 20

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.cad.raw_solid import Rgb
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 _NO_NAME = re.compile(
     r"|=>\[.*|NAUO\d*|\d+|SOLID|SHELL|COMPOUND|Next assembly (usage|relationship)|Open CASCADE STEP translator.*",

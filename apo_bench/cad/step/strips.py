@@ -6,7 +6,7 @@ import numpy as np
 
 from apo_bench.cad.faces.fitting import Round, border_of
 from apo_bench.cad.raw_solid import Mesh, square_to
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 _LEVEL = 1e-6
 _SAME_RAD = 1e-5

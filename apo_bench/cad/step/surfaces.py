@@ -6,7 +6,7 @@ import numpy as np
 
 from apo_bench.cad.faces.fitting import Round, axis_of, circle_through, refined
 from apo_bench.cad.step.open_cascade import BrepFace
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 _SPLINE_MM = 5e-4
 """A spline whose points are this near to a plane, a cylinder or a cone is one."""

@@ -5,8 +5,7 @@ from itertools import combinations, islice
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Correction, Observation
 from apo_bench.correction.baselines.paper import at_once
 from apo_bench.correction.baselines.track import track_operations
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly
 
 
 def candidates(

@@ -11,11 +11,8 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.equations import Equations
-from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import Box
+from apo_bench.assembly import Assembly, Equations
+from apo_bench.geometry import Array, Box, pose
 
 
 @final

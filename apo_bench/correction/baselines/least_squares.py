@@ -9,12 +9,11 @@ CONTACT_M^2 / (standard deviation of the noise) only. Made for some tens of oper
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction
+from apo_bench.assembly import Correction, Observation
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Observation
 from apo_bench.correction.baselines.measured import as_it_ends
 from apo_bench.correction.solvers.whitened import whitened
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 CONTACT_M = 1e-6
 """Stated standard deviation of a contact, tuned by `python benchmarks/tune.py`."""

@@ -4,14 +4,12 @@ from collections.abc import Callable, Collection
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.equations import equations, largest, largest_gap
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.lowering import lowered_observation
+from apo_bench.assembly import Correction, Observation, largest, largest_gap, lowered_observation
+from apo_bench.assembly.equations import equations
 from apo_bench.correction.solvers.inequalities import demanded, violations
 from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, least_step
 from apo_bench.correction.status import refused_correction, status_sentence
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.records import outcomes
 
 TWIST_UNITS = (1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M)

@@ -5,14 +5,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.equations import equations, largest, largest_gap
-from apo_bench.assembly.goals import Observation, placements
-from apo_bench.assembly.topology import Assembly, Operation
+from apo_bench.assembly import Assembly, Correction, Observation, Operation, largest, largest_gap, placements
+from apo_bench.assembly.equations import equations
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.solvers.newton import solve_newton
 from apo_bench.correction.status import refused_correction, solver_status, status_sentence
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 
 def no_history(observation: Observation) -> Correction:

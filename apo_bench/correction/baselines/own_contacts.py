@@ -4,9 +4,9 @@ A goal that is no candidate is executed all the same, and a little wrong it does
 wedged in the fingers that let go of it.
 """
 
-from apo_bench.assembly.equations import Equations
+from apo_bench.assembly import Equations
 from apo_bench.correction.solvers.newton import solve_newton
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 
 def solve_own_contacts(system: Equations, goals: Array, k: int, gap_m: float) -> Array:

@@ -3,9 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.equations import equations, largest
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Correction, Observation, largest
+from apo_bench.assembly.equations import equations
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.baselines.own_contacts import solve_own_contacts
 from apo_bench.correction.solvers.newton import solve_newton

@@ -16,13 +16,12 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.equations import Equations, equations
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Correction, Equations, Observation
+from apo_bench.assembly.equations import equations
 from apo_bench.correction.baselines.intruding import Meeting, intruding, meeting
 from apo_bench.correction.baselines.measured import as_it_ends
 from apo_bench.correction.solvers.whitened import Whitened, whitened
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 PENALTY_CONTACT_M = 1e-4
 """Gap or depth that costs as much as one standard deviation of noise, tuned by `python benchmarks/tune.py`."""

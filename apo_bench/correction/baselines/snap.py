@@ -7,13 +7,12 @@ sense of least squares.
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.equations import Equations, equations
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Correction, Equations, Observation
+from apo_bench.assembly.equations import equations
 from apo_bench.correction.baselines.measured import TWIST_UNITS, as_it_ends
 from apo_bench.correction.solvers.newton import REST_M, SINGULAR_CUT_OFF
 from apo_bench.correction.solvers.whitened import Whitened, whitened
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 _TURNS = 30
 

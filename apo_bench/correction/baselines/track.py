@@ -12,14 +12,13 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.correction_record import Correction, Iterate, Try
-from apo_bench.assembly.equations import Equations, equations, largest
-from apo_bench.assembly.goals import Observation, Step
+from apo_bench.assembly import Correction, Equations, Iterate, Observation, Step, Try, largest
+from apo_bench.assembly.equations import equations
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.baselines.own_contacts import solve_own_contacts
 from apo_bench.correction.solvers.newton import Solution, solve_newton
 from apo_bench.correction.status import refused_correction, solver_status, status_sentence
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 _Sets = Callable[[tuple[int, ...]], Iterable[tuple[int, ...]]]
 """Candidates, most recent first -> the sets of motion parameters to try, in order."""

@@ -12,15 +12,13 @@ from typing import final
 
 import numpy as np
 
+from apo_bench.assembly import Observation, lowered_observation
 from apo_bench.assembly.equations import equations
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.lowering import lowered_observation
 from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.play import fit_covariance
 from apo_bench.correction.solvers.compact import compact_equations
 from apo_bench.correction.solvers.posterior import RANK_CUT_OFF
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry import Array, frozen, pose
 
 UNITS = frozen(np.repeat([1e-3, np.radians(1.0)], 3))
 """(6,): the unit of body twists here, 1 mm and 1 deg."""

@@ -18,7 +18,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from apo_bench.correction.learning.evidence import Reading
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 GROSS_RANGE = 300.0
 """R: how far a gross error may lead in one direction, [mm] and [deg]."""

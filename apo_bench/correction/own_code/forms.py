@@ -6,16 +6,23 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from apo_bench.assembly.correction_record import Consistency, Correction, Iterate, Try
-from apo_bench.assembly.goals import Observation, Step
-from apo_bench.assembly.outlier_model import OutlierModel
-from apo_bench.assembly.shared_error import SharedError
-from apo_bench.assembly.tails import Tails
-from apo_bench.assembly.topology import Assembly, Contact, Gap, Operation
+from apo_bench.assembly import (
+    Assembly,
+    Consistency,
+    Contact,
+    Correction,
+    Gap,
+    Iterate,
+    Observation,
+    Operation,
+    OutlierModel,
+    SharedError,
+    Step,
+    Tails,
+    Try,
+)
 from apo_bench.correction.own_code.message import Arrays, CorrectorMessage, GarbledMessage, MessageForm
-from apo_bench.geometry.hull import Cylinder, Hull
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Box, Face, Piece, Solid
+from apo_bench.geometry import Box, Cylinder, Face, Hull, Piece, RoundFace, Solid
 
 
 class _CorrectionForm(msgspec.Struct):

@@ -9,16 +9,13 @@ import math
 from collections.abc import Iterable
 from typing import Any, final
 
-from apo_bench.assembly.correction_record import Correction, Look
-from apo_bench.assembly.goals import Observation
+from apo_bench.assembly import Correction, Look, Observation
 from apo_bench.correction.correctors import CorrectorMisbehaved, checked_corrector, correct
 from apo_bench.correction.own_code.forms import observation_message, parse_correction
 from apo_bench.correction.own_code.message import Arrays, CorrectorMessage, GarbledMessage, MessageForm
 from apo_bench.correction.own_code.process import Server
 from apo_bench.errors import InputError
-from apo_bench.records.limits import CORRECTOR_LIMIT_S
-from apo_bench.records.method import is_own
-from apo_bench.records.short_names import UNCORRECTED
+from apo_bench.records import CORRECTOR_LIMIT_S, UNCORRECTED, is_own
 
 LEAST_STARTING_S = 30.0
 """What importing a module may take at least: a new interpreter, and libraries that are large."""

@@ -10,14 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.facing_round import measure_round
-from apo_bench.assembly.goals import Observation, placements
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Observation, measure_round, placements
+from apo_bench.geometry import Array, Face, RoundFace, face_area, overlap_area, pose
 from apo_bench.geometry.intrusion import intrusion
-from apo_bench.geometry.overlap import face_area, overlap_area
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Face
 
 PLACES_TRIED = 24
 LEAST_PLACES = 8

@@ -14,10 +14,8 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.outlier_model import OutlierModel
-from apo_bench.assembly.pattern import looking_away, pattern
+from apo_bench.assembly import Correction, Observation, OutlierModel, looking_away
+from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.consistency import CONTRADICTION_M, fit_deviation
 from apo_bench.correction.contact import ContactCorrector, contact_apply
 from apo_bench.correction.inferred import inferred_goals
@@ -25,9 +23,7 @@ from apo_bench.correction.problem import seen_system
 from apo_bench.correction.robust.views import GROSS, INLIER, ROOM, Sightings, State, merged
 from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.whitened import noise_factor
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.twist import right_jacobian
+from apo_bench.geometry import Array, frozen, pose, right_jacobian
 
 _as_begun = ContactCorrector("apply", elsewhere=False)
 _FAR_RAD = np.radians(10.0)

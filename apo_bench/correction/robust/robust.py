@@ -9,10 +9,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Correction, Look
-from apo_bench.assembly.equations import largest_gap
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.outlier_model import OutlierModel
+from apo_bench.assembly import Correction, Look, Observation, OutlierModel, largest_gap
 from apo_bench.correction.consistency import TEST_LEVEL
 from apo_bench.correction.contact import contact_apply
 from apo_bench.correction.inferred import inferred_goals
@@ -21,7 +18,7 @@ from apo_bench.correction.robust.hypotheses import Case, Hypothesis, as_stated
 from apo_bench.correction.robust.search import Search
 from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, Sightings, looked_again, views_of
 from apo_bench.correction.status import refused_correction
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 _SURE = 0.01
 """An operation is looked at again if it is likelier than this that another state is the right one, ..."""

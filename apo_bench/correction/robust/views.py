@@ -11,10 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.outlier_model import OutlierModel
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.assembly import Observation, OutlierModel
+from apo_bench.geometry import Array, frozen, pose
 
 INLIER = 0
 BROAD = 1

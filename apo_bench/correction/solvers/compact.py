@@ -16,10 +16,9 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.equations import Equations
+from apo_bench.assembly import Equations
 from apo_bench.correction.solvers.words import Words
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.twist import GENERATORS
+from apo_bench.geometry import GENERATORS, Array
 
 _GENERATORS = np.ascontiguousarray(np.swapaxes(GENERATORS, 0, 1).reshape(4, 24))
 _LEAST_PIVOT = 1e-15

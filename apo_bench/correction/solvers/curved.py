@@ -10,8 +10,7 @@ import numpy as np
 from apo_bench.correction.solvers.compact import CompactEquations
 from apo_bench.correction.solvers.gauss_newton import STEP, shortened_step
 from apo_bench.correction.solvers.whitened import correction_to
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.twist import exp_and_jacobian
+from apo_bench.geometry import Array, exp_and_jacobian
 
 _TURNS = 30
 _RANK = 1e-5

@@ -28,7 +28,7 @@ from apo_bench.correction.solvers.compact import CompactEquations
 from apo_bench.correction.solvers.kernels import Kernels
 from apo_bench.correction.solvers.linear_step import NEXT, SURE, DenseStep, LinearStep, turn_of
 from apo_bench.correction.solvers.sparse import SparseStep
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 MOST_TURNS = 60
 STEP = 1e-7

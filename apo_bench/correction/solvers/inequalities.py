@@ -14,17 +14,14 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.equations import Equations
-from apo_bench.assembly.lowering import lowered
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly, Equations, lowered
 from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
 from apo_bench.correction.solvers.gauss_newton import FALL, NearestGoals, damping, settles, shortened_step
 from apo_bench.correction.solvers.linear_step import shortest_z
 from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR, jacobian_rank
 from apo_bench.correction.solvers.whitened import pulled, twists_of
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.twist import exp_and_jacobian
+from apo_bench.geometry import Array, exp_and_jacobian
 
 _BLIND = 1e-7
 """Part of the largest row below which an inequality does not depend on the free directions."""

@@ -6,12 +6,11 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.pattern import Pattern, pattern
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly, Pattern
+from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.solvers.compact import CompactEquations, moments
 from apo_bench.correction.solvers.words import Words
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, remembered
+from apo_bench.geometry import Array, pose, remembered
 
 _ONE = np.eye(4)
 

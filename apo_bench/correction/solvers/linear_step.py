@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
 from apo_bench.correction.solvers.kernels import Kernels, owned
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.twist import ADJOINTS, SERIES, exp_and_jacobian
+from apo_bench.geometry import ADJOINTS, SERIES, Array, exp_and_jacobian
 
 SURE = 1e-6
 NEXT = 1e-9

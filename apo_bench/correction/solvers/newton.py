@@ -17,9 +17,8 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.correction_record import Iterate
-from apo_bench.assembly.equations import Equations, largest
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Equations, Iterate, largest
+from apo_bench.geometry import Array
 
 LENGTH_M = 0.04
 """Way of a point per radian, at which a rotation weighs as much as a translation."""

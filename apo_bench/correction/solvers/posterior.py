@@ -13,7 +13,7 @@ import numpy as np
 from scipy.linalg.lapack import dgeqp3, dorgqr, dpstrf
 
 from apo_bench.correction.solvers import sparse
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 LARGEST_POSTERIOR = 600
 """Unknowns above which free directions are not spelled out: a basis of them is a dense matrix."""

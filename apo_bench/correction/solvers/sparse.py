@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from apo_bench.correction.solvers.compact import CompactEquations
 from apo_bench.correction.solvers.linear_step import goals_at, turn_of
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 WIDE = 240
 """Rows of a band above which it is no longer worth it."""

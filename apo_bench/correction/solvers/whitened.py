@@ -9,12 +9,9 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.shared_error import joint_covariance
+from apo_bench.assembly import Observation, joint_covariance
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.twist import right_jacobian
+from apo_bench.geometry import Array, pose, right_jacobian
 
 
 @final

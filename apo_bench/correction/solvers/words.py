@@ -7,7 +7,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 _ONE = np.eye(4)
 

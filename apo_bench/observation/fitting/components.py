@@ -4,8 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.fitted import LEVEL_UNITS
 

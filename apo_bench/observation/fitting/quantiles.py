@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST_SCALE
 from apo_bench.observation.models.tails import Split, Tail, of_numbers
 

@@ -5,10 +5,8 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, Observation
-from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Assembly, Demonstration, Observation
+from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.camera import (
     CAMERA_AZIMUTH_DEG,
     CAMERA_DISTANCE_M,

@@ -10,9 +10,7 @@ from typing import final
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.pose import is_rigid
+from apo_bench.geometry import Array, frozen, is_rigid, pose
 
 WORKSPACE_MIDDLE_M = frozen([0.12, 0.0, 0.03], 3)
 """What the default camera looks at, in the world, [m]: the middle of where assemblies stand on the table."""

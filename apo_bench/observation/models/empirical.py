@@ -7,12 +7,9 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, Observation
-from apo_bench.assembly.outlier_model import measured_rates
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly, Demonstration, Observation, measured_rates
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry import Array, frozen, pose
 from apo_bench.io.strict_csv import CsvRow, read_csv
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.fitted import LEVEL_UNITS, check_measured_level, observe_in_ray_frames

@@ -10,14 +10,9 @@ from typing import ClassVar, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.goals import Demonstration, Observation
-from apo_bench.assembly.outlier_model import measured_rates
-from apo_bench.assembly.shared_error import SharedError
-from apo_bench.assembly.tails import Tails
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError, Tails, measured_rates
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.isotropic import displaced, floored, observe_displaced, with_shared
 from apo_bench.observation.models.level import Facts, Level

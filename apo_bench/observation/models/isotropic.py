@@ -10,13 +10,9 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, Observation
-from apo_bench.assembly.shared_error import SharedError
-from apo_bench.assembly.tails import Tails
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError, Tails
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry import Array, frozen, pose
 from apo_bench.observation.models.level import Facts, Level
 
 COVARIANCE_FLOOR = frozen(np.repeat([0.05e-3, np.radians(0.05)], 3), 6)

@@ -7,11 +7,9 @@ from typing import ClassVar, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.goals import Demonstration, Observation, Poses
-from apo_bench.assembly.outlier_model import measured_rates
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly, Demonstration, Observation, Poses, measured_rates
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry import Array, frozen
 from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Facts, Level
 

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from apo_bench.errors import InputError
 from apo_bench.files.bop import PoseRows
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.camera import Camera
 
 INLIER_MM = 50.0

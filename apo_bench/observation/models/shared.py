@@ -5,12 +5,9 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, Observation
-from apo_bench.assembly.shared_error import SharedError, first_order
-from apo_bench.assembly.topology import Assembly
+from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError, first_order
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.fitted import view_error, view_frame
 from apo_bench.observation.models.isotropic import OWN, OWN_FACT, observe_displaced, observe_shared

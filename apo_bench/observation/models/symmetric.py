@@ -5,13 +5,8 @@ from typing import ClassVar, final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, Observation
-from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.polygon import across_axis
-from apo_bench.geometry.solid import Solid
-from apo_bench.geometry.symmetry import folds, nearest_alike, revolution, symmetries, turn_about
+from apo_bench.assembly import Assembly, Demonstration, Observation
+from apo_bench.geometry import Array, Solid, across_axis, folds, nearest_alike, pose, revolution, symmetries, turn_about
 from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Facts, Level
 

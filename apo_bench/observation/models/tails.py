@@ -13,7 +13,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 _NODES = 160
 _GAUSS = 200.0

@@ -10,11 +10,7 @@ import numpy as np
 import shapely
 from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.hull import Hull
-from apo_bench.geometry.polygon import flat_area, polygons_of, rings_of, straightened
-from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
-from apo_bench.geometry.solid import Face
+from apo_bench.geometry import WHOLE_TURN, Array, Face, Hull, RoundFace, flat_area, polygons_of, rings_of, straightened
 from apo_bench.parts.making.moments import Moments
 
 _SAME_M = 1e-9

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from shapely import Polygon, box, unary_union
 
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.polygon import polygons_of, rings_of, straightened
+from apo_bench.geometry import Array, polygons_of, rings_of, straightened
 
 _SAME_MM = 1e-6
 _ON_MM = 1e-9

@@ -8,11 +8,7 @@ from typing import Any, final
 import numpy as np
 from shapely import Polygon, unary_union
 
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.hull import Hull
-from apo_bench.geometry.polygon import straightened
-from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
-from apo_bench.geometry.solid import Face
+from apo_bench.geometry import WHOLE_TURN, Array, Face, Hull, RoundFace, straightened
 from apo_bench.parts.making.body import Body
 from apo_bench.parts.making.cells import bands, bore_cell, clipped, convex_cells, wedges
 from apo_bench.parts.making.frustums import Frustum, at_height, chamfered, heights_of, prism, raised, tangent, without

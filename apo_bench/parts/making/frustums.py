@@ -6,9 +6,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.hull import sides_of
-from apo_bench.geometry.round_face import RoundFace
+from apo_bench.geometry import Array, RoundFace, sides_of
 from apo_bench.parts.making.moments import Moments, frustum_moments
 from apo_bench.parts.making.outline import COARSE_SIDES
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 
 class Moments(NamedTuple):

@@ -7,8 +7,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.hull import sides_of
+from apo_bench.geometry import Array, sides_of
 from apo_bench.parts.making.moments import Moments, polygon_moments, segment_moments
 
 COARSE_SIDES = 12

@@ -6,10 +6,7 @@ from itertools import pairwise
 import numpy as np
 from shapely import Polygon
 
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.hull import Cylinder, Hull, cylinder_hull
-from apo_bench.geometry.polygon import polygons_of, rings_of
-from apo_bench.geometry.solid import Face
+from apo_bench.geometry import Array, Cylinder, Face, Hull, cylinder_hull, polygons_of, rings_of
 from apo_bench.parts.making.body import Body
 from apo_bench.parts.making.cells import clipped, wedges
 from apo_bench.parts.making.extrude import flat_face

@@ -8,11 +8,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.hull import Hull
-from apo_bench.geometry.polygon import flat_area
-from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
-from apo_bench.geometry.solid import Box, Face, Piece, Solid, all_boxes
+from apo_bench.geometry import WHOLE_TURN, Array, Box, Face, Hull, Piece, RoundFace, Solid, all_boxes, flat_area
 from apo_bench.parts.allowed import THINNEST_M
 from apo_bench.parts.making.body import Body
 from apo_bench.parts.stated import PART_SCHEMA

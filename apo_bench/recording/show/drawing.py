@@ -8,11 +8,9 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
+from apo_bench.assembly import Poses
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import Solid
+from apo_bench.geometry import Array, Solid, pose
 from apo_bench.io.figures import default_looks, save_figure
 from apo_bench.recording.arranging import camera_pose
 from apo_bench.recording.camera_file import CameraFile

@@ -10,16 +10,10 @@ from pathlib import Path
 from typing import Any, NamedTuple, final
 
 from apo_bench.errors import InputError
-from apo_bench.records.row import Row
+from apo_bench.records import SETTINGS, Key, Row, one_salt, row_key, with_salt
 from apo_bench.records.run.report_rows import NUMBERS, report_rows
 from apo_bench.records.run.run_file import read_run
-from apo_bench.records.salt import one_salt, with_salt
-from apo_bench.records.setting_columns import Key, row_key
-from apo_bench.records.settings import SETTINGS
-from apo_bench.statistics.forecasts import ALL
-from apo_bench.statistics.paired import tango
-from apo_bench.statistics.rates import Cell, Interval, Place, Rate, order, place_of, tally
-from apo_bench.statistics.settings import cell_place
+from apo_bench.statistics import ALL, Cell, Interval, Place, Rate, cell_place, order, place_of, tally, tango
 
 RUN = "run.json can be read"
 _ENDING = ("success", "failure_stage", "failure_code")

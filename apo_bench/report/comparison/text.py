@@ -3,18 +3,25 @@
 from collections.abc import Callable
 from typing import Any
 
-from apo_bench.records.row import Row
+from apo_bench.records import KEY, Row, row_key
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.report_rows import NUMBERS
-from apo_bench.records.setting_columns import KEY, row_key
 from apo_bench.report.comparison.compare import Agreement, CellPair, Comparison, Side
 from apo_bench.report.run.facts import limits_of, scenario_files, value_words
 from apo_bench.report.run.trials import verdict, why
 from apo_bench.report.tables.table import Column, Table, level_text
-from apo_bench.statistics.over_seeds import FEWEST_SEEDS
-from apo_bench.statistics.rate_text import percent, percents, points
-from apo_bench.statistics.rates import Cell, Place, Rate, place_of
-from apo_bench.statistics.settings import cell_place, setting_of
+from apo_bench.statistics import (
+    FEWEST_SEEDS,
+    Cell,
+    Place,
+    Rate,
+    cell_place,
+    percent,
+    percents,
+    place_of,
+    points,
+    setting_of,
+)
 
 _SCHEMA = "apo-bench/comparison/1"
 MOST_LISTED = 2000

@@ -5,15 +5,10 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
-from apo_bench.records.method import knows_truth
-from apo_bench.records.outcomes import STAGES
+from apo_bench.records import STAGES, knows_truth
 from apo_bench.report.figures.sheet import SAMPLE, WIDTH, Entry, Figure, Panel, Tips
 from apo_bench.report.figures.styles import INK, SOFT, STAGE_COLORS, SUCCESS
-from apo_bench.statistics.effort import TrialTimes
-from apo_bench.statistics.forecasts import ALL, Confusion
-from apo_bench.statistics.rate_text import percent
-from apo_bench.statistics.rates import Cell
-from apo_bench.statistics.settings import Setting, level_of, level_words
+from apo_bench.statistics import ALL, Cell, Confusion, Setting, TrialTimes, level_of, level_words, percent
 
 _LEFT = 138
 _RIGHT = 46

@@ -13,12 +13,8 @@ from apo_bench.report.figures.levels import (
 from apo_bench.report.figures.other_axes import looks_figure, tightness_figure
 from apo_bench.report.figures.sheet import DrawnFigure, draw
 from apo_bench.report.figures.styles import styles
-from apo_bench.statistics.contacts import GapSummary, Recognition
-from apo_bench.statistics.effort import TrialTimes
-from apo_bench.statistics.forecasts import Confusion
+from apo_bench.statistics import Cell, Confusion, GapSummary, Recognition, Setting, TrialTimes, members
 from apo_bench.statistics.levels.summary import Summary
-from apo_bench.statistics.rates import Cell
-from apo_bench.statistics.settings import Setting, members
 
 
 def figures(

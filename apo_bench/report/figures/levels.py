@@ -4,17 +4,17 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
 
-from apo_bench.records.method import knows_truth
-from apo_bench.records.settings import RANGE
+from apo_bench.records import RANGE, knows_truth
 from apo_bench.report.figures.lines import Axis, MethodLine, Point, RuleLine, dodges, entries, levels_axis, line_panel
 from apo_bench.report.figures.sheet import Figure, Panel
 from apo_bench.report.figures.styles import RECOGNITION_STYLES, SEEN, Style, styles
-from apo_bench.statistics.contacts import GapSummary, Quantiles, Recognition
-from apo_bench.statistics.forecasts import ALL
-from apo_bench.statistics.paired import Paired
-from apo_bench.statistics.rate_text import percent, percents
-from apo_bench.statistics.rates import Cell
-from apo_bench.statistics.settings import (
+from apo_bench.statistics import (
+    ALL,
+    Cell,
+    GapSummary,
+    Paired,
+    Quantiles,
+    Recognition,
     Setting,
     cell_place,
     level_of,
@@ -22,8 +22,10 @@ from apo_bench.statistics.settings import (
     level_words,
     levels_of,
     members,
-    settings,
+    percent,
+    percents,
 )
+from apo_bench.statistics.settings import settings
 
 _Item = TypeVar("_Item")
 SHARES = tuple((x / 100, f"{x} %") for x in (0, 25, 50, 75, 100))

@@ -2,14 +2,13 @@
 
 from collections.abc import Callable, Sequence
 
-from apo_bench.records.method import knows_truth, may_look
+from apo_bench.records import knows_truth, may_look
 from apo_bench.report.figures.levels import SHARES, methods_of
 from apo_bench.report.figures.lines import Axis, MethodLine, Point, dodges, entries, levels_axis, line_panel
 from apo_bench.report.figures.sheet import Figure, Panel
 from apo_bench.report.figures.styles import styles
-from apo_bench.statistics.rate_text import level_label, percent, percents
-from apo_bench.statistics.rates import Cell
-from apo_bench.statistics.settings import Setting, level_of, level_words, members, settings
+from apo_bench.statistics import Cell, Setting, level_label, level_of, level_words, members, percent, percents
+from apo_bench.statistics.settings import settings
 
 _DODGE = 1.03
 """Methods stand this factor from each other at one tightness, so that equal rates do not hide each other."""

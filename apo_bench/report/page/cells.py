@@ -9,16 +9,23 @@ from typing import Any, NamedTuple
 
 from markupsafe import Markup
 
-from apo_bench.records.limits import USUAL_LIMITS, Limits
-from apo_bench.records.method import knows_truth
-from apo_bench.records.row import Row, look_up
+from apo_bench.records import SETTINGS, USUAL_LIMITS, Limits, Row, knows_truth, look_up
 from apo_bench.records.run.replay_command import Files, without_seed
 from apo_bench.records.run.report_rows import NUMBERS
-from apo_bench.records.settings import SETTINGS
 from apo_bench.report.run.trials import verdict, why
-from apo_bench.statistics.rate_text import percent, percents
-from apo_bench.statistics.rates import Cell, Place, by_place
-from apo_bench.statistics.settings import Setting, cell_place, level_of, level_unit, level_words, levels_of
+from apo_bench.statistics import (
+    Cell,
+    Place,
+    Setting,
+    by_place,
+    cell_place,
+    level_of,
+    level_unit,
+    level_words,
+    levels_of,
+    percent,
+    percents,
+)
 
 _MANY = 12
 """With more settings than this, those of a scenario are folded."""

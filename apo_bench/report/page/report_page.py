@@ -4,22 +4,16 @@ import base64
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from apo_bench.records.limits import Limits
-from apo_bench.records.method import knows_truth
-from apo_bench.records.row import Row, look_up
+from apo_bench.records import RANGE, Limits, Row, knows_truth, look_up, one_salt
 from apo_bench.records.run.replay_command import Files, replay_command
-from apo_bench.records.salt import one_salt
-from apo_bench.records.settings import RANGE
 from apo_bench.report.figures.sheet import DrawnFigure
 from apo_bench.report.page.cells import matrices, packed_json, trials
 from apo_bench.report.page.document import page
 from apo_bench.report.run.facts import limits_of, run_facts, scenario_files
 from apo_bench.report.run.trials import FailurePicture, why
 from apo_bench.report.tables.table import Table
-from apo_bench.statistics.effort import Work
+from apo_bench.statistics import Cell, Setting, Work, cell_place, place_of, setting_of
 from apo_bench.statistics.levels.summary import Summary
-from apo_bench.statistics.rates import Cell, place_of
-from apo_bench.statistics.settings import Setting, cell_place, setting_of
 
 _SECTIONS = {
     "success": "Success",

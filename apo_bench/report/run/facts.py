@@ -4,7 +4,7 @@ import json
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from apo_bench.records.limits import USUAL_LIMITS, Limits
+from apo_bench.records import USUAL_LIMITS, Limits
 from apo_bench.report.tables.table import Column, Table
 
 _LONG = 400

@@ -4,11 +4,10 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from apo_bench.records.row import Row
+from apo_bench.records import Row, Salt
 from apo_bench.records.run.own_code import left_out, own_code
 from apo_bench.records.run.replay_command import Files
-from apo_bench.records.salt import Salt
-from apo_bench.statistics.rates import NOT_EXECUTED, rank
+from apo_bench.statistics import NOT_EXECUTED, rank
 
 
 class FailurePicture(NamedTuple):

@@ -3,7 +3,7 @@ contacts as seen and as planned."""
 
 from collections.abc import Callable, Sequence
 
-from apo_bench.records.method import knows_relations, knows_truth, may_look
+from apo_bench.records import knows_relations, knows_truth, may_look
 from apo_bench.report.tables.table import (
     Column,
     Table,
@@ -13,10 +13,7 @@ from apo_bench.report.tables.table import (
     place_columns,
     rate_columns,
 )
-from apo_bench.statistics.contacts import GapSummary
-from apo_bench.statistics.paired import Paired
-from apo_bench.statistics.rate_text import failures, percent, percents, points, share, signed
-from apo_bench.statistics.rates import Cell
+from apo_bench.statistics import Cell, GapSummary, Paired, failures, percent, percents, points, share, signed
 
 _PAIR_NOTE = (
     "Over the same seeds: at how many of them both methods were right, one alone, or neither; the difference of their "

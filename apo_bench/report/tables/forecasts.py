@@ -2,12 +2,9 @@
 
 from collections.abc import Sequence
 
-from apo_bench.records.method import knows_relations
+from apo_bench.records import knows_relations
 from apo_bench.report.tables.table import Column, Table, millimetres, rate_columns
-from apo_bench.statistics.contacts import Recognition
-from apo_bench.statistics.forecasts import Calibration, Confusion
-from apo_bench.statistics.rate_text import level_label, percent, percents
-from apo_bench.statistics.rates import Rate
+from apo_bench.statistics import Calibration, Confusion, Rate, Recognition, level_label, percent, percents
 
 _CALIBRATION_NOTE = (
     "Over every level, carelessness and clearance. *Covered* is how often the truth lies in the 95 % region that a "

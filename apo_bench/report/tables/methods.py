@@ -4,10 +4,9 @@ level), what its replays take, and what a sweep took."""
 from collections.abc import Sequence
 
 from apo_bench.report.tables.table import Column, Table, interval_columns, place_columns
-from apo_bench.statistics.effort import Effort, TrialTimes, Work
+from apo_bench.statistics import Effort, TrialTimes, Work, points
 from apo_bench.statistics.levels.curves import Area, AreaDifference
 from apo_bench.statistics.levels.half_level import HalfLevel
-from apo_bench.statistics.rate_text import points
 
 _HALF_LEVEL_NOTE = (
     "Where success falls to one half, read along the logarithm of the level, with a 95 % interval; *surely* is from "

@@ -8,10 +8,8 @@ from pathlib import Path
 from typing import Any, NamedTuple, final
 
 from apo_bench.io.tables import write_columns, write_csv
-from apo_bench.records.method import knows_truth
-from apo_bench.statistics.rate_text import level_label
-from apo_bench.statistics.rates import Interval, Place, Rate
-from apo_bench.statistics.settings import cell_place, setting_of
+from apo_bench.records import knows_truth
+from apo_bench.statistics import Interval, Place, Rate, cell_place, level_label, setting_of
 
 
 class Column(NamedTuple):

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.graph import Arc, Graph, Node
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Arc, Graph, Node
+from apo_bench.geometry import Array
 
 
 class Passing(NamedTuple):

@@ -7,8 +7,8 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly.graph import Graph, Node
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Graph, Node
+from apo_bench.geometry import Array
 from apo_bench.show.graph.layers import ArcChain, LayerItem, Layers, Passing, abscissas, arrange_layers, width
 
 _NODE_HEIGHT = 0.5

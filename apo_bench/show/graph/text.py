@@ -2,8 +2,7 @@
 
 from typing import Any
 
-from apo_bench.assembly.graph import Arc, ArcResiduals, Graph, Node
-from apo_bench.assembly.topology import spelled
+from apo_bench.assembly import Arc, ArcResiduals, Graph, Node, spelled
 from apo_bench.io.words import columns
 
 _GRAPH = "apo-bench/graph/1"

@@ -6,11 +6,8 @@ from typing import Literal, cast
 import mujoco
 import numpy as np
 
-from apo_bench.assembly.goals import Plan, Poses
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.intrusion import intrusion_depths
-from apo_bench.geometry.solid import Solid
+from apo_bench.assembly import Plan, Poses
+from apo_bench.geometry import Array, Solid, intrusion_depths, pose
 from apo_bench.prediction.arm import ArmMove
 from apo_bench.simulation.arm_checks.tip_error import motion_error
 from apo_bench.simulation.arms.kinematics import Kinematics

@@ -5,7 +5,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array, remembered
+from apo_bench.geometry import Array, remembered
 from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth, steady
 from apo_bench.simulation.robot.robot import Halt, Robot
 from apo_bench.simulation.scene.scene import Scene

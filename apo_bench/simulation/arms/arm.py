@@ -7,7 +7,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array, copyable, freeze
+from apo_bench.geometry import Array, copyable, freeze
 
 _GRADED = 0.6
 """A gripper of which one step of the command makes this part of its opening knows open and closed only."""

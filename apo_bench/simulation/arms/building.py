@@ -10,8 +10,7 @@ import mujoco
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.resources import folder
 from apo_bench.simulation.arms.apart import build_apart
 from apo_bench.simulation.arms.arm import Arm, ArmLimits

@@ -6,7 +6,7 @@ import mujoco
 import numpy as np
 
 from apo_bench.errors import InputError, unknown
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.simulation.arms.description import ArmDescription
 from apo_bench.simulation.frames import frame, rotation
 

@@ -8,8 +8,7 @@ from typing import final
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, frozen
+from apo_bench.geometry import Array, frozen, pose
 from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.scenario.keys import read_pose
 

@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 from apo_bench.errors import InputError, unknown
 from apo_bench.names import resolve
-from apo_bench.records.short_names import FOREIGN_ARMS
+from apo_bench.records import FOREIGN_ARMS
 from apo_bench.resources import folder
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.building import read_arm, read_described

@@ -3,7 +3,7 @@
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.frames import frame

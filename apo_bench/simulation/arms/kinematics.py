@@ -6,8 +6,7 @@ import mink
 import mujoco
 import numpy as np
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.frames import frame, quaternion
 

@@ -13,7 +13,7 @@ import mujoco
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.simulation.arms.arm import Hand
 from apo_bench.simulation.arms.description import GripperDescription
 from apo_bench.simulation.arms.pressing import PROBE_WIDE, force_of

@@ -3,7 +3,7 @@
 import mujoco
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.simulation.arms.rig import STEP_S, Rig
 from apo_bench.simulation.frames import quaternion
 

@@ -12,7 +12,7 @@ import mujoco
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array, Ints
+from apo_bench.geometry import Array, Ints
 from apo_bench.simulation.arms.description import GripperDescription
 from apo_bench.simulation.physics import physics
 

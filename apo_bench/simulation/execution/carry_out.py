@@ -6,7 +6,7 @@ the plan are carried out in force: guarded where contacts close, by position alo
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.insertion.macros import UP
 from apo_bench.simulation.execution.fingers import centre, change_grip, check_hold, depart, grasp, release
 from apo_bench.simulation.execution.search import after_search, press_in

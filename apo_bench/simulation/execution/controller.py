@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.goals import Plan, Poses, Step, goals_in_force
-from apo_bench.assembly.reached import Outcome, Reached, ReplayResult, Snapshot
+from apo_bench.assembly import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot, Step, goals_in_force
 from apo_bench.prediction.stability import first_unstable
-from apo_bench.records.outcomes import sentence
+from apo_bench.records import sentence
 from apo_bench.simulation.execution.carry_out import bring, take
 from apo_bench.simulation.execution.prepare import Move, key_angles, moves
 from apo_bench.simulation.execution.replay_cache import Progress, ReplayCache, cache_keys

@@ -1,6 +1,6 @@
 """The fingers: take a part, let go of it, take it elsewhere, centre it."""
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.simulation.execution.transfer import Grip, Transfer, hover_pose
 from apo_bench.simulation.robot.in_hand import weld
 from apo_bench.simulation.robot.paths import shifted, smooth, with_height

@@ -6,11 +6,19 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.holds import held_width, holds, holds_whole
-from apo_bench.geometry.intrusion import intrusion_depths, upright_bounds
-from apo_bench.geometry.solid import Piece, Solid, all_boxes, extent
+from apo_bench.assembly import Poses
+from apo_bench.geometry import (
+    Array,
+    Piece,
+    Solid,
+    all_boxes,
+    extent,
+    held_width,
+    holds_whole,
+    intrusion_depths,
+    upright_bounds,
+)
+from apo_bench.geometry.holds import holds
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.frames import frame
 from apo_bench.simulation.robot.gripper import gripper_boxes

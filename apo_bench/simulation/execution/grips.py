@@ -1,9 +1,7 @@
 """How the gripper holds the part of a transfer, as poses of the tip."""
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.clearance import physical_pieces
+from apo_bench.assembly import Assembly, Poses
+from apo_bench.geometry import Array, physical_pieces
 from apo_bench.insertion.surroundings import later_walls
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.execution.grasping import (

@@ -7,11 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.goals import Plan, Poses, Step
-from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, remembered
-from apo_bench.geometry.solid import extent
+from apo_bench.assembly import Assembly, Plan, Poses, Step
+from apo_bench.geometry import Array, extent, pose, remembered
 from apo_bench.insertion.surroundings import OVER_M, ends_of, mouths, neighbours, slide_directions, slow_before
 from apo_bench.scenario.nominal import nominal_operations
 from apo_bench.simulation.execution.grips import centring_grips, transfer_grips

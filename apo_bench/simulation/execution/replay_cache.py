@@ -11,9 +11,8 @@ from typing import Any, NamedTuple, final
 import mujoco
 import numpy as np
 
-from apo_bench.assembly.goals import Poses, Step
-from apo_bench.assembly.reached import ReplayResult, Snapshot
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Poses, ReplayResult, Snapshot, Step
+from apo_bench.geometry import Array
 from apo_bench.simulation.execution.transfer import Transfer
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.world import awaken

@@ -5,8 +5,7 @@ The robot knows what it commands and the force on the part in its hand; it never
 
 import numpy as np
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.simulation.execution.spiral import RADIUS_M, Easing, Spiral
 from apo_bench.simulation.execution.transfer import Grip, Transfer
 from apo_bench.simulation.frames import frame

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.simulation.robot.forces import Guard, LowPass
 
 RADIUS_M = 0.002

@@ -5,10 +5,8 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Operation
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Operation, Poses
+from apo_bench.geometry import Array, pose
 from apo_bench.insertion.arrival import Arrival
 from apo_bench.insertion.line import Attach
 from apo_bench.insertion.macros import MacroName

@@ -12,10 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import world_bounds
+from apo_bench.assembly import Assembly, Poses
+from apo_bench.geometry import Array, world_bounds
 from apo_bench.io.figures import load_matplotlib
 from apo_bench.simulation.film.still import Chapter, FilmMoment
 from apo_bench.simulation.hooks import BY_HAND

@@ -7,11 +7,8 @@ from typing import Any, NamedTuple, final
 import mujoco
 import numpy as np
 
-from apo_bench.assembly.goals import Plan, Poses, placements
-from apo_bench.assembly.topology import PartFace
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.solid import Face
+from apo_bench.assembly import PartFace, Plan, Poses, placements
+from apo_bench.geometry import Array, Face, frozen, pose
 from apo_bench.simulation.hooks import Doing, Hooks
 from apo_bench.simulation.scene.render import arm_home, place_for_picture
 from apo_bench.simulation.scene.scene import Scene

@@ -7,7 +7,7 @@ from typing import Any
 
 import mujoco
 
-from apo_bench.assembly.goals import Poses
+from apo_bench.assembly import Poses
 from apo_bench.errors import InputError
 from apo_bench.simulation.film.film import FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG, framing
 from apo_bench.simulation.film.still import Still, draw_over, show_moment

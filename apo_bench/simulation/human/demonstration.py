@@ -5,12 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly.goals import Demonstration, Layout, placements
-from apo_bench.assembly.reached import Reached, Snapshot
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Demonstration, Layout, Reached, Snapshot, placements
+from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import judge
-from apo_bench.records.outcomes import sentence
+from apo_bench.records import sentence
 from apo_bench.scenario.human_error import careless_covariance, spread_error
 from apo_bench.scenario.scenario import Carelessness
 from apo_bench.simulation.hooks import Hooks

@@ -8,10 +8,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from apo_bench.assembly.goals import Poses, Step
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, Ints
-from apo_bench.geometry.solid import all_boxes
+from apo_bench.assembly import Poses, Step
+from apo_bench.geometry import Array, Ints, all_boxes, pose
 from apo_bench.simulation.frames import quaternion
 from apo_bench.simulation.hooks import BY_HAND, Doing, Hooks, hooks_of
 from apo_bench.simulation.robot.in_hand import TINY_S, take_along

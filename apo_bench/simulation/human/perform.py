@@ -8,10 +8,8 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.topology import Assembly
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Assembly, Poses
+from apo_bench.geometry import Array, pose
 from apo_bench.insertion.arrival import Arrival
 from apo_bench.insertion.macros import UP
 from apo_bench.insertion.surroundings import OVER_M, ends_of, slide_directions

@@ -10,8 +10,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import Box
+from apo_bench.geometry import Array, Box
 from apo_bench.simulation.arms.arm import Arm, Hand
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.arms.rig import below

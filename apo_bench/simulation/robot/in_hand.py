@@ -14,9 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly.reached import InHand
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import InHand
+from apo_bench.geometry import Array, pose
 from apo_bench.simulation.frames import body_frame, quaternion
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import World, part_pose, place, touch_others

@@ -10,10 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array, Ints
-from apo_bench.geometry.intrusion import intrusion_depths, upright_bounds
-from apo_bench.geometry.solid import Piece
+from apo_bench.geometry import Array, Ints, Piece, intrusion_depths, pose, upright_bounds
 from apo_bench.simulation.frames import body_frame
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.robot.paths import Trajectory

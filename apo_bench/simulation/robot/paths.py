@@ -7,8 +7,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array, pose
 
 _PEAK = 1.875
 """Peak over mean speed of a minimum-jerk motion."""

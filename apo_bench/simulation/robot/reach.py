@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.interpolate import CubicSpline
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.robot.paths import Trajectory
 

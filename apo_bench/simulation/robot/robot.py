@@ -13,9 +13,8 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from apo_bench.assembly.goals import Poses, Step
-from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Poses, Step
+from apo_bench.geometry import Array, pose
 from apo_bench.simulation.hooks import TICK_S, Doing, Hooks, hooks_of
 from apo_bench.simulation.robot.forces import WRIST_S, ForceSensors, Guard
 from apo_bench.simulation.robot.gripper import fingers_of

@@ -8,8 +8,8 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly.goals import Plan
-from apo_bench.geometry.arrays import Array
+from apo_bench.assembly import Plan
+from apo_bench.geometry import Array
 
 
 @final

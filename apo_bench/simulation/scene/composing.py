@@ -10,8 +10,7 @@ from typing import Any
 import mujoco
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.solid import all_boxes
+from apo_bench.geometry import Array, all_boxes
 from apo_bench.parts import PartFile, read_part
 from apo_bench.resources import folder
 from apo_bench.scenario.layout import layout_at

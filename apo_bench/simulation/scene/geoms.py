@@ -10,9 +10,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.hull import Hull
-from apo_bench.geometry.solid import Piece, Solid, all_boxes
+from apo_bench.geometry import Array, Hull, Piece, Solid, all_boxes
 
 _ROLLING_CONDIM = 6
 """Of contacts of a cylinder: without friction of rolling, one that lies on a box begins to roll by itself."""

@@ -5,8 +5,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry.holds import held_span
-from apo_bench.geometry.solid import all_boxes
+from apo_bench.geometry import all_boxes, held_span
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.scene.geoms import SMOOTH_PRIORITY

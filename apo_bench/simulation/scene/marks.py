@@ -8,7 +8,7 @@ from typing import Any, final
 import mujoco
 import numpy as np
 
-from apo_bench.geometry.arrays import Array, freeze
+from apo_bench.geometry import Array, freeze
 
 _Color = tuple[float, float, float]
 _WIDTH_M = 0.0035

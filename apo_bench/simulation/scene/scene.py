@@ -6,10 +6,8 @@ from typing import Any, Literal, final
 
 import mujoco
 
-from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.solid import Piece
-from apo_bench.records.settings import check
-from apo_bench.records.thresholds import Criteria
+from apo_bench.geometry import Piece, physical_pieces
+from apo_bench.records import Criteria, check
 from apo_bench.scenario.checks import check_clearance
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.arms.arm import Arm

@@ -11,11 +11,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array, remembered
-from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.hull import SAGITTA_M, Hull, first_of_each
-from apo_bench.geometry.round_face import RoundFace
-from apo_bench.geometry.solid import Piece, Solid
+from apo_bench.geometry import (
+    SAGITTA_M,
+    Array,
+    Hull,
+    Piece,
+    RoundFace,
+    Solid,
+    first_of_each,
+    physical_pieces,
+    remembered,
+)
 
 _THICK_M = 1e-3
 """How thick a wall is, or half as thick as the part is there."""

@@ -9,9 +9,8 @@ from typing import Any, final
 import mujoco
 import numpy as np
 
-from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.reached import Snapshot
-from apo_bench.geometry.arrays import Array, Ints
+from apo_bench.assembly import Poses, Snapshot
+from apo_bench.geometry import Array, Ints
 from apo_bench.simulation.frames import frame, quaternion, rotation
 
 SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)

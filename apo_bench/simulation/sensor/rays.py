@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder, RangeImage
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.simulation.scene.world import World
 
 _AWAY_M = -5.0

@@ -10,7 +10,7 @@ from typing import Any, final
 import numpy as np
 
 from apo_bench.depth_camera.range_finder import VIEWED_POINT_M, PinholeView, RangeFinder, RangeImage, look_at
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.simulation.scene.world import World
 from apo_bench.simulation.sensor.rays import Sight, Strike
 

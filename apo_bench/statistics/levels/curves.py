@@ -14,10 +14,8 @@ from typing import NamedTuple, final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
-from apo_bench.records.method import knows_truth
-from apo_bench.records.row import Row
-from apo_bench.records.settings import RANGE
+from apo_bench.geometry import Array
+from apo_bench.records import RANGE, Row, knows_truth
 from apo_bench.statistics.over_seeds import mean_interval
 from apo_bench.statistics.paired import REFERENCES, place_of_reference
 from apo_bench.statistics.rates import Interval, by_place, order

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 
 _STEEPNESS = np.geomspace(0.4, 40.0, 18)
 """Per unit of the natural logarithm: from hardly falling to a step."""

@@ -15,7 +15,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry import Array
 from apo_bench.statistics.levels.curves import Curve, CurveSetting
 from apo_bench.statistics.levels.falling import profile
 from apo_bench.statistics.over_seeds import threshold

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import final
 
-from apo_bench.records.row import Row
+from apo_bench.records import Row
 from apo_bench.statistics.levels.curves import Area, AreaDifference, area_differences, areas, curves
 from apo_bench.statistics.levels.half_level import HalfLevel, half_levels
 from apo_bench.statistics.paired import REFERENCES, Paired, paired

@@ -6,8 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any, final
 
-from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.reached import Outcome
+from apo_bench.assembly import Observation, Outcome
 from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.correction.own_code.own import OwnCorrectors
 from apo_bench.errors import InputError

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly.outlier_model import OutlierModel
+from apo_bench.assembly import OutlierModel
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, Sighting, beliefs, merged, views_of
 from apo_bench.errors import InputError

@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly.equations import largest_gap
-from apo_bench.assembly.goals import Demonstration, placements
-from apo_bench.assembly.outlier_model import OutlierModel
-from apo_bench.assembly.pattern import looking_away, pattern
+from apo_bench.assembly import Demonstration, OutlierModel, largest_gap, looking_away, placements
+from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.consistency import p_value
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.inferred import inferred_goals
@@ -26,8 +24,8 @@ from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.posterior import jacobian_rank
 from apo_bench.correction.solvers.whitened import noise_factor
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.geometry.overlap import overlap, overlap_area
+from apo_bench.geometry import overlap_area, pose
+from apo_bench.geometry.overlap import overlap
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.relations import culprit, make_relations, with_relations
 from apo_bench.scenario.file import load_scenario
