@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench import Scene, build_scene, load_scenario
 from benchmarks.switches import missing
 
 

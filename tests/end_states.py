@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
+from apo_bench import Criteria, Verdict, judge
 from apo_bench.assembly import Reached, Snapshot, placements
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.judgement import Judgement
-from apo_bench.judging.verdict import Verdict, judge
-from apo_bench.records import Criteria, Thresholds
+from apo_bench.records import Thresholds
 from tests import scenes
 
 CLEARANCE_MM = 0.25

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from apo_bench.assembly import Assembly, Contact, Gap, Observation, Operation, PartFace
+from apo_bench import Assembly, Observation
+from apo_bench.assembly import Contact, Gap, Operation, PartFace
 from apo_bench.geometry import Box, Cylinder, Face, Hull, Piece, RoundFace, Solid, cylinder_hull, pose, sides_of
 
 Z = np.array([0.0, 0.0, 1.0])

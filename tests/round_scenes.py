@@ -7,14 +7,15 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Operation, PartFace
+from apo_bench import Assembly, Scenario
+from apo_bench.assembly import Contact, Operation, PartFace
 from apo_bench.geometry import Array, pose
 from apo_bench.insertion.line import Preference
 from apo_bench.parts import load_part, part_path
 from apo_bench.parts.making import Body, bore, extrude, rectangle, shaft, write_part
 from apo_bench.records import Thresholds
 from apo_bench.scenario.nominal import with_attach_lines
-from apo_bench.scenario.scenario import Grasp, Scenario, Site
+from apo_bench.scenario.scenario import Grasp, Site
 
 PEG = shaft(5, -25, 25, "wall", bottom="bottom", top="top")
 PLATE = extrude(rectangle(60, 60), 0, 20, bores=[bore((0, 0), 5, 0, 20, "bore", fit=True)], bottom="bottom", top="top")

@@ -7,10 +7,9 @@ from dataclasses import fields
 
 import numpy as np
 
+from apo_bench import Scenario, load_scenario
 from apo_bench.assembly import Operation
 from apo_bench.geometry import Box, Cylinder, Face, Hull, RoundFace, Solid, cylinder_hull, world_bounds
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.scenario import Scenario
 from tests.scenes import Scene, mm, scene, table, touch
 
 Z = np.array([0.0, 0.0, 1.0])

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Demonstration, Observation, Operation, PartFace, placements
+from apo_bench import Assembly, Demonstration, Observation
+from apo_bench.assembly import Contact, Operation, PartFace, placements
 from apo_bench.geometry import Array, Box, Face, Solid, pose
 
 AXES = {"x": 0, "y": 1, "z": 2}

@@ -8,7 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench.assembly import Assembly, Contact, Equations, Operation, PartFace, largest_gap, lowered, placements
+from apo_bench import Assembly
+from apo_bench.assembly import Contact, Equations, Operation, PartFace, largest_gap, lowered, placements
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, displacement, least_step
 from apo_bench.geometry import Array, pose

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from apo_bench import InputError
 from apo_bench.assembly import Graph, arc_residuals, largest_gap, product, relation_graph, simplified, spelled
-from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from tests import scenes
 

@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from apo_bench import ContactCorrector, correct, correct_many
 from apo_bench.assembly import looking_away, placements
 from apo_bench.assembly.kinds import OPPOSING
-from apo_bench.correction.contact import ContactCorrector
-from apo_bench.correction.correctors import correct
-from apo_bench.correction.many import correct_many
 from apo_bench.geometry import pose
 from tests.correction.robust.test_robust import look, shown
 from tests.shipped import BOXES

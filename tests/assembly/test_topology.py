@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly import Assembly, Operation, inverted, placements, product, simplified, spelled
+from apo_bench import Assembly
+from apo_bench.assembly import Operation, inverted, placements, product, simplified, spelled
 from apo_bench.assembly.topology import Term
 from apo_bench.geometry import pose
 from tests import scenes

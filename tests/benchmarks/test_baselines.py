@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench import load_scenario
+from apo_bench.scenario.file import scenario_names
 from benchmarks.asked import asked_trials
 from benchmarks.asks import BY_HEART, FEW, asks
 from benchmarks.baselines import Count, Place, counted, kept

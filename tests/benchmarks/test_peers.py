@@ -9,8 +9,7 @@ from types import ModuleType
 
 import pytest
 
-from apo_bench.correction.correctors import correct
-from apo_bench.errors import InputError
+from apo_bench import InputError, correct
 from tests.correction.test_baselines import noisy
 from tests.correction.test_round_contacts import case
 

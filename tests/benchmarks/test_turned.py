@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from apo_bench.correction.correctors import correct
+from apo_bench import correct
 from apo_bench.geometry import pose
 from apo_bench.records import CORRECTORS
 from benchmarks.turned import OURS, SEED, faces_oppose, of_boxes, scenario_of, turned

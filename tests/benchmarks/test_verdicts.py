@@ -8,12 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+from apo_bench import Criteria, judge, load_scenario
 from apo_bench.assembly import Reached, Snapshot, placements
 from apo_bench.geometry import pose
 from apo_bench.judging.judgement import FAULTS
-from apo_bench.judging.verdict import judge
-from apo_bench.records import Criteria
-from apo_bench.scenario.file import load_scenario
 from benchmarks import verdicts
 from tests.scenes import mm
 

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from apo_bench import InputError
 from apo_bench.cad.importing import Imported, import_part, raw_solids
 from apo_bench.cad.step.from_brep import raw_of
 from apo_bench.cad.step.open_cascade import solids_of
 from apo_bench.cli.app import main
-from apo_bench.errors import InputError
 from tests.cad.brep_made import brep_made, write_step
 from tests.cad.held import hold
 from tests.cad.made import MADE

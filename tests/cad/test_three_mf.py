@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from apo_bench import InputError
 from apo_bench.cad.meshes.three_mf import read_3mf
 from apo_bench.cli.app import main
-from apo_bench.errors import InputError
 
 TETRAHEDRON = (
     "<mesh><vertices>"

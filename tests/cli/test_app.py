@@ -12,10 +12,11 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+from apo_bench import load_scenario
 from apo_bench.cli import app as cli
 from apo_bench.records import ROW
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario.file import scenario_names
 
 TRIAL = ("replay", "stick_in_tower", "--seed", "5", "--grasp", "weld", "--method", "none")
 MEASURED = ("replay", "stick_in_tower", "--grasp", "weld", "--method", "none")
@@ -100,7 +101,7 @@ def test_a_graph_says_what_was_not_seen(capsys: pytest.CaptureFixture[str], tmp_
 
 def _castle_aside(folder: Path, mm: float) -> Path:
     """An observation of example 5.1 that is right but for the upper castle, which stands aside along y."""
-    from apo_bench.assembly import Observation
+    from apo_bench import Observation
     from apo_bench.files.json_forms import observation_form, write_form
     from apo_bench.geometry import pose
 
@@ -141,13 +142,11 @@ def test_a_scene_is_one_file_that_mujoco_opens(capsys: pytest.CaptureFixture[str
 def test_the_method_that_is_not_named_is_the_same_everywhere() -> None:
     from inspect import signature
 
+    from apo_bench import Corrected, SweepSettings, TrialSettings, correct
     from apo_bench.cli.correction import correct_command
     from apo_bench.cli.setting_options import trial_options
     from apo_bench.cli.show import show_command
-    from apo_bench.correction.correctors import correct
-    from apo_bench.envs.corrected import Corrected
-    from apo_bench.records import CORRECTOR, TrialSettings
-    from apo_bench.sweeps.grid import SweepSettings
+    from apo_bench.records import CORRECTOR
 
     asked = signature(correct_command, eval_str=True).parameters["method"]
     assert asked.default is None

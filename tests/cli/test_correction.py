@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Consistency, Correction, Observation, largest_gap
+from apo_bench import Correction, Observation, load_scenario, read_observation
+from apo_bench.assembly import Consistency, largest_gap
 from apo_bench.cli import app as cli
 from apo_bench.files.json_forms import observation_form, write_form
 from apo_bench.files.json_reading import read_plan
-from apo_bench.files.observation import read_observation
 from apo_bench.geometry import pose
-from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario.file import scenario_names
 from apo_bench.show.correct_text import correction_lines, shown_p
 
 ROOT = Path(__file__).parents[2]

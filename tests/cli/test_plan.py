@@ -9,19 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Plan, Step, placements
+from apo_bench import InputError, Plan, Scenario, build_scene, draw_layout, load_scenario
+from apo_bench.assembly import Step, placements
 from apo_bench.cli import app as cli
-from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.insertion.arrival import turning_state
 from apo_bench.insertion.operations import understand
-from apo_bench.scenario.file import load_scenario, scenario_names
-from apo_bench.scenario.layout import draw_layout
+from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.nominal import nominal_operations, nominal_start
-from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.plan_text import direction, plan_lines, plan_lines_form, plan_text
 from apo_bench.simulation.execution.prepare import moves
-from apo_bench.simulation.scene.scene import build_scene
 from tests import scenes
 
 ROOT = Path(__file__).parents[2]

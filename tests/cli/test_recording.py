@@ -8,10 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from apo_bench import load_scenario, read_observation
 from apo_bench.cli.app import main
-from apo_bench.files.observation import read_observation
 from apo_bench.geometry import pose
-from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import layout_at
 from benchmarks.recording_forms import FORMS, Tracked
 from tests.recorded import CAMERA, seen

@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Assembly, Observation, Operation
+from apo_bench import Assembly, InputError, Observation, correct
+from apo_bench.assembly import Operation
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.baselines.intruding import intruding, meeting
 from apo_bench.correction.baselines.least_squares import least_squares
 from apo_bench.correction.baselines.penalty import loss
-from apo_bench.correction.correctors import correct
-from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from apo_bench.geometry.intrusion import intrusion
 from apo_bench.simulation.settling import settle

@@ -10,10 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Assembly, Operation, Relation
+from apo_bench import Assembly, load_scenario
+from apo_bench.assembly import Operation, Relation
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.baselines.candidates import candidates
-from apo_bench.scenario.file import load_scenario
 from tests import scenes
 from tests.assembly.test_equations import random_scene
 

@@ -10,18 +10,15 @@ from functools import partial
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Assembly, Correction, Observation
+from apo_bench import Assembly, ContactCorrector, Correction, Observation, correct, correct_many, load_scenario
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.contact import ContactCorrector, Doubt
-from apo_bench.correction.correctors import correct
-from apo_bench.correction.many import correct_many
+from apo_bench.correction.contact import Doubt
 from apo_bench.correction.solvers import kernels
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
 from apo_bench.correction.solvers.gauss_newton import NearestGoals, nearest_goals
 from apo_bench.correction.solvers.linear_step import DenseStep
 from apo_bench.correction.solvers.whitened import coordinates_of
 from apo_bench.geometry import Array, pose
-from apo_bench.scenario.file import load_scenario
 from tests import scenes
 
 by_kernels = partial(nearest_goals, kernels=kernels.kernels())

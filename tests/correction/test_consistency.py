@@ -10,12 +10,10 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import kstest
 
-from apo_bench.assembly import Assembly, Consistency, Contact, Correction, Observation, PartFace
+from apo_bench import Assembly, ContactCorrector, Correction, InputError, Observation, correct
+from apo_bench.assembly import Consistency, Contact, PartFace
 from apo_bench.correction.consistency import p_value
-from apo_bench.correction.contact import ContactCorrector
-from apo_bench.correction.correctors import correct
 from apo_bench.correction.suspects import MOST_SUSPECTS
-from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Face, pose
 from benchmarks.corrector_bench.problems import problem
 from tests import scenes

@@ -8,16 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Assembly, Gap, Observation, placements
+from apo_bench import Assembly, InputError, Observation, Scenario, explain, load_scenario
+from apo_bench.assembly import Gap, placements
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.contact import contact
 from apo_bench.correction.directions import Direction, directions, held
-from apo_bench.correction.explanation import Explanation, explain
+from apo_bench.correction.explanation import Explanation
 from apo_bench.correction.solvers.newton import solve_newton
-from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
-from apo_bench.scenario.file import load_scenario, scenario_names
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario.file import scenario_names
 from benchmarks.corrector_bench import problems
 
 STEP = 1e-3

@@ -10,9 +10,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.sparse import csr_array
 
-from apo_bench.assembly import Assembly, Observation, Operation
-from apo_bench.correction.contact import ContactCorrector
-from apo_bench.correction.correctors import correct
+from apo_bench import Assembly, ContactCorrector, Observation, correct
+from apo_bench.assembly import Operation
 from apo_bench.correction.solvers import posterior, sparse
 from apo_bench.correction.solvers.compact import CompactEquations
 from apo_bench.correction.solvers.gauss_newton import NearestGoals, batch_goals, nearest_goals

@@ -11,12 +11,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly import Demonstration, Observation
+from apo_bench import Demonstration, InputError, Observation, draw_layout, load_scenario
 from apo_bench.cli.app import main
 from apo_bench.correction.learning import likelihood
 from apo_bench.correction.learning.evidence import UNITS, readings
 from apo_bench.correction.learning.likelihood import ObservedErrors
-from apo_bench.errors import InputError
 from apo_bench.files.json_forms import observation_form, write_form
 from apo_bench.geometry import pose
 from apo_bench.observation.fitting.components import COMPONENTS, component_factors, view_ways
@@ -25,8 +24,6 @@ from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.fitted import restated, view_frame
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.noise_file import noise_text, read_noise
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.layout import draw_layout
 from apo_bench.trial.learned_noise import learn
 
 CONSTANT = np.array([1.5, -1.0, 2.0, 1.0, -0.8, 0.5]) * UNITS

@@ -9,14 +9,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly import Correction, Gap, Observation
+from apo_bench import ContactCorrector, Correction, InputError, Observation, correct_many
+from apo_bench.assembly import Gap
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.contact import ContactCorrector
-from apo_bench.correction.many import BATCH, correct_many
+from apo_bench.correction.many import BATCH
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
 from apo_bench.correction.solvers.laid import laid_contacts
-from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from tests import scenes
 from tests.assembly.test_equations import random_scene

@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 
 import apo_bench
-from apo_bench.assembly import Correction, Observation, largest_gap
+from apo_bench import Correction, InputError, Observation, correct, correct_many
+from apo_bench.assembly import largest_gap
 from apo_bench.correction.contact import contact
-from apo_bench.correction.correctors import correct
-from apo_bench.correction.many import correct_many
-from apo_bench.errors import InputError
 from apo_bench.geometry import Array
 from tests import scenes
 

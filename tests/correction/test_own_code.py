@@ -19,8 +19,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Correction, Layout, Observation
-from apo_bench.correction.correctors import CorrectorMisbehaved, correct
+from apo_bench import (
+    Correction,
+    InputError,
+    Layout,
+    Observation,
+    TrialSettings,
+    build_scene,
+    correct,
+    load_scenario,
+    run_trial,
+)
+from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.correction.own_code import own
 from apo_bench.correction.own_code import process as own_process
 from apo_bench.correction.own_code.forms import (
@@ -31,15 +41,10 @@ from apo_bench.correction.own_code.forms import (
 )
 from apo_bench.correction.own_code.message import FRAME_HEADER, GarbledMessage, receive, send
 from apo_bench.correction.own_code.own import CorrectorLost, OwnCorrectors
-from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.io.processes import descendants
-from apo_bench.records import TrialSettings
-from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.sweeps.work.environment_lock import EnvironmentLock
 from apo_bench.sweeps.work.worker import Worker
-from apo_bench.trial.trial import run_trial
 from tests import scenes
 
 LINUX = pytest.mark.skipif(sys.platform != "linux", reason="what a process leaves behind is found in /proc")

@@ -5,18 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Demonstration, Observation
+from apo_bench import Demonstration, Observation, correct, correct_many, observe
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.consistency import fit_deviation, softened_length
 from apo_bench.correction.contact import contact_refuse
-from apo_bench.correction.correctors import correct
-from apo_bench.correction.many import correct_many
 from apo_bench.correction.play import fit_covariance, plays
 from apo_bench.correction.problem import problem_of
 from apo_bench.correction.solvers.gauss_newton import nearest_goals
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.observation.observing import observe
 from benchmarks.corrector_bench.draws import draw
 from benchmarks.corrector_bench.problems import chain
 from tests.correction.robust.test_robust import look, shown

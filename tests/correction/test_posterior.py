@@ -11,9 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly import Correction, Gap, Observation, Operation
-from apo_bench.correction.correctors import correct
-from apo_bench.correction.many import correct_many
+from apo_bench import Correction, Observation, correct, correct_many
+from apo_bench.assembly import Gap, Operation
 from apo_bench.correction.region import contains_truth
 from apo_bench.correction.solvers.gauss_newton import nearest_goals
 from apo_bench.correction.solvers.posterior import freedom, jacobian_rank, marginals

@@ -9,14 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Plan, Step
-from apo_bench.correction.correctors import correct
+from apo_bench import Plan, Scene, build_scene, correct, draw_layout, load_scenario, replay
+from apo_bench.assembly import Step
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.layout import draw_layout
-from apo_bench.simulation.execution.controller import replay
-from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.stages import (
     LAYOUT,
     Attempt,

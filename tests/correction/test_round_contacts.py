@@ -9,17 +9,14 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from apo_bench.assembly import Assembly, Gap, Observation, PartFace, SharedError, largest_gap, lowered
+from apo_bench import Assembly, ContactCorrector, InputError, Observation, correct, correct_many, explain
+from apo_bench.assembly import Gap, PartFace, SharedError, largest_gap, lowered
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.contact import ContactCorrector, contact
-from apo_bench.correction.correctors import correct
-from apo_bench.correction.explanation import explain
+from apo_bench.correction.contact import contact
 from apo_bench.correction.learning.evidence import readings
-from apo_bench.correction.many import correct_many
 from apo_bench.correction.own_code.forms import observation_message, parse_observation
 from apo_bench.correction.play import fit_covariance
 from apo_bench.correction.region import contains_truth
-from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.records import with_simulated
 from apo_bench.show.explain_text import sentences

@@ -8,17 +8,21 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly import Demonstration, Gap, Observation, SharedError
-from apo_bench.correction.contact import ContactCorrector
-from apo_bench.correction.correctors import correct
-from apo_bench.correction.explanation import explain
-from apo_bench.correction.many import correct_many
+from apo_bench import (
+    ContactCorrector,
+    Demonstration,
+    InputError,
+    Observation,
+    correct,
+    correct_many,
+    draw_layout,
+    explain,
+    load_scenario,
+)
+from apo_bench.assembly import Gap, SharedError
 from apo_bench.correction.region import contains_truth
-from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.layout import draw_layout
 from apo_bench.show.explain_text import sentences
 
 

@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from apo_bench import ContactCorrector, correct, correct_many
 from apo_bench.assembly import largest_gap, looking_away
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.contact import ContactCorrector
-from apo_bench.correction.correctors import correct
-from apo_bench.correction.many import correct_many
 from apo_bench.correction.solvers.compact import compact_equations
 from apo_bench.correction.solvers.curved import descended
 from apo_bench.correction.solvers.gauss_newton import nearest_goals

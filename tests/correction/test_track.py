@@ -11,11 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_array_equal
 
-from apo_bench.assembly import Correction, Observation, largest_gap
+from apo_bench import Correction, Observation, correct
+from apo_bench.assembly import largest_gap
 from apo_bench.assembly.goals import once_each
 from apo_bench.correction.baselines.paper import paper
 from apo_bench.correction.baselines.track import nested, paper_track, reached_back
-from apo_bench.correction.correctors import correct
 from apo_bench.geometry import Array, is_rigid
 from apo_bench.records import CODES
 from tests import scenes

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from apo_bench import InputError, observe
 from apo_bench.assembly import Contact, PartFace
 from apo_bench.cli.app import main
 from apo_bench.envs.apo_replay import APOReplay
-from apo_bench.errors import InputError, failed
+from apo_bench.errors import failed
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.observation.observing import observe
 from apo_bench.observation.relations import with_relations
 from tests import scenes
 

@@ -10,11 +10,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import nnls
 
-from apo_bench.assembly import Assembly, Contact, Gap, Observation, Operation
+from apo_bench import Assembly, ContactCorrector, InputError, Observation, correct
+from apo_bench.assembly import Contact, Gap, Operation
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.contact import ContactCorrector
-from apo_bench.correction.correctors import correct
-from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose, right_jacobian
 from tests import scenes
 from tests.correction.test_large import fence

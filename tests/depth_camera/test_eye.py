@@ -13,22 +13,26 @@ import gymnasium
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Observation
+from apo_bench import (
+    InputError,
+    Observation,
+    Scene,
+    SweepSettings,
+    TrialSettings,
+    build_scene,
+    load_scenario,
+    run_sweep,
+    run_trial,
+)
 from apo_bench.cli.app import main
 from apo_bench.depth_camera.distance import join_shapes, shape_of, strike_distances
 from apo_bench.depth_camera.range_finder import RangeFinder
 from apo_bench.depth_camera.range_sensor import RangeSensor
-from apo_bench.errors import InputError
 from apo_bench.geometry import Array, physical_pieces, pose, symmetries
-from apo_bench.records import TrialSettings
-from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.human.hands import Hands
-from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.sensor.rays import Sight
 from apo_bench.simulation.sensor.watch import Change, TvCamera
 from apo_bench.sweeps import sweep
-from apo_bench.sweeps.grid import SweepSettings
-from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.trial.stages import (
     OBSERVATION,
     SimulatedDemonstration,
@@ -37,7 +41,6 @@ from apo_bench.trial.stages import (
     simulate_demonstration,
     stream,
 )
-from apo_bench.trial.trial import run_trial
 from tests import pages
 
 SVG_TEXT = "{http://www.w3.org/2000/svg}text"

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.assembly import Assembly, Operation
+from apo_bench import Assembly
+from apo_bench.assembly import Operation
 from apo_bench.depth_camera.distance import Shape, join_shapes, shape_of, signed_distance, strike_distances
 from apo_bench.depth_camera.fit import PRIOR, Points, covariance, distinct, refine, starts
 from apo_bench.depth_camera.follow import Expected, follow_demonstration

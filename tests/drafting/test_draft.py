@@ -7,18 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from apo_bench import InputError, Scenario, load_scenario
 from apo_bench.cli.app import main
 from apo_bench.drafting.checking import line_of
 from apo_bench.drafting.draft import draft
 from apo_bench.drafting.posed import PosedPart, on_the_table
 from apo_bench.drafting.waiting import stance
 from apo_bench.drafting.writing import scenario_text
-from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.parts import load_part
 from apo_bench.parts.making import Body, bore, extrude, join, polygon, rectangle, shaft, write_part
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.scenario import Scenario
 
 
 def made(folder: Path, bodies: dict[str, Body], places: dict[str, tuple[str, np.ndarray]]) -> tuple[PosedPart, ...]:

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from apo_bench import InputError
 from apo_bench.drafting.draft import draft
 from apo_bench.drafting.posed import on_the_table, read_posed
 from apo_bench.drafting.waiting import Stance, laid_out, site_of, stance
 from apo_bench.drafting.writing import scenario_text
-from apo_bench.errors import InputError
 from apo_bench.geometry import Box, Cylinder, Solid, cylinder_hull, pose
 from apo_bench.parts.making import extrude, rectangle, shaft
 from tests.drafting.test_draft import at, made

@@ -16,19 +16,16 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 import apo_bench
-from apo_bench.assembly import Correction, Observation, Outcome, Step
-from apo_bench.correction.correctors import correct
+from apo_bench import Correction, InputError, Observation, Scene, TrialSettings, correct, run_trial
+from apo_bench.assembly import Outcome, Step
 from apo_bench.envs import apo_replay as envs
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.infos import nullable, predicted_info
-from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.records import TrialSettings, outcomes
+from apo_bench.records import outcomes
 from apo_bench.simulation.execution import controller as replays
-from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.stages import SimulatedDemonstration, looks_at, simulate_demonstration
-from apo_bench.trial.trial import run_trial
 
 SEED = 5
 REPLAY = "apo_bench.envs.apo_replay.replay_and_judge"

@@ -13,14 +13,11 @@ import numpy as np
 import pytest
 
 import apo_bench
-from apo_bench.assembly import Correction, Observation
+from apo_bench import Correction, InputError, Observation, TrialSettings, run_trial
 from apo_bench.envs import episode
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.spaces import as_seen_entries
-from apo_bench.errors import InputError
 from apo_bench.observation.noise import NOISES, Level, make_noise
-from apo_bench.records import TrialSettings
-from apo_bench.trial.trial import run_trial
 
 SEED = 5
 WAYS: dict[str, Callable[[Any], Any]] = {

@@ -11,8 +11,8 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 
+from apo_bench import InputError
 from apo_bench.cli.app import main
-from apo_bench.errors import InputError
 from apo_bench.files import bop, bop_truth
 from apo_bench.files.bop import read_results
 from apo_bench.files.bop_truth import read_truth

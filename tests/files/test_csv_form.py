@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 import apo_bench
-from apo_bench.errors import InputError
+from apo_bench import InputError, load_scenario
 from apo_bench.files import json_forms as files
 from apo_bench.files.csv_form import read_table, table
 from apo_bench.files.observation import read_observation_file, read_stated
 from apo_bench.geometry import pose
-from apo_bench.scenario.file import load_scenario
 
 SCENARIO = load_scenario("stick_in_tower")
 HEADER = "operation,part,x_mm,y_mm,z_mm,qw,qx,qy,qz"

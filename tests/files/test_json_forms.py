@@ -14,13 +14,11 @@ import pytest
 from hypothesis import HealthCheck, event, given, settings
 from hypothesis import strategies as st
 
-from apo_bench.assembly import Observation, OutlierModel, Plan, SharedError, Step, Tails, first_order
-from apo_bench.errors import InputError
+from apo_bench import InputError, Observation, Plan, Scenario, load_scenario
+from apo_bench.assembly import OutlierModel, SharedError, Step, Tails, first_order
 from apo_bench.files import json_forms as files
 from apo_bench.files import json_reading
 from apo_bench.geometry import pose
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.scenario import Scenario
 
 SCENARIO = load_scenario("stick_in_tower")
 N = len(SCENARIO.assembly)

@@ -8,12 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.errors import InputError
+from apo_bench import InputError, load_scenario, read_observation
 from apo_bench.files import json_forms as files
 from apo_bench.files import json_reading
 from apo_bench.files.csv_form import read_table, table
-from apo_bench.files.observation import as_planned, read_observation
-from apo_bench.scenario.file import load_scenario
+from apo_bench.files.observation import as_planned
 
 SCENARIO = replace(load_scenario("stick_in_tower"), clearance_mm=0.4)
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from apo_bench.errors import InputError
+from apo_bench import InputError
 from apo_bench.geometry import Face, Solid, physical_pieces
 from apo_bench.parts import load_part
 from apo_bench.parts.faces import SIDES, unite

@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
+from apo_bench import load_scenario
 from apo_bench.geometry import Array, Box, Solid, folds, pose, quarter_turns, symmetries
 from apo_bench.geometry.symmetry import nearest_symmetry
-from apo_bench.scenario.file import load_scenario
 from tests import scenes
 
 pytestmark = pytest.mark.numeric

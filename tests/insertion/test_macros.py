@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Assembly, Operation
+from apo_bench import Assembly
+from apo_bench.assembly import Operation
 from apo_bench.geometry import Array, Solid
 from apo_bench.insertion.arrival import Arrival, arrive
 from apo_bench.insertion.line import Preference

@@ -8,7 +8,8 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Assembly, Operation, placements
+from apo_bench import Assembly
+from apo_bench.assembly import Operation, placements
 from apo_bench.geometry import Array, Box, RoundFace, Solid
 from apo_bench.insertion.arrival import Arrival, arrive, turning_state
 from apo_bench.insertion.line import Preference

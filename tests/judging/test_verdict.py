@@ -12,12 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from apo_bench import Criteria, Verdict, judge
 from apo_bench.assembly import Reached, placements
 from apo_bench.geometry import pose
 from apo_bench.judging.judgement import FAULTS
 from apo_bench.judging.rules import fixtures
-from apo_bench.judging.verdict import Verdict, judge
-from apo_bench.records import CODES, Criteria, Thresholds
+from apo_bench.records import CODES, Thresholds
 from tests import scenes
 from tests.end_states import (
     BRIDGE,

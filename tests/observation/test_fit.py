@@ -12,8 +12,8 @@ from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation
 from scipy.stats import kstest
 
+from apo_bench import InputError
 from apo_bench.cli.app import main
-from apo_bench.errors import InputError
 from apo_bench.files.bop import read_results
 from apo_bench.files.bop_truth import read_truth
 from apo_bench.observation.fitting.fit import fit_noise, fit_split, goodness_of_fit, outliers_by_score

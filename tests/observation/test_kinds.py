@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench.assembly import Demonstration, Observation
-from apo_bench.errors import InputError
+from apo_bench import Demonstration, InputError, Observation, observe
 from apo_bench.geometry import Array, pose, symmetries
 from apo_bench.observation.models import shared
 from apo_bench.observation.models.anisotropic import Sighted, line_of_sight
@@ -20,7 +19,6 @@ from apo_bench.observation.models.outliers import MISSES, OUTLIER_TIMES, OUTLIER
 from apo_bench.observation.models.shared import CORRELATION, Bias, BiasView, Correlated
 from apo_bench.observation.models.symmetric import WORSE, AnyTurn, Symmetric
 from apo_bench.observation.noise import NOISES, Level, Noise, make_noise
-from apo_bench.observation.observing import observe
 from tests import scenes
 
 LEVEL = Level(2.0, 2.0)

@@ -12,17 +12,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench.assembly import Demonstration, Layout, Observation, placements
+from apo_bench import Demonstration, Layout, Observation, TrialSettings, draw_layout, load_scenario, observe
+from apo_bench.assembly import placements
 from apo_bench.envs.spaces import LARGEST_DEVIATION, ROOM_M, packed
 from apo_bench.geometry import Array, pose
 from apo_bench.observation.models import anisotropic
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.isotropic import COVARIANCE_FLOOR, Isotropic
 from apo_bench.observation.noise import NOISES, Level, Noise, make_noise
-from apo_bench.observation.observing import observe
-from apo_bench.records import TrialSettings
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.layout import draw_layout
 from apo_bench.trial import trial
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, stream

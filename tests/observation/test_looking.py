@@ -5,12 +5,9 @@ from functools import cache
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Demonstration
-from apo_bench.errors import InputError
+from apo_bench import Demonstration, InputError, draw_layout, load_scenario
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.layout import draw_layout
 
 N = 5
 

@@ -12,10 +12,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial.transform import Rotation
 from scipy.stats import chi2
 
-from apo_bench.assembly import Observation
+from apo_bench import InputError, Observation, TrialSettings, observe
 from apo_bench.cli.app import main
 from apo_bench.envs.spaces import LARGEST_DEVIATION
-from apo_bench.errors import InputError
 from apo_bench.files.bop import read_results
 from apo_bench.files.bop_truth import read_truth
 from apo_bench.geometry import Array, pose
@@ -27,9 +26,7 @@ from apo_bench.observation.models.outliers import UNSEEN_DEVIATION
 from apo_bench.observation.models.residuals import Residuals, match_residuals
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.noise_file import noise_text, read_noise
-from apo_bench.observation.observing import observe
 from apo_bench.observation.presets import presets
-from apo_bench.records import TrialSettings
 from apo_bench.trial.fingerprint import noise_content, spec_hash
 from apo_bench.trial.planning import apply_method
 from tests import bop_made as made_of

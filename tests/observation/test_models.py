@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench.assembly import Observation
+from apo_bench import Observation, observe
 from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.anisotropic import (
     ACROSS_SIGHT,
@@ -20,7 +20,6 @@ from apo_bench.observation.models.anisotropic import (
 )
 from apo_bench.observation.models.isotropic import LEAST_FACTOR, MOST_FACTOR, Isotropic, PerPart, part_factors
 from apo_bench.observation.noise import Level, Noise, make_noise
-from apo_bench.observation.observing import observe
 from tests import scenes
 
 TOWER = scenes.turned(scenes.stick_in_tower(), pose.at((0.1, -0.02, 0.0), (20.0, 35.0, 23.0)))

@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench.assembly import Demonstration, Observation
-from apo_bench.errors import InputError
+from apo_bench import Demonstration, InputError, Observation, observe
 from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.isotropic import COVARIANCE_FLOOR, Isotropic, floored
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.observation.observing import observe
 from tests import scenes
 
 pytestmark = pytest.mark.numeric

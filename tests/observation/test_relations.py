@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench.assembly import Assembly, Contact, Observation, relation_graph
+from apo_bench import Assembly, InputError, Observation, TrialSettings, load_scenario
+from apo_bench.assembly import Contact, relation_graph
 from apo_bench.assembly.equations import equations
-from apo_bench.errors import InputError
 from apo_bench.observation.relations import (
     NEAR_FACES_M,
     TOUCHING_M,
@@ -22,8 +22,6 @@ from apo_bench.observation.relations import (
     relations_name,
     with_relations,
 )
-from apo_bench.records import TrialSettings
-from apo_bench.scenario.file import load_scenario
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import ARM, DEMONSTRATION, LAYOUT, OBSERVATION, RELATIONS, stream
 from tests import scenes

@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Assembly, Contact, PartFace
-from apo_bench.correction.correctors import correct
-from apo_bench.errors import InputError
+from apo_bench import Assembly, InputError, correct
+from apo_bench.assembly import Contact, PartFace
 from apo_bench.observation.relations import Shifted, culprit, false, missed, with_relations
 from tests import rounds, scenes
 from tests.brackets import on_pins

@@ -10,14 +10,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.errors import InputError
+from apo_bench import InputError, load_scenario
 from apo_bench.geometry import Box
 from apo_bench.parts import load_part, part_names, part_path, read_part
 from apo_bench.parts.allowed import ELEMENT_RULES, LARGEST_PART_BYTES, MOST_FACES, MOST_PIECES, MOST_SITES
 from apo_bench.parts.check import check_solid
 from apo_bench.parts.faces import unite
 from apo_bench.resources import folder
-from apo_bench.scenario.file import load_scenario
 
 PART = """<mujoco model="thing">
   <default>
@@ -277,7 +276,7 @@ SCENARIO = (folder("scenarios") / "stick_in_tower.toml").read_text(encoding="utf
 
 
 def test_a_scene_does_not_take_a_part_that_has_changed_since(tmp_path: Path) -> None:
-    from apo_bench.simulation.scene.scene import build_scene
+    from apo_bench import build_scene
 
     part = tmp_path / "rod.xml"
     part.write_bytes(part_path("stick").read_bytes())
@@ -302,7 +301,7 @@ def test_a_scene_does_not_take_a_part_that_has_changed_since(tmp_path: Path) -> 
 def test_what_stands_at_the_ends_of_the_ranges_is_composed(
     said: str, friction: tuple[float, ...], tmp_path: Path
 ) -> None:
-    from apo_bench.simulation.scene.scene import build_scene
+    from apo_bench import build_scene
 
     part = tmp_path / "rod.xml"
     whole = part_path("stick").read_text(encoding="utf-8")

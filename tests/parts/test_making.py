@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.errors import InputError
+from apo_bench import InputError
 from apo_bench.geometry import Box, physical_pieces
 from apo_bench.parts import load_part
 from apo_bench.parts.making import (

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.errors import InputError
+from apo_bench import InputError
 from apo_bench.geometry import Box, Face, face_area
 from apo_bench.parts import load_part, part_names, part_path
 from apo_bench.parts.faces import SIDES, unite

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.errors import InputError
+from apo_bench import InputError
 from apo_bench.parts import load_part, part_names, part_path, read_part
 from apo_bench.parts.load import check_part
 from apo_bench.parts.making import bore, circle, extrude, join, rectangle, shaft, write_part

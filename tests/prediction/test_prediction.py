@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.assembly import Assembly, Operation, Plan, Step, placements
+from apo_bench import Assembly, Plan, load_scenario
+from apo_bench.assembly import Operation, Step, placements
 from apo_bench.geometry import Array, pose
 from apo_bench.insertion.line import Attach
 from apo_bench.prediction.arm import ArmMove
 from apo_bench.prediction.failure import Prediction, predict
 from apo_bench.prediction.resting import is_support, residual, resting_poses
 from apo_bench.records import Thresholds
-from apo_bench.scenario.file import load_scenario
 from tests import rounds, scenes
 from tests.scenes import touch
 

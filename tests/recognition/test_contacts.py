@@ -11,17 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly import Assembly, Contact, Facing, Gap, Observation, Operation, placements
+from apo_bench import Assembly, InputError, Observation, correct, draw_layout, load_scenario, recognise
+from apo_bench.assembly import Contact, Facing, Gap, Operation, placements
 from apo_bench.assembly.facing import facing
-from apo_bench.correction.correctors import correct
-from apo_bench.errors import InputError
 from apo_bench.geometry import Solid, pose
 from apo_bench.observation.models.isotropic import floored
 from apo_bench.recognition.belief import Belief, initial_belief
-from apo_bench.recognition.contacts import recognise
 from apo_bench.recognition.thresholds import FIXED_RULES, RULES_BY_NOISE, Rules, pair_thresholds, reality, slack
-from apo_bench.scenario.file import load_scenario, scenario_names
-from apo_bench.scenario.layout import draw_layout
+from apo_bench.scenario.file import scenario_names
 from apo_bench.trial.recognised_contacts import count_contacts, recognise_by, with_recognised_contacts
 from tests import scenes
 

@@ -10,10 +10,9 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import multivariate_normal
 
-from apo_bench.assembly import Assembly, Contact, Observation, Operation, PartFace
+from apo_bench import Assembly, ContactCorrector, InputError, Observation
+from apo_bench.assembly import Contact, Operation, PartFace
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.contact import ContactCorrector
-from apo_bench.errors import InputError
 from apo_bench.geometry import Hull, pose, ways_out
 from apo_bench.geometry.intrusion import intrusion
 from apo_bench.recognition.estimate import estimate

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from apo_bench import recognise
 from apo_bench.assembly import Facing, contact_kind, measure_round, placements, round_pairs
 from apo_bench.assembly.facing import facing
 from apo_bench.geometry import Array, Face, RoundFace, pose
-from apo_bench.recognition.contacts import recognise
 from apo_bench.recognition.thresholds import FIXED_RULES, Rules, pair_thresholds, reality, slack
 from tests import rounds, scenes
 from tests.brackets import on_pins, under_roof

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.errors import InputError
+from apo_bench import InputError
 from apo_bench.geometry import pose
 from apo_bench.recording.camera_file import Conventions, read_camera
 from apo_bench.recording.formats import FORMATS, read_log

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from apo_bench import load_scenario
 from apo_bench.geometry import Array, pose
 from apo_bench.recording.averaging import Mean
 from apo_bench.recording.camera_pose import CameraPose, solve_camera
 from apo_bench.recording.contact_fit import contact_fit
-from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import layout_at
 from tests.recorded import CAMERA
 

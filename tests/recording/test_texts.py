@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from apo_bench import load_scenario
 from apo_bench.geometry import pose
 from apo_bench.recording.camera_file import CameraFile, Conventions
 from apo_bench.recording.camera_pose import CameraPose
@@ -11,7 +12,6 @@ from apo_bench.recording.importing import planned_starts
 from apo_bench.recording.log import Log
 from apo_bench.recording.show.drawing import unfit_drawing
 from apo_bench.recording.show.text import camera_lines
-from apo_bench.scenario.file import load_scenario
 from tests.recorded import seen
 
 NAME = "stick_in_tower"

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.errors import InputError
+from apo_bench import InputError
 from apo_bench.io.plain_text import clean
 from apo_bench.records.run.report_rows import report_rows
 from apo_bench.records.run.run_file import read_run

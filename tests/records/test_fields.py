@@ -8,13 +8,11 @@ from typing import Any
 
 import pytest
 
-from apo_bench.records import REQUIRED, ROW_FIELDS, TrialSettings
+from apo_bench import TrialSettings, build_scene, load_scenario, run_trial
+from apo_bench.records import REQUIRED, ROW_FIELDS
 from apo_bench.records.run.validation import TIMING_FIELDS, row_of, timing_of, unwritable
-from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.sweeps.work.worker import timing
 from apo_bench.trial.row import lost, misbehaved
-from apo_bench.trial.trial import run_trial
 
 SPEC = TrialSettings("block_on_block", level_mm=3.0, level_deg=2.0, method="paper", seed=2)
 

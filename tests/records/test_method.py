@@ -2,14 +2,13 @@
 
 import pytest
 
+from apo_bench import InputError, SweepSettings, TrialSettings, load_scenario
 from apo_bench.assembly import LookingCorrector
-from apo_bench.errors import InputError
 from apo_bench.names import resolve
-from apo_bench.records import CORRECTORS, TrialSettings, knows_relations, knows_truth, may_look, parsed
+from apo_bench.records import CORRECTORS, knows_relations, knows_truth, may_look, parsed
 from apo_bench.records.method import checked_method
-from apo_bench.scenario.file import load_scenario
 from apo_bench.statistics import rank
-from apo_bench.sweeps.grid import SweepSettings, units
+from apo_bench.sweeps.grid import units
 
 
 @pytest.mark.parametrize(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from apo_bench.errors import InputError
+from apo_bench import InputError
 from apo_bench.records import checked_robot_error, robot_sigmas
 from apo_bench.records.robot_error import Sigmas
 

@@ -19,8 +19,8 @@ from typing import Any
 
 import pytest
 
+from apo_bench import InputError
 from apo_bench.assembly import Outcome
-from apo_bench.errors import InputError
 from apo_bench.records import KEY, ROW
 from apo_bench.records.run import run_folder
 from apo_bench.records.run.run_file import run_record

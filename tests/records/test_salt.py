@@ -15,20 +15,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from apo_bench import InputError, Scene, SweepSettings, TrialSettings, run_sweep
 from apo_bench.cli import app as cli
-from apo_bench.errors import InputError
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.records import Salt, TrialSettings, read_salt, salt_of_sweep
+from apo_bench.records import Salt, read_salt, salt_of_sweep
 from apo_bench.records import salt as module
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.salt import make_salt
 from apo_bench.report.comparison.compare import compare
 from apo_bench.report.report import report
 from apo_bench.show.failure_pictures import failure_pictures
-from apo_bench.simulation.scene.scene import Scene
 from apo_bench.statistics import tally
-from apo_bench.sweeps.grid import SweepSettings, load_all, units
-from apo_bench.sweeps.sweep import run_sweep
+from apo_bench.sweeps.grid import load_all, units
 from apo_bench.trial.fingerprint import spec_hash
 from apo_bench.trial.stages import ARM, OBSERVATION, observe_demonstration, simulate_demonstration, stream
 from tests import pages

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
+from apo_bench import InputError
 from apo_bench.cli import app as cli
-from apo_bench.errors import InputError
 from apo_bench.report.comparison.compare import compare
 from apo_bench.report.comparison.text import comparison_form, in_words
 from apo_bench.statistics import percent, wilson

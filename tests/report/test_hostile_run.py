@@ -14,9 +14,9 @@ from typing import Any
 import pytest
 from pyarrow import parquet
 
+from apo_bench import InputError
 from apo_bench.cli import app as cli
 from apo_bench.cli.terminal import print_cells, print_report
-from apo_bench.errors import InputError
 from apo_bench.io.plain_text import clean
 from apo_bench.records.run.own_code import own_code
 from apo_bench.records.run.replay_command import replay_command

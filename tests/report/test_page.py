@@ -286,7 +286,7 @@ def test_many_rows_take_little_room(tmp_path: Path) -> None:
 
 
 def test_rows_that_lack_something_are_refused(tmp_path: Path) -> None:
-    from apo_bench.errors import InputError
+    from apo_bench import InputError
 
     broken = row("contact")
     del broken["success"]
@@ -331,7 +331,7 @@ def test_odd_sweeps_have_a_page(trials: list[dict[str, Any]], tmp_path: Path) ->
 
 
 def test_measured_demonstrations_alone_are_no_sweep(tmp_path: Path) -> None:
-    from apo_bench.errors import InputError
+    from apo_bench import InputError
 
     with pytest.raises(InputError, match="belong to no cell"):
         report(write(tmp_path / "run", [row("contact", level=None, level_deg=None, careless=None)]))

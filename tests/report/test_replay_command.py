@@ -10,15 +10,13 @@ from typing import Any
 
 import pytest
 
+from apo_bench import TrialSettings, build_scene, load_scenario, run_trial
 from apo_bench.cli import app as cli
-from apo_bench.records import TrialSettings, settings_of
+from apo_bench.records import settings_of
 from apo_bench.records.run.replay_command import milli, number, replay_command
 from apo_bench.report.report import report
 from apo_bench.report.run.trials import sample
-from apo_bench.scenario.file import load_scenario
 from apo_bench.show.failure_pictures import failure_pictures
-from apo_bench.simulation.scene.scene import build_scene
-from apo_bench.trial.trial import run_trial
 from tests import pages
 from tests.statistics.test_rates import row, write
 
@@ -72,7 +70,7 @@ def test_a_failure_is_drawn_as_it_ended(trials: list[dict[str, Any]], tmp_path: 
 def test_a_page_without_graphics_says_so(
     trials: list[dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from apo_bench.errors import InputError
+    from apo_bench import InputError
     from apo_bench.simulation.scene import render
 
     def refuse(*_: object, **__: object) -> None:

@@ -8,14 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Contact, Gap, Observation, PartFace, relation_graph
+from apo_bench import InputError, Observation, Scenario, correct, load_scenario
+from apo_bench.assembly import Contact, Gap, PartFace, relation_graph
 from apo_bench.correction.baselines.no_history import no_history
-from apo_bench.correction.correctors import correct
-from apo_bench.errors import InputError
 from apo_bench.observation.relations import Shifted, false, missed
 from apo_bench.resources import folder
-from apo_bench.scenario.file import load_scenario, scenario_names
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario.file import scenario_names
 from apo_bench.show.card import scenario_card
 from apo_bench.show.graph.text import graph_lines
 

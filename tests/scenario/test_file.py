@@ -13,11 +13,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.errors import InputError
+from apo_bench import InputError, load_scenario
 from apo_bench.geometry import pose
 from apo_bench.records import Thresholds
 from apo_bench.resources import folder
-from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario.file import scenario_names
 
 TOWER = (folder("scenarios") / "stick_in_tower.toml").read_text()
 SLOTS = (folder("scenarios") / "stick_on_castles.toml").read_text()

@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.assembly import Layout, placements
+from apo_bench import Layout, Scenario, draw_layout, load_scenario
+from apo_bench.assembly import placements
 from apo_bench.geometry import pose
-from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.human_error import NOTHING_M, careless_covariance, spread_error
-from apo_bench.scenario.layout import draw_layout
-from apo_bench.scenario.scenario import Carelessness, Scenario
+from apo_bench.scenario.scenario import Carelessness
 from tests import rounds
 from tests.scenes import Scene
 

@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from shapely import MultiPoint
 
-from apo_bench.assembly import Assembly, Contact, Poses, largest_gap, placements
+from apo_bench import Assembly, Scenario, draw_layout, load_scenario
+from apo_bench.assembly import Contact, Poses, largest_gap, placements
 from apo_bench.geometry import Array, Solid, pose
 from apo_bench.geometry.intrusion import intrusion
 from apo_bench.geometry.overlap import overlap
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.layout import draw_layout, layout_at
-from apo_bench.scenario.scenario import Grasp, Scenario, Site, Turn
+from apo_bench.scenario.layout import layout_at
+from apo_bench.scenario.scenario import Grasp, Site, Turn
 from tests import scenes
 from tests.shipped import BOXES
 

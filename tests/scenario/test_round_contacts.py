@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from apo_bench import InputError
 from apo_bench.assembly import Contact, Gap, PartFace
-from apo_bench.errors import InputError
 from apo_bench.io.documents import JsonNode
 from apo_bench.scenario.checks import check_clearance, check_scenario
 from apo_bench.scenario.contacts import ContactGaps, read_contacts

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from apo_bench import load_scenario
 from apo_bench.geometry import pose
-from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.starts import AIR_M, in_the_air
 

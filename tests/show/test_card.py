@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench import load_scenario
+from apo_bench.scenario.file import scenario_names
 from apo_bench.show.card import cards, scenario_card
 from benchmarks.asks import HEAD, asks, by_heart
 from benchmarks.baselines import kept

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Assembly, Graph, Operation, relation_graph
+from apo_bench import Assembly
+from apo_bench.assembly import Graph, Operation, relation_graph
 from apo_bench.show.graph.drawing import draw_graph
 from apo_bench.show.graph.layers import Links, arrange_layers, links_of
 from apo_bench.show.graph.layout import Rectangle, layout_graph, shared_area

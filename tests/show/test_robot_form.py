@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Plan, Step
+from apo_bench import Plan, load_scenario
+from apo_bench.assembly import Step
 from apo_bench.files.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
-from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import layout_at
 from apo_bench.show.plan_text import plan_lines
 from apo_bench.show.robot_form import robot_form, tip_in_part

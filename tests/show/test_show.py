@@ -8,12 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Observation
+from apo_bench import Observation, correct, load_scenario
 from apo_bench.cli import app as cli
-from apo_bench.correction.correctors import correct
 from apo_bench.files.observation import as_planned
 from apo_bench.geometry import pose
-from apo_bench.scenario.file import load_scenario
 from apo_bench.show.believed_picture import belief_lines, belief_panel
 
 SHIFT_M = 2e-3

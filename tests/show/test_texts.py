@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from apo_bench.assembly import Consistency, Contact, Correction, Observation, PartFace, relation_graph
+from apo_bench import Correction, Observation
+from apo_bench.assembly import Consistency, Contact, PartFace, relation_graph
 from apo_bench.correction.learning.likelihood import EstimatedNumber
 from apo_bench.geometry import pose
 from apo_bench.observation.fitting.components import COMPONENTS

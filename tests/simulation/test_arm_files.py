@@ -5,10 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from apo_bench.errors import InputError
+from apo_bench import InputError, read_arm
 from apo_bench.resources import folder
 from apo_bench.simulation.arms import apart
-from apo_bench.simulation.arms.building import read_arm
 from apo_bench.simulation.arms.loading import check_surroundings, compiled, files_of, load_model
 from apo_bench.simulation.arms.tree import read_model_tree
 

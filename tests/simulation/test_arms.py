@@ -8,24 +8,18 @@ import mujoco
 import numpy as np
 import pytest
 
-from apo_bench.errors import InputError
+from apo_bench import Arm, InputError, TrialSettings, build_scene, load_scenario, read_arm, run_trial
 from apo_bench.geometry import Array
-from apo_bench.records import TrialSettings
 from apo_bench.records.run.own_code import own_code
 from apo_bench.resources import folder
-from apo_bench.scenario.file import load_scenario
 from apo_bench.show.arm_text import check_lines
 from apo_bench.simulation.arm_checks.arm_check import check_arm, unsaid
-from apo_bench.simulation.arms.arm import Arm
-from apo_bench.simulation.arms.building import read_arm
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.arms.home import find_home
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.robot.paths import smooth
 from apo_bench.simulation.robot.reach import along, within_speed
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.scene.scene import build_scene
-from apo_bench.trial.trial import run_trial
 
 ARMS = folder("assets") / "arms"
 UR5E = ((0.1625, 0, 90), (0, -0.425, 0), (0, -0.3922, 0), (0.1333, 0, 90), (0.0997, 0, -90), (0.0996, 0, 0))

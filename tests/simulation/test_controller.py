@@ -7,15 +7,23 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench import simulation
-from apo_bench.assembly import Demonstration, Layout, Plan, ReplayResult, Step
+from apo_bench import (
+    Demonstration,
+    Layout,
+    Plan,
+    ReplayResult,
+    Scene,
+    Verdict,
+    build_scene,
+    demonstrate,
+    draw_layout,
+    judge,
+    replay,
+    simulation,
+)
+from apo_bench.assembly import Step
 from apo_bench.geometry import Array, pose
-from apo_bench.judging.verdict import Verdict, judge
-from apo_bench.scenario.layout import draw_layout
-from apo_bench.simulation.execution.controller import replay
-from apo_bench.simulation.human.demonstration import demonstrate
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.scene.scene import Scene, build_scene
 
 
 def layout(scene: Scene, seed: int) -> Layout:

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from apo_bench import Scene, build_scene, load_scenario
 from apo_bench.assembly import placements
 from apo_bench.geometry import Array, pose
-from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario.file import scenario_names
 from apo_bench.simulation.human import demonstration
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.robot.paths import shifted, smooth
-from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 
 NAMES = scenario_names()

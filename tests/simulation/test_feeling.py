@@ -4,11 +4,10 @@ import mujoco
 import numpy as np
 import pytest
 
+from apo_bench import Scene, build_scene, load_scenario
 from apo_bench.geometry import pose
-from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.robot.paths import shifted, smooth, steady
 from apo_bench.simulation.robot.robot import Halt, Robot
-from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.scene.world import place, sleeping
 
 DOWN = np.array([0.0, 0.0, -1.0])

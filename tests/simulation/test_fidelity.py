@@ -8,12 +8,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Plan
-from apo_bench.errors import InputError
+from apo_bench import InputError, Plan, TrialSettings, build_scene, load_scenario, replay, run_trial
 from apo_bench.geometry import intrusion_depths, pose
-from apo_bench.records import TrialSettings
-from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.execution.controller import LOOK_S, PATIENCE_S, _until_rest, replay
+from apo_bench.simulation.execution.controller import LOOK_S, PATIENCE_S, _until_rest
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
 from apo_bench.simulation.robot import near, robot
@@ -21,10 +18,8 @@ from apo_bench.simulation.robot.forces import ForceSensors
 from apo_bench.simulation.robot.in_hand import fast_forward
 from apo_bench.simulation.robot.paths import Trajectory, minimum_jerk, shifted, smooth
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.simulation.scene.world import SLEEP, initial_state, part_pose, sleeping, timestep
 from apo_bench.trial.stages import simulate_demonstration
-from apo_bench.trial.trial import run_trial
 
 
 @cache

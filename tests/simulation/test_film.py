@@ -2,15 +2,10 @@
 
 import numpy as np
 
-from apo_bench.assembly import Plan
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.layout import draw_layout
-from apo_bench.simulation.execution.controller import replay
+from apo_bench import Plan, build_scene, demonstrate, draw_layout, load_scenario, replay
 from apo_bench.simulation.film.film import ABOVE_PX, BELOW_PX, Caption, captioned, frames, operation_words, sampled
 from apo_bench.simulation.film.still import Chapter, FilmMoment, FilmTrack
 from apo_bench.simulation.hooks import BY_HAND, Doing
-from apo_bench.simulation.human.demonstration import demonstrate
-from apo_bench.simulation.scene.scene import build_scene
 
 
 def moments(*forces: float) -> list[FilmMoment]:

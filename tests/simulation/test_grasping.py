@@ -5,14 +5,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Operation, Plan, Poses, Step, placements
-from apo_bench.errors import InputError
+from apo_bench import InputError, Plan, Scene, build_scene, load_scenario, replay
+from apo_bench.assembly import Operation, Poses, Step, placements
 from apo_bench.geometry import Array, Box, intrusion_depths, pose
 from apo_bench.parts.making import Body, extrude, polygon, rectangle
-from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Grasp
-from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.execution.grasping import (
     RestingPart,
     clear_across,
@@ -25,7 +23,6 @@ from apo_bench.simulation.execution.prepare import Move, moves
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.robot.near import obstacle
 from apo_bench.simulation.robot.paths import turn_from, waypoints_unwound
-from apo_bench.simulation.scene.scene import Scene, build_scene
 from tests.round_scenes import contacts, scenario
 
 

@@ -6,14 +6,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Layout, Plan, Step
+from apo_bench import Layout, Plan, Scene, build_scene, demonstrate, draw_layout, load_scenario, replay
+from apo_bench.assembly import Step
 from apo_bench.geometry import pose
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.layout import draw_layout
-from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.hooks import BY_HAND, Doing, Hooks, hooks_of
-from apo_bench.simulation.human.demonstration import demonstrate
-from apo_bench.simulation.scene.scene import Scene, build_scene
 
 
 class Calls:

@@ -6,15 +6,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Plan, Step
+from apo_bench import Plan, Scene, build_scene, draw_layout, load_scenario, replay
+from apo_bench.assembly import Step
 from apo_bench.geometry import Array, pose
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.layout import draw_layout
-from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.robot import robot as module
 from apo_bench.simulation.robot.in_hand import SLIPS_M, Carried, HoldWatch, steadied
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.scene.world import World, initial_state, part_pose, place, touch_others
 from tests.round_scenes import peg_in_hole
 

@@ -3,15 +3,12 @@
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Plan
+from apo_bench import Plan, build_scene, draw_layout, load_scenario
 from apo_bench.geometry import pose
 from apo_bench.prediction.failure import Prediction, predict
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.arm_checks.plan_check import arm_moves
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.execution.prepare import in_reach
-from apo_bench.simulation.scene.scene import build_scene
 
 
 def test_a_panda_that_cannot_hold_its_tolerance_is_foretold() -> None:

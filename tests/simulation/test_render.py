@@ -5,10 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench.errors import InputError
-from apo_bench.scenario.layout import draw_layout
-from apo_bench.simulation.scene.render import Film, camera_view, picture, save_film
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench import Film, InputError, Scene, camera_view, draw_layout, picture
+from apo_bench.simulation.scene.render import save_film
 from apo_bench.simulation.scene.world import initial_state
 
 SIZE = (160, 120)

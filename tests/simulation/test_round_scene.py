@@ -7,17 +7,13 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull
 
-from apo_bench.assembly import Operation, Plan
+from apo_bench import Plan, Scene, build_scene, demonstrate, draw_layout, load_scenario, replay
+from apo_bench.assembly import Operation
 from apo_bench.geometry import SAGITTA_M, Hull, Piece, physical_pieces, pose
 from apo_bench.parts.making import shaft, solid_of
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.layout import draw_layout
 from apo_bench.scenario.scenario import Grasp
-from apo_bench.simulation.execution.controller import replay
-from apo_bench.simulation.human.demonstration import demonstrate
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.composing import parts_and_hands
-from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.scene.walls import simulated_pieces
 from apo_bench.simulation.scene.world import World, initial_state, part_pose, place
 from tests.round_scenes import PLATE, contacts, peg_in_hole, scenario

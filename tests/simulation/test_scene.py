@@ -4,13 +4,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from apo_bench.errors import InputError
+from apo_bench import InputError, Scene, build_scene, draw_layout, load_scenario
 from apo_bench.geometry import pose
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.arms.kinematics import Kinematics
-from apo_bench.simulation.scene.scene import Scene, build_scene, scene_xml
+from apo_bench.simulation.scene.scene import scene_xml
 from apo_bench.simulation.scene.world import initial_state, place, snapshot
 
 

@@ -7,10 +7,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Plan
+from apo_bench import Plan, TrialSettings, build_scene, load_scenario, run_trial
 from apo_bench.geometry import pose
-from apo_bench.records import TrialSettings
-from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution import search
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache
@@ -20,9 +18,7 @@ from apo_bench.simulation.execution.transfer import Grip
 from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.robot.paths import shifted, steady
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.stages import replay_and_judge, simulate_demonstration
-from apo_bench.trial.trial import run_trial
 
 STEP_S = 0.001
 DOWN = np.array([0.0, 0.0, -1.0])

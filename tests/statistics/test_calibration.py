@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from apo_bench.errors import InputError
+from apo_bench import InputError
 from apo_bench.records import ROW_FIELDS
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.report.tables.forecasts import calibration_table

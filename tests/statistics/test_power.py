@@ -10,8 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.stats import binom, multinomial
 
+from apo_bench import InputError
 from apo_bench.cli.app import main
-from apo_bench.errors import InputError
 from apo_bench.statistics import (
     evidence,
     margin_power,

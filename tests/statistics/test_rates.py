@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from statsmodels.stats.proportion import proportion_confint
 
-from apo_bench.errors import InputError
+from apo_bench import InputError
 from apo_bench.records import ROW
 from apo_bench.report.figures.levels import success_figure
 from apo_bench.report.figures.sheet import draw

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.errors import InputError
+from apo_bench import InputError
 from apo_bench.statistics.levels.summary import summary
 from tests.statistics.test_rates import row
 

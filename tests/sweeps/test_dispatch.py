@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from apo_bench.records import TrialSettings
+from apo_bench import TrialSettings
 from apo_bench.sweeps.work import dispatch
 from apo_bench.sweeps.work.dispatch import STARTING_S, Dispatch, Job
 from apo_bench.sweeps.work.environment_lock import EnvironmentLock, versions

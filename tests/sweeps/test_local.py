@@ -19,19 +19,17 @@ from typing import Any, NamedTuple
 import imageio.v3 as imageio
 import pytest
 
+from apo_bench import InputError, SweepSettings, TrialSettings, load_scenario, run_sweep
 from apo_bench.cli.app import main
-from apo_bench.errors import InputError
-from apo_bench.records import USUAL_LIMITS, Limits, TrialSettings
+from apo_bench.records import USUAL_LIMITS, Limits
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_file import read_run
 from apo_bench.report.report import report
 from apo_bench.report.run.facts import limits_of
-from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.sweeps.grid import SweepSettings, load_all, units
+from apo_bench.sweeps.grid import load_all, units
 from apo_bench.sweeps.local import pool
 from apo_bench.sweeps.local.pool import FALSE_STARTS, run_locally
-from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.sweeps.work.environment_lock import EnvironmentLock, versions
 from apo_bench.sweeps.work.messages import Stopped, Unit, listening
 from apo_bench.sweeps.work.worker import Worker

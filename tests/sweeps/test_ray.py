@@ -21,16 +21,16 @@ from typing import Any
 
 import pytest
 
+from apo_bench import InputError, SweepSettings, run_sweep
 from apo_bench.cli.app import main
-from apo_bench.errors import InputError
 from apo_bench.records import Row, row_key
 from apo_bench.resources import folder
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.sweeps.grid import SweepSettings, load_all, units
+from apo_bench.sweeps.grid import load_all, units
 from apo_bench.sweeps.ray import backend as on_ray
 from apo_bench.sweeps.ray import pool, task
 from apo_bench.sweeps.ray.driver import runtime_files
-from apo_bench.sweeps.sweep import names_of, run_sweep
+from apo_bench.sweeps.sweep import names_of
 from apo_bench.sweeps.work import dispatch
 from apo_bench.sweeps.work.dispatch import Dispatch
 from apo_bench.sweeps.work.environment_lock import EnvironmentLock, environment_lock

@@ -20,14 +20,13 @@ from typing import Any
 
 import pytest
 
+from apo_bench import InputError, SweepSettings, load_scenario
 from apo_bench.assembly import Outcome
-from apo_bench.errors import InputError
 from apo_bench.records import CORRECTORS, ENV_ID, ROW, row_key, setting_columns, trial_key
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps import sweep as runner
-from apo_bench.sweeps.grid import SweepSettings, load_all, units
+from apo_bench.sweeps.grid import load_all, units
 from apo_bench.sweeps.work import worker
 from apo_bench.sweeps.work.messages import Unit
 from apo_bench.trial import kept_demonstrations, trial

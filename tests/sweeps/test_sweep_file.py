@@ -6,12 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from apo_bench import InputError, SweepSettings, run_sweep
 from apo_bench.cli.app import main
-from apo_bench.errors import InputError
 from apo_bench.records import CORRECTOR, trial_key
 from apo_bench.resources import folder
-from apo_bench.sweeps.grid import SweepSettings, load_all, units
-from apo_bench.sweeps.sweep import run_sweep
+from apo_bench.sweeps.grid import load_all, units
 from apo_bench.sweeps.sweep_file import is_sweep_file, read_sweep
 
 WHOLE = """

@@ -7,15 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Observation
+from apo_bench import Observation, Scene, TrialSettings, build_scene, load_scenario, run_trial
 from apo_bench.geometry import Array, pose
-from apo_bench.records import TrialSettings
-from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import layout_at
-from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.by_heart import goals_by_heart
 from apo_bench.trial.planning import apply_method
-from apo_bench.trial.trial import run_trial
 
 SCENARIO = load_scenario("stick_in_tower")
 

@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from apo_bench.records import TrialSettings
-from apo_bench.scenario.file import load_scenario
+from apo_bench import TrialSettings, load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.trial import fingerprint
 from apo_bench.trial.fingerprint import (

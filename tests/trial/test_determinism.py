@@ -12,15 +12,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from apo_bench import Scene, SweepSettings, TrialSettings, build_scene, load_scenario, run_sweep, run_trial
 from apo_bench.cli.app import main
-from apo_bench.records import TrialSettings
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.sweeps.grid import SweepSettings
-from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.trial.stages import simulate_demonstration
-from apo_bench.trial.trial import run_trial
 
 HOPELESS = 40.0
 """A level [mm, degrees] at which plans are refused before the arm moves, so that a trial costs little."""

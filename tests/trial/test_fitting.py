@@ -9,22 +9,29 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Correction, Observation, Plan, Step
+from apo_bench import (
+    ContactCorrector,
+    Correction,
+    Observation,
+    Plan,
+    Scene,
+    TrialSettings,
+    build_scene,
+    correct,
+    fitting_plan,
+    load_scenario,
+    run_trial,
+)
+from apo_bench.assembly import Step
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.contact import ContactCorrector
-from apo_bench.correction.correctors import correct
 from apo_bench.correction.solvers.whitened import correction_to, noise_factor
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.prediction.failure import Prediction, predict
-from apo_bench.records import TrialSettings
-from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.prepare import in_reach
-from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.trial.fitting import FittingPlan, fitting_plan
+from apo_bench.trial.fitting import FittingPlan
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import observe_demonstration, simulate_demonstration
-from apo_bench.trial.trial import run_trial
 
 plain = ContactCorrector(compiled=False)
 SEVERAL_MM = 20.0

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from apo_bench.assembly import Observation
+from apo_bench import Observation
 from apo_bench.assembly.equations import equations
 from apo_bench.geometry import Array
 from apo_bench.trial.free_directions import FreeSpace, even_points, free_space, nearest_fitting, shortest_above

@@ -12,12 +12,9 @@ from typing import Any
 
 import pytest
 
+from apo_bench import InputError, Scene, SweepSettings, TrialSettings, build_scene, run_sweep
 from apo_bench.cli.app import main
-from apo_bench.errors import InputError
-from apo_bench.records import RANGE, Salt, TrialSettings
-from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.sweeps.grid import SweepSettings
-from apo_bench.sweeps.sweep import run_sweep
+from apo_bench.records import RANGE, Salt
 from apo_bench.trial import kept_demonstrations
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations, decides, demonstration_key
 from apo_bench.trial.stages import SimulatedDemonstration, scene_of

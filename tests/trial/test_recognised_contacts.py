@@ -10,16 +10,14 @@ from typing import Any
 
 import pytest
 
+from apo_bench import Scene, TrialSettings, build_scene, load_scenario, run_trial
 from apo_bench.cli import app as cli
-from apo_bench.records import RECOGNISED, TrialSettings
+from apo_bench.records import RECOGNISED
 from apo_bench.report.figures.levels import recognition_figure
 from apo_bench.report.figures.sheet import draw
 from apo_bench.report.tables.forecasts import recognition_table
-from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.statistics import ALL, recognitions
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
-from apo_bench.trial.trial import run_trial
 from tests import pages
 from tests.statistics.test_rates import UNCOUNTED
 

@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.records import Row, TrialSettings, look_up
-from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench import Scene, TrialSettings, build_scene, load_scenario, run_trial
+from apo_bench.records import Row, look_up
 from apo_bench.trial.stages import draw_robot_error
-from apo_bench.trial.trial import run_trial
 
 SEED = 3
 

@@ -19,12 +19,10 @@ from typing import NamedTuple
 import pytest
 from scipy.stats import binom
 
-from apo_bench.records import ROW, Row, TrialSettings
-from apo_bench.scenario.file import load_scenario
+from apo_bench import Scene, TrialSettings, build_scene, load_scenario, run_trial
+from apo_bench.records import ROW, Row
 from apo_bench.simulation.execution.replay_cache import ReplayCache
-from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
-from apo_bench.trial.trial import run_trial
 from tests.benchmarks.test_headline import fidelity, kept_rows, key
 
 RECORD = Path(__file__).with_name("success_rate.json")

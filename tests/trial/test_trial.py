@@ -10,22 +10,29 @@ from typing import Any
 import numpy as np
 import pytest
 
-from apo_bench.assembly import Consistency, Correction, Observation, Step, Suspect, Try, relation_graph
+from apo_bench import (
+    Correction,
+    InputError,
+    Observation,
+    Scene,
+    TrialSettings,
+    build_scene,
+    correct,
+    load_scenario,
+    run_trial,
+)
+from apo_bench.assembly import Consistency, Step, Suspect, Try, relation_graph
 from apo_bench.cli.terminal import print_row
-from apo_bench.correction.correctors import correct
-from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.records import ENV_ID, ROW, TrialSettings, level_pair, outcomes
+from apo_bench.records import ENV_ID, ROW, level_pair, outcomes
 from apo_bench.records.settings import LARGEST_SEED
 from apo_bench.resources import folder
-from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial import stages
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration, stream
-from apo_bench.trial.trial import nominal_where_seen, run_measured, run_trial
+from apo_bench.trial.trial import nominal_where_seen, run_measured
 
 SPEC = TrialSettings("stick_in_tower", grasp="weld", method="none", seed=5)
 KEYS = (

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from apo_bench import InputError, correct
 from apo_bench.assembly import OutlierModel
-from apo_bench.correction.correctors import correct
 from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, Sighting, beliefs, merged, views_of
-from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from tests.correction.robust.test_robust import astray, fixed_error_mm, look, shown
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from apo_bench.assembly import Demonstration, OutlierModel, largest_gap, looking_away, placements
+from apo_bench import Demonstration, InputError, correct, draw_layout, load_scenario
+from apo_bench.assembly import OutlierModel, largest_gap, looking_away, placements
 from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.consistency import p_value
-from apo_bench.correction.correctors import correct
 from apo_bench.correction.inferred import inferred_goals
 from apo_bench.correction.problem import seen_system
 from apo_bench.correction.region import contains_truth
@@ -23,13 +23,10 @@ from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, views_of
 from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.posterior import jacobian_rank
 from apo_bench.correction.solvers.whitened import noise_factor
-from apo_bench.errors import InputError
 from apo_bench.geometry import overlap_area, pose
 from apo_bench.geometry.overlap import overlap
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.relations import culprit, make_relations, with_relations
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.layout import draw_layout
 from apo_bench.trial.pose_error import goal_errors
 from tests.shipped import BOXES
 
