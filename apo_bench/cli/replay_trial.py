@@ -1,7 +1,5 @@
 """One command: `apo-bench replay`, a trial with all that can be told of it."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any

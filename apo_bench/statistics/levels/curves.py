@@ -6,8 +6,6 @@ straight line (trapezoids). Level 0 has no place on it and is left out. Every se
 levels gives one area.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, final
