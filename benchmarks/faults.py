@@ -96,7 +96,7 @@ def run(root: Path, job: Fault | str, work: Path) -> Ran:
     copy(root, place)
     if isinstance(job, Fault):
         put(job, place)
-    return tested(place, job.room if isinstance(job, Fault) else job)
+    return tested(place, job.room if isinstance(job, Fault) else job, LONGEST_S)
 
 
 def copy(root: Path, place: Path) -> None:
@@ -126,7 +126,7 @@ def put(fault: Fault, place: Path) -> None:
     path.write_text(path.read_text(encoding="utf-8").replace(fault.before, fault.after), encoding="utf-8")
 
 
-def tested(place: Path, room: str) -> Ran:
+def tested(place: Path, room: str, longest_s: float) -> Ran:
     """The tests of a room in a copy, up to the first that fails; what hypothesis draws is the same every time."""
     options = ["-q", "-x", "-n", "0", "-m", "not extras", "--tb=no", "-rfE", "--hypothesis-seed=0"]
     command = [sys.executable, "-m", "pytest", *options, f"tests/{room}"]
@@ -135,10 +135,10 @@ def tested(place: Path, room: str) -> Ran:
     began = time.perf_counter()
     try:
         ended = subprocess.run(
-            command, cwd=place, env=env, capture_output=True, text=True, timeout=LONGEST_S, check=False
+            command, cwd=place, env=env, capture_output=True, text=True, timeout=longest_s, check=False
         )
     except subprocess.TimeoutExpired:
-        return Ran(True, f"no end within {LONGEST_S} s", LONGEST_S)
+        return Ran(True, f"no end within {longest_s:g} s", longest_s)
     seconds = round(time.perf_counter() - began, 1)
     if ended.returncode not in (0, 1):
         raise RuntimeError(
