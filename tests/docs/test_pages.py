@@ -169,7 +169,7 @@ def test_printed_numbers_are_compared_to_rounding_and_words_exactly(printed: str
 
 
 def test_pages_and_notebooks_use_what_the_package_exports() -> None:
-    """But for how the noise of two estimators was made of their quantiles, and the tools that make part files."""
+    """But for how the noise of two estimators was made of their quantiles, the tools that make part files, and dm_env."""
     code = {page: [block.text for block in blocks(page) if block.language == "python"] for page in PAGES}
     for path in (ROOT / "notebooks").glob("*.ipynb"):
         cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
@@ -181,7 +181,12 @@ def test_pages_and_notebooks_use_what_the_package_exports() -> None:
         found for texts in code.values() for text in texts for found in re.findall(r"from (apo_bench\.\S+)", text)
     }
     assert sum(map(len, code.values())) > 10
-    assert inner == {"apo_bench.observation.fitting.quantiles", "apo_bench.parts", "apo_bench.parts.making"}
+    assert inner == {
+        "apo_bench.envs",
+        "apo_bench.observation.fitting.quantiles",
+        "apo_bench.parts",
+        "apo_bench.parts.making",
+    }
 
 
 def test_the_trial_by_hand_has_ten_lines() -> None:
