@@ -36,10 +36,10 @@ headline: $(VENV)/.installed
 # bytecode of the package and its tests is kept, as hundreds of processes are started
 test numeric: export PYTHONDONTWRITEBYTECODE :=
 # what needs one core runs beside what needs the other; three processes for two cores, as some tests wait for a process
-# or a limit
+# or a limit; how long each test took is kept in build/durations.xml
 test: $(VENV)/.installed-dev
 	$(MAKE) --jobs 2 types site compiled style walls
-	$(BIN)/pytest -q -n 3 --dist worksteal -m "not extras"
+	$(BIN)/pytest -q -n 3 --dist worksteal -m "not extras" --durations=10 --junitxml=build/durations.xml
 	$(NUMERIC)
 
 types: $(VENV)/.installed-dev

@@ -169,7 +169,7 @@ def test_printed_numbers_are_compared_to_rounding_and_words_exactly(printed: str
 
 
 def test_pages_and_notebooks_use_what_the_package_exports() -> None:
-    """But for how the noise of two estimators was made of their quantiles, the tools that make part files, and dm_env."""
+    """But for quantiles from which the noise of two estimators was made, the tools that make part files, and dm_env."""
     code = {page: [block.text for block in blocks(page) if block.language == "python"] for page in PAGES}
     for path in (ROOT / "notebooks").glob("*.ipynb"):
         cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
