@@ -13,17 +13,21 @@ from apo_bench.geometry import Array, copyable, freeze
 
 
 class Iterate(NamedTuple):
-    """One turn of a solver, kept for the reader and the plots."""
+    """One iteration of a solver, kept for the reader and the plots."""
 
     gap_m: float
-    """Largest |e| before the step."""
+    """Largest |e| before the step, [m]. Of `contact` and `contact-robust` of the compact equations, three per contact,
+    which count sqrt(v) times at the centre of v vertices; so it may be larger than `Correction.gap_before_m`, the
+    largest |e| of vertices."""
     rank: int
+    """Of the paper's solver, of the equations at this iteration; of `contact`, where it ended, in every iteration."""
     step: float
-    """Length of the scaled step, [m]."""
+    """Of the paper's solver, the length of the scaled step, [m]; of `contact`, its largest component, in standard
+    deviations."""
 
 
 class Try(NamedTuple):
-    """One trial of the iterative correction (Section 4.2)."""
+    """One trial of the iterative correction of the paper (its Section 4.2): a solution with some goals free."""
 
     step: int
     """The operation that had just been observed, counted from 0."""
@@ -56,7 +60,8 @@ class Consistency:
     chi_square: float
     """Squared Mahalanobis length of the correction, what is left of contradictory contacts added."""
     freedom: int
-    """Degrees of freedom: the rank of the contact equations at the solution."""
+    """Degrees of freedom of the chi-square distribution: the rank of the contact equations at the solution, which is
+    how many directions contacts fix, not how many they leave free."""
     p_value: float
     level: float
     """The test fails if the p-value is below."""
@@ -86,8 +91,11 @@ class Correction:
     freed: tuple[int, ...]
     """Operations whose motion parameters were free, counted from 0, most recent first."""
     gap_before_m: float
+    """Largest |e| of a vertex at what was seen, [m], or the largest violation of an inequality; so is `gap_after_m`, at
+    the goals."""
     gap_after_m: float
     rank: int
+    """Directions that the equations fix at the goals."""
     trace: tuple[Iterate, ...] = ()
     tried: tuple[Try, ...] = ()
     """Every set of motion parameters that was tried, in order."""

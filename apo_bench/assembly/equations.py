@@ -1,8 +1,12 @@
-"""The face contact equations of an assembly and their Jacobian (Eq. 1, 3 and 26, misprints mended).
+"""The face contact equations of an assembly and their Jacobian, of the paper that `apo_bench.correction` names.
 
 A contact says that vertices v of a face of the environment part b lie on the plane n of a face of the manipulated
 part a:  e = n D_a^-1 D_b v = 0, with n = (n_x, n_y, n_z, -d) in the frame of a and v = (x, y, z, 1) in that of b.
 Both D are the ODLs right after the operation that made the contact; contacts that were lost later stay in.
+
+That is Eq. 26 (and 25), e = n D_a^-1 D_b v. Eq. 1, e = n T_a^-1 T_b v, is the same of parts that were moved alone,
+where v needs its 1, which is not printed; Eq. 3 puts T dT for T, e = n dT_a^-1 T_a^-1 T_b dT_b v, where T_b^-1 is
+printed for T_a^-1. In R8 and R9 of Section 3.3.2 the last T_6 should be T_6^-1.
 
 A part that was never moved rests where it started. That pose is one more motion parameter, known and never free:
 the operations are preceded by one operation per part that puts it at its start.
@@ -81,7 +85,7 @@ class Equations:
         return np.einsum("mi,mi->m", self.plane, self._points(self._matrices(goals))[0])
 
     def linearised(self, goals: Array) -> tuple[Array, Array]:
-        """e, (m,), and its derivative by the body twists of all goals, (m, 6 n), [m] per [m] and [rad] (Eq. 14).
+        """e, (m,), and its derivative by the body twists of all goals, (m, 6 n), [m] per [m, rad]: df/dq of Eq. 10.
 
         A letter T in n .. T .. v turns n (everything up to T) = (a, .) and (everything behind T) v = p, so its rows
         are +(a, p x a); T^-1 stays on the side of v, and its rows are -(a, p x a). A T that occurs twice adds up.

@@ -21,7 +21,8 @@ TEST_LEVEL = 0.01
 ROUNDING = 1e-13
 """Part of the largest diagonal entry that is added to all: redundant contacts without play have no other."""
 CONTRADICTION_M = 0.05e-3
-"""Standard deviation that contradictory contacts are given, [m], so that their contradiction can be measured."""
+"""Standard deviation that contradictory contacts are given, [m], so that their contradiction can be measured. They hold
+if no compact equation, which counts sqrt(v) times at the centre of v vertices, is off by more."""
 
 
 @remembered

@@ -21,7 +21,7 @@ from apo_bench.correction.solvers.compact import CompactEquations, compact_equat
 from apo_bench.correction.solvers.gauss_newton import NearestGoals, batch_goals
 from apo_bench.correction.solvers.inequalities import Inequalities, bounded
 from apo_bench.correction.solvers.kernels import Kernels, kernels
-from apo_bench.correction.solvers.laid import Laid, laid_contacts
+from apo_bench.correction.solvers.laid_contacts import LaidContacts, laid_contacts
 from apo_bench.correction.solvers.whitened import correction_to, noise_factor, scales
 from apo_bench.geometry import Array, remembered
 
@@ -54,7 +54,7 @@ class Problem:
     """(b, n, 4, 4), what was seen."""
     L: Array
     """(b, n, 6, 6), or (b, n, 6, 6 n) where operations share errors."""
-    laid: Laid
+    laid: LaidContacts
     """The equations of every contact, planes shifted to where they are asked to be."""
     demands: _Demands
     inequalities: tuple[Inequalities, ...]

@@ -226,7 +226,7 @@ def test_an_operation_that_was_not_seen_is_not_guessed() -> None:
 
 def test_a_solver_that_runs_out_of_turns_has_not_converged(monkeypatch: pytest.MonkeyPatch) -> None:
     def hurried(system: Equations, goals: Array, free: Collection[int]) -> Solution:
-        return solve_newton(system, goals, free, turns=1)
+        return solve_newton(system, goals, free, iterations=1)
 
     monkeypatch.setattr("apo_bench.correction.baselines.paper.solve_newton", hurried)
     scene = scenes.stick_on_castles()

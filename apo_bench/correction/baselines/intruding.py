@@ -1,6 +1,6 @@
 """Boxes of parts in contact that are inside each other, written as face contact equations.
 
-The deepest corner v of one box behind the side n of the other has e = n D_a^-1 D_b v = -depth, the form of Eq. 3, so
+The deepest corner v of one box behind the side n of the other has e = n D_a^-1 D_b v = -depth, the form of Eq. 26, so
 the Jacobian of contacts serves here too. Of the six directions along which two boxes may part, those normal to their
 sides, the shortest way out counts; cross products of edges are left aside, and so are pieces that are no boxes.
 """

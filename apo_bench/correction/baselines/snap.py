@@ -14,7 +14,7 @@ from apo_bench.correction.solvers.newton import REST_M, SINGULAR_CUT_OFF
 from apo_bench.correction.solvers.whitened import Whitened, whitened
 from apo_bench.geometry import Array
 
-_TURNS = 30
+_ITERATIONS = 30
 
 
 def snap(observation: Observation) -> Correction:
@@ -41,14 +41,14 @@ def _snapped(observation: Observation) -> Array:
 def _put(own: Equations, goals: Array, k: int, space: Whitened) -> Array:
     """The pose of operation k, (4, 4), nearest to the seen one of those with the least sum of squared gaps.
 
-    At each turn the directions that the contacts fix get the Newton step of the paper, with its cut-off (Eq. 15), and
-    the others go to where |z| is least: with V^t d = c for what is fixed, the twist is covariance V (V^t covariance
-    V)^-1 (c + V^t xi).
+    At each iteration the directions that the contacts fix get the Newton step of the paper, with its cut-off (Eq. 15
+    and 22), and the others go to where |z| is least: with V^t d = c for what is fixed, the twist is covariance V (V^t
+    covariance V)^-1 (c + V^t xi).
     """
     coordinates = Whitened(space.observed[k : k + 1], space.factor[k : k + 1])
     now = np.array(goals)
     z = np.zeros(6)
-    for _ in range(_TURNS):
+    for _ in range(_ITERATIONS):
         e, J = own.linearised(now)
         if not e.size:
             break

@@ -27,7 +27,7 @@ _AGREE = 50.0
 """Views whose difference is longer than this, squared and in standard deviations, are not inliers both."""
 _IMPOSSIBLE = 100.0
 """States that are less likely than the likeliest by so much in -2 log are not looked at."""
-_TURNS = 5
+_ITERATIONS = 5
 
 
 class Sighting(NamedTuple):
@@ -114,7 +114,7 @@ def _mean(views: Sequence[Sighting]) -> tuple[Array, Array, float]:
     W = np.linalg.inv([view.covariance for view in views])
     C = np.linalg.inv(W.sum(axis=0))
     T = goals[-1]
-    for _ in range(_TURNS):
+    for _ in range(_ITERATIONS):
         T = T @ pose.exp(C @ np.einsum("kij,kj->i", W, pose.log(pose.inverse(T) @ goals)))
     xi = pose.log(pose.inverse(T) @ goals)
     return T, (C + C.T) / 2, float(np.einsum("ki,kij,kj->", xi, W, xi))

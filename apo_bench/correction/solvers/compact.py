@@ -3,7 +3,8 @@
 The vertices of a face lie in a plane, so e, which is linear in them, is known everywhere once it is known at their
 centre, and how fast it grows along two directions. Scaled by the square root of the number of vertices, and with
 directions that have the same second moments as the centred vertices, these three have the same sum of squares as e of
-all vertices. Nothing is lost, and the matrices are smaller by a quarter.
+all vertices. Nothing is lost, and the matrices are smaller by a quarter. The largest of the three is not the largest e
+of a vertex: e at the centre of v vertices counts sqrt(v) times.
 
 Every array may have leading axes: many observations of one assembly are linearised at once.
 """
@@ -17,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Equations
-from apo_bench.correction.solvers.words import Words
+from apo_bench.correction.solvers.pose_products import Words
 from apo_bench.geometry import GENERATORS, Array
 
 _GENERATORS = np.ascontiguousarray(np.swapaxes(GENERATORS, 0, 1).reshape(4, 24))
@@ -67,7 +68,9 @@ class CompactEquations:
         return np.asarray(e.reshape(*e.shape[:-3], 3 * len(self)))
 
     def blocks(self, T: Array, B: Array) -> tuple[Array, Array]:
-        """e, (*, 3 c), [m], and its derivative by the coordinates of each letter's goal, (*, c, w, 6, 3) (Eq. 14).
+        """e, (*, 3 c), [m], and its derivative by the coordinates of each letter's goal, (*, c, w, 6, 3).
+
+        It is df/dq of Eq. 10, by the derivatives of the paper's appendix, which hold at dq = 0.
 
         A letter T in n .. T .. v turns n (everything up to T) = f and (everything behind T) v = p, and a unit twist G
         changes e by f G p; T^-1 stays on the side of p, with the opposite sign. A T that occurs twice adds up.
@@ -85,7 +88,7 @@ class CompactEquations:
         for j in range(w):
             np.matmul(forms[..., j, :, :, :], F[..., j, :, :], out=forms[..., j + 1, :, :, :])
         e = behind[..., 0, :, :, :] @ self.plane[:, :, None]
-        # f G_i of the six generators (appendix), and p, at the side of each letter on which its change acts.
+        # f G_i of the generators G_i = d(dT)/dq_i (appendix), and p, on the side of each letter where its change acts.
         fG = forms.reshape(*lead, (w + 1) * c, 4).take(self.words.sides, axis=-2) @ _GENERATORS
         p = behind.reshape(*lead, (w + 1) * c, 3, 4).take(self.words.sides, axis=-3)
         # B^t of each letter's goal, with its sign: what twists make of coordinates z.

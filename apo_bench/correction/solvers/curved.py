@@ -1,7 +1,7 @@
 """The shortest correction where contacts bend as much as the correction is long: Newton's method.
 
 `gauss_newton` takes a step to the shortest z on the linearised contacts. Where these bend about what was seen, as for a
-part that was seen upside down, of which every turn is about as far, its steps shrink by a percent only. The second
+part that was seen upside down, of which every rotation is about as far, its steps shrink by a percent only. The second
 derivative of the Lagrangian |z|^2 / 2 + l f(z) along the free directions says where they lead.
 """
 
@@ -12,7 +12,7 @@ from apo_bench.correction.solvers.gauss_newton import STEP, shortened_step
 from apo_bench.correction.solvers.whitened import correction_to
 from apo_bench.geometry import Array, exp_and_jacobian
 
-_TURNS = 30
+_ITERATIONS = 30
 _RANK = 1e-5
 """Singular values below this part of the largest one are rounding: the contacts hold almost."""
 _APART = 1e-5
@@ -29,7 +29,7 @@ def descended(system: CompactEquations, observed: Array, L: Array, goals: Array)
         L: (n, 6, 6), L L^t the covariance of the body twists, [m, rad].
     """
     z = correction_to(observed, L, goals)
-    for _ in range(_TURNS):
+    for _ in range(_ITERATIONS):
         e, Jt = _linearised(system, observed, L, z)
         # N spans the free directions; multipliers l solve z + J^t l = 0 in the others, and `towards` closes e there.
         U, w, Vt = np.linalg.svd(Jt)

@@ -8,8 +8,8 @@ z' = J^t (J J^t)^-1 (J z - f); then f is linearised again (Gauss-Newton on the c
 
 Redundant contacts make J J^t singular at the solution and almost singular before it, so no rank is decided on the way.
 `mu` is added to the diagonal instead; it falls with the square of the gap (Levenberg-Marquardt as of Yamashita and
-Fukushima, 2001, converges quadratically then, also where J loses rank), and by a factor at every turn. Rank and free
-directions are read off where the solver rests: there singular values of redundant directions are rounding.
+Fukushima, 2001, converges quadratically then, also where J loses rank), and by a factor at every iteration. Rank and
+free directions are read off where the solver rests: there singular values of redundant directions are rounding.
 
 There is one loop, over a batch of observations of one assembly; one observation is a batch of one. How J is kept and
 how the linear equations are solved is said by a `LinearStep`: dense or sparse matrices.
@@ -30,17 +30,17 @@ from apo_bench.correction.solvers.linear_step import NEXT, SURE, DenseStep, Line
 from apo_bench.correction.solvers.sparse import SparseStep
 from apo_bench.geometry import Array
 
-MOST_TURNS = 60
+MOST_ITERATIONS = 60
 STEP = 1e-7
 """The solver rests after a step that is shorter in every component, in standard deviations."""
 DAMPING = 0.05
 """mu, per mean square of the rows of J and per mean square of the gaps in that unit."""
 FALL = 0.3
-"""mu is at most `DAMPING` times this to the number of turns, so that it cannot hold a gap open."""
+"""mu is at most `DAMPING` times this to the number of iterations, so that it cannot hold a gap open."""
 SQUARED_GAP_FLOOR = 1e-14
 """mu is at least this part of the mean square of the rows: rounding."""
 LARGEST_TURN = 0.25
-"""[rad]. No goal turns further in one step."""
+"""[rad]. No goal is rotated further in one step."""
 LARGEST_DENSE = 72
 """Unknowns above which one observation is solved with sparse matrices."""
 SMALLEST = 1e-300
@@ -67,8 +67,8 @@ class NearestGoals(NamedTuple):
     forms: Array
     """(*, c, 4): n D_a^-1 D_b of each contact: e of any vertex is this times it."""
     trace: Sequence[Any]
-    """The turns, of a batch those of each observation: the largest |e| before it, [m], and the largest component of its
-    step, in standard deviations."""
+    """The iterations, of a batch those of each observation: the largest |e| of the compact equations before it, [m],
+    and the largest component of its step, in standard deviations."""
 
     def at(self, i: int) -> NearestGoals:
         """Those of one observation of a batch."""
@@ -147,7 +147,7 @@ def _nearest(step: LinearStep, z: Array) -> NearestGoals:
     rows = np.arange(b)
     sure, following = step.settled
     step.linearise(z, rows)
-    for turn in range(MOST_TURNS):
+    for iteration in range(MOST_ITERATIONS):
         # Plain numbers of each observation: NumPy would take longer for so few. What is not finite is given up.
         gap_m, gap2, row_size = step.sizes.tolist()
         if not math.isfinite(sum(gap2) + sum(row_size)):
@@ -158,14 +158,14 @@ def _nearest(step: LinearStep, z: Array) -> NearestGoals:
         if len(going) < len(rows):
             rows = np.array(going)
         # The step to the shortest z on the linearised contacts, z' = J^t (J J^t + mu)^-1 (J z - f).
-        most = min(1.0, FALL**turn)
+        most = min(1.0, FALL**iteration)
         mu = np.array([damping(row_size[o], gap2[o], most) for o in going])
-        change, length, turned = step.change(z, mu, rows)
+        change, largest, angles = step.change(z, mu, rows)
         # Rest where the next step would be too short to matter. A step that turns a goal far is shortened, since
         # contacts are linear for small turns only.
         left = []
-        for i, (o, size, angle) in enumerate(zip(going, length.tolist(), turned.tolist(), strict=True)):
-            if size < sure and settles(size, traces[o][-1][1] if turn else math.inf, sure, following):
+        for i, (o, size, angle) in enumerate(zip(going, largest.tolist(), angles.tolist(), strict=True)):
+            if size < sure and settles(size, traces[o][-1][1] if iteration else math.inf, sure, following):
                 at_rest[o] = True
             else:
                 left.append(o)
@@ -209,5 +209,5 @@ def settles(size: float, before: float, sure: float = SURE, following: float = N
 
 def shortened_step(step: Array, L: Array) -> Array:
     """A step (6 n,), shortened if a goal would turn further than `LARGEST_TURN`."""
-    (turned,) = turn_of(step[None], L[None]).tolist()
-    return step * (LARGEST_TURN / turned) if turned > LARGEST_TURN else step
+    (angle,) = turn_of(step[None], L[None]).tolist()
+    return step * (LARGEST_TURN / angle) if angle > LARGEST_TURN else step

@@ -1,6 +1,6 @@
 """Contacts with play, as inequality constraints: a vertex may be anywhere between two distances from its plane.
 
-Equations of exact and centred contacts are solved first, which settles their rank. After that every turn solves a
+Equations of exact and centred contacts are solved first, which settles their rank. After that every iteration solves a
 quadratic program: the shortest z among all that satisfy the linearised equations and inequalities.
 Redundant equations would make the active-set solver cycle, so z is written as the shortest solution of the equations
 plus a combination of their free directions; only that is the unknown of the program.
@@ -27,9 +27,9 @@ _BLIND = 1e-7
 """Part of the largest row below which an inequality does not depend on the free directions."""
 _EXACT = 1e-10
 """How far the program may violate an inequality, in standard deviations."""
-_TURNS = 200
+_ITERATIONS = 200
 _SETTLED = FALL**60
-"""The equations are damped as after so many turns: they hold already."""
+"""The equations are damped as after so many iterations: they hold already."""
 _SLOWEST = 1.0 / 64.0
 _GROWS = 1.05
 """The least part of a step that is made, and how much larger that part may be than the one before."""
@@ -124,7 +124,7 @@ def nearest_between(
     rest = False
     Jt = start.Jt
     last = np.zeros(len(start.z))
-    for _ in range(_TURNS):
+    for _ in range(_ITERATIONS):
         e, Jt = linearised_by(system, T, B)
         # Equations first: the shortest z on them, and what they leave free there, of the rank that is known already.
         nearest = _settled(e, Jt, z)
@@ -135,9 +135,9 @@ def nearest_between(
         ahead = e_wall + J_wall @ (nearest - z)
         u, room = _program(J_wall, free, inequalities.low - ahead, inequalities.high - ahead)
         step = nearest + free @ u - z
-        length = float(np.abs(step).max(initial=0.0))
-        trace.append((float(np.abs(e).max(initial=0.0)), length))
-        over = settles(length, before)
+        largest = float(np.abs(step).max(initial=0.0))
+        trace.append((float(np.abs(e).max(initial=0.0)), largest))
+        over = settles(largest, before)
         rest = over and room
         # All of the step where it is the last, so that equations hold to rounding.
         pace = _paced(pace, step, last)
@@ -146,7 +146,7 @@ def nearest_between(
         D, Jr = exp_and_jacobian(twists_of(L, z))
         T = observed @ D
         B = Jr @ L
-        before = length
+        before = largest
         if over:
             break
     return NearestGoals(T, z, system.residual(T), Jt, B, np.array(rest), np.array(True), system.forms(T), trace)

@@ -53,7 +53,7 @@ def owned(x: _Array) -> _Array:
 
 def linearised(
     words: _Index,
-    factors: _Array,
+    matrices: _Array,
     plane: _Array,
     points: _Array,
     observed: _Array,
@@ -63,33 +63,35 @@ def linearised(
     rows: _Index,
     series: _Array,
     adjoints: _Array,
-    six: _Array,
+    small: _Array,
     behind: _Array,
-    forms: _Array,
+    before: _Array,
     T: _Array,
     B: _Array,
     e: _Array,
     J: _Array,
-    full: _Array,
+    forms: _Array,
     sizes: _Array,
 ) -> None:
-    """Goals T = T_seen exp(L z), the equations e there and their derivative J by z (Eq. 14), of some observations.
+    """Goals T = T_seen exp(L z), the equations e there and their derivative J by z (Eq. 10), of some observations.
 
     Args:
         words: (3, c, w): letters, columns and inverse (0 or 1) of `Words`.
-        factors: (2, p + n + 1, 4, 4): all matrices, and their inverses; those of the goals are overwritten.
+        matrices: (2, p + n + 1, 4, 4): `Words.constants`, poses and their inverses; those of the goals are overwritten.
         points: (b, c, 3, 4); observed (b, n, 4, 4); L (b, n, 6, 6); z (b, 6 n).
         soft2: (3 c,), the variance of each equation, 0 of those that are demanded.
         rows: Which observations.
         series: `geometry.twist.SERIES`; `adjoints` is `geometry.twist.ADJOINTS`.
-        six: (6, 6, 6), scratch, as are behind (w + 1, 3, 4) and forms (w + 1, 4).
-        T: (b, n, 4, 4), overwritten, as are B (b, n, 6, 6), J_r L, e (b, 3 c), J (b, 3 c, 6 n), full (b, c, 4),
+        small: (6, 6, 6), scratch: xi and coefficients, ad, ad^2, a sum, J_r, exp(xi) - 1, of one goal.
+        behind: (w + 1, 3, 4), scratch, what stands behind each letter of one contact times its points; so is before,
+            (w + 1, 4), its plane times what stands before.
+        T: (b, n, 4, 4), overwritten, as are B (b, n, 6, 6), J_r L, e (b, 3 c), J (b, 3 c, 6 n), forms (b, c, 4),
             n D_a^-1 D_b, and sizes (3, b) as `LinearStep` has them.
     """
     n = observed.shape[1]
     c = len(plane)
     w = words.shape[2]
-    first = factors.shape[1] - 1 - n
+    first = matrices.shape[1] - 1 - n
     for o in rows:
         for k in range(n):
             # xi = L z, its squared angle, and the coefficients of ad, .., ad^4 in J_r.
@@ -98,62 +100,62 @@ def linearised(
                 t = 0.0
                 for j in range(6):
                     t += L[o, k, i, j] * z[o, 6 * k + j]
-                six[0, 0, i] = t
+                small[0, 0, i] = t
                 if i > 2:
                     square += t * t
             for j in range(4):
                 t = 0.0
                 for i in range((_SHORT if square < 1.0 else len(series)) - 1, -1, -1):
                     t = t * square + series[i, 2 + j]
-                six[0, 1, j] = t
+                small[0, 1, j] = t
             # ad, then ad^2 and b + c ad + d ad^2, then J_r = 1 + a ad + (b + c ad + d ad^2) ad^2.
             for i in range(6):
                 for j in range(6):
                     t = 0.0
                     for q in range(6):
-                        t += six[0, 0, q] * adjoints[q, i, j]
-                    six[1, i, j] = t
+                        t += small[0, 0, q] * adjoints[q, i, j]
+                    small[1, i, j] = t
             for i in range(6):
                 for j in range(6):
                     t = 0.0
                     for q in range(6):
-                        t += six[1, i, q] * six[1, q, j]
-                    six[2, i, j] = t
-                    six[3, i, j] = six[0, 1, 2] * six[1, i, j] + six[0, 1, 3] * t
-                six[3, i, i] += six[0, 1, 1]
+                        t += small[1, i, q] * small[1, q, j]
+                    small[2, i, j] = t
+                    small[3, i, j] = small[0, 1, 2] * small[1, i, j] + small[0, 1, 3] * t
+                small[3, i, i] += small[0, 1, 1]
             for i in range(6):
                 for j in range(6):
-                    t = six[0, 1, 0] * six[1, i, j]
+                    t = small[0, 1, 0] * small[1, i, j]
                     for q in range(6):
-                        t += six[3, i, q] * six[2, q, j]
-                    six[4, i, j] = t
-                six[4, i, i] += 1.0
+                        t += small[3, i, q] * small[2, q, j]
+                    small[4, i, j] = t
+                small[4, i, i] += 1.0
             for i in range(6):
                 for j in range(6):
                     t = 0.0
                     for q in range(6):
-                        t += six[4, i, q] * L[o, k, q, j]
+                        t += small[4, i, q] * L[o, k, q, j]
                     B[o, k, i, j] = t
             # exp(xi) - 1 = A^t X, with A the upper left block of J_r: T = T_seen + T_seen A^t X, and T^-1.
             for i in range(3):
                 for j in range(4):
                     t = 0.0
                     for q in range(3):
-                        t += six[4, q, i] * (six[1, q, j] if j < 3 else six[0, 0, q])
-                    six[5, i, j] = t
+                        t += small[4, q, i] * (small[1, q, j] if j < 3 else small[0, 0, q])
+                    small[5, i, j] = t
             for i in range(4):
                 for j in range(4):
                     t = observed[o, k, i, j]
                     for q in range(3):
-                        t += observed[o, k, i, q] * six[5, q, j]
+                        t += observed[o, k, i, q] * small[5, q, j]
                     T[o, k, i, j] = t
-                    factors[0, first + k, i, j] = t
+                    matrices[0, first + k, i, j] = t
             for i in range(3):
                 t = 0.0
                 for j in range(3):
-                    factors[1, first + k, i, j] = T[o, k, j, i]
+                    matrices[1, first + k, i, j] = T[o, k, j, i]
                     t -= T[o, k, j, i] * T[o, k, j, 3]
-                factors[1, first + k, i, 3] = t
+                matrices[1, first + k, i, 3] = t
         for i in range(3):
             sizes[i, o] = 0.0
         for i in range(c):
@@ -173,7 +175,7 @@ def linearised(
                     for d in range(4):
                         t = 0.0
                         for q in range(4):
-                            t += factors[side, letter, d, q] * behind[j + 1, r, q]
+                            t += matrices[side, letter, d, q] * behind[j + 1, r, q]
                         behind[j, r, d] = t
             for r in range(3):
                 t = 0.0
@@ -182,18 +184,18 @@ def linearised(
                 e[o, 3 * i + r] = t
                 sizes[0, o] = max(sizes[0, o], abs(t))
                 sizes[1, o] += t * t / (3 * c) if soft2[3 * i + r] == 0.0 else 0.0
-            # forms[j] = n F_1 .. F_j = (a, .). A letter T has p behind and a before itself: its rows are
+            # before[j] = n F_1 .. F_j = (a, .). A letter T has p behind and a before itself: its rows are
             # (a h, p x a) B of points p with last number h; T^-1 stays on the other side, with the opposite sign.
             for d in range(4):
-                forms[0, d] = plane[i, d]
+                before[0, d] = plane[i, d]
             for j in range(last):
                 side = words[2, i, j]
                 letter = words[0, i, j]
                 for d in range(4):
                     t = 0.0
                     for q in range(4):
-                        t += forms[j, q] * factors[side, letter, q, d]
-                    forms[j + 1, d] = t
+                        t += before[j, q] * matrices[side, letter, q, d]
+                    before[j + 1, d] = t
                 k = words[1, i, j]
                 if k < n:
                     at, sign = (j, -1.0) if side == 1 else (j + 1, 1.0)
@@ -201,12 +203,12 @@ def linearised(
                         for d in range(3):
                             x = (d + 1) % 3
                             y = (d + 2) % 3
-                            shift = sign * behind[at, r, 3] * forms[at, d]
-                            turn = sign * (behind[at, r, x] * forms[at, y] - behind[at, r, y] * forms[at, x])
+                            shift = sign * behind[at, r, 3] * before[at, d]
+                            turn = sign * (behind[at, r, x] * before[at, y] - behind[at, r, y] * before[at, x])
                             for q in range(6):
                                 J[o, 3 * i + r, 6 * k + q] += shift * B[o, k, d, q] + turn * B[o, k, 3 + d, q]
             for d in range(4):
-                full[o, i, d] = forms[last, d]
+                forms[o, i, d] = before[last, d]
             for r in range(3 * i, 3 * i + 3):
                 for q in range(6 * n):
                     sizes[2, o] += J[o, r, q] * J[o, r, q] / (3 * c)
@@ -223,8 +225,8 @@ def change(
     R: _Array,
     y: _Array,
     step: _Array,
-    length: _Array,
-    turned: _Array,
+    largest: _Array,
+    angles: _Array,
 ) -> None:
     """J^t (J J^t + mu + soft2)^-1 (J z - e) - z of some observations, by R R^t = J J^t + mu + soft2 (Cholesky).
 
@@ -234,8 +236,8 @@ def change(
         rows: Which observations.
         R: (m, m), scratch, one over each pivot's root on the diagonal; so is y (m,).
         step: (rows, 6 n), overwritten.
-        length: (rows,), overwritten: its largest component.
-        turned: (rows,), overwritten: the largest turn of a goal, [rad].
+        largest: (rows,), overwritten: its largest component.
+        angles: (rows,), overwritten: how far a goal is rotated at most, [rad].
     """
     m = e.shape[1]
     size = z.shape[1]
@@ -269,17 +271,17 @@ def change(
                 y[q] -= R[i, q] * y[i]
             for q in range(size):
                 step[x, q] += y[i] * J[o, i, q]
-        length[x] = 0.0
-        turned[x] = 0.0
+        largest[x] = 0.0
+        angles[x] = 0.0
         for k in range(size // 6):
             s = 0.0
             for i in range(6):
-                length[x] = max(length[x], abs(step[x, 6 * k + i]))
+                largest[x] = max(largest[x], abs(step[x, 6 * k + i]))
                 t = 0.0
                 for q in range(6):
                     t += L[o, k, i, q] * step[x, 6 * k + q]
                 s += t * t if i > 2 else 0.0
-            turned[x] = max(turned[x], math.sqrt(s))
+            angles[x] = max(angles[x], math.sqrt(s))
 
 
 PLAIN = Kernels(linearised, change)

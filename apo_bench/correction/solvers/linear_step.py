@@ -82,9 +82,13 @@ class DenseStep:
             points = system.points if system.points.ndim == 4 else np.tile(system.points, (b, 1, 1, 1))
             self._observed, self._L = owned(observed), owned(L)
             self._soft2 = owned(self._soft2)
+            # What the kernels take; these are their names of it, in their order.
+            # words, matrices, plane, points
             self._contacts = system.words.table, np.array(system.constants), owned(system.plane), owned(points)
             width = system.words.letters.shape[1]
+            # small, behind, before
             self._scratch = np.empty((6, 6, 6)), np.empty((width + 1, 3, 4)), np.empty((width + 1, 4))
+            # R, y
             self._factor = np.empty((m, m)), np.empty(m)
             self._forms = np.empty((b, len(system), 4))
 
@@ -99,9 +103,10 @@ class DenseStep:
     def linearise(self, z: Array, rows: Rows) -> None:
         # The kernel does what the lines below it do.
         if self._kernels is not None:
-            seen = *self._contacts, self._observed, self._L, self._soft2
-            out = self.T, self.B, self.e, self._J, self._forms, self.sizes
-            self._kernels.linearised(*seen, z, rows, SERIES, ADJOINTS, *self._scratch, *out)
+            # In the order of its parameters: what is known, where to linearise, two tables, scratch, results.
+            known = *self._contacts, self._observed, self._L, self._soft2
+            results = self.T, self.B, self.e, self._J, self._forms, self.sizes
+            self._kernels.linearised(*known, z, rows, SERIES, ADJOINTS, *self._scratch, *results)
             return
         some = self._views(rows)
         m = max(self.e.shape[1], 1)
@@ -119,11 +124,12 @@ class DenseStep:
         # As above, by a Cholesky decomposition.
         if self._kernels is not None:
             step = np.empty((len(rows), z.shape[1]))
-            length = np.empty(len(rows))
-            turned = np.empty(len(rows))
-            given = self._J, self.e, z, self._L, mu, self._soft2, rows
-            self._kernels.change(*given, *self._factor, step, length, turned)
-            return step, length, turned
+            largest = np.empty(len(rows))
+            angles = np.empty(len(rows))
+            self._kernels.change(
+                self._J, self.e, z, self._L, mu, self._soft2, rows, *self._factor, step, largest, angles
+            )
+            return step, largest, angles
         some = self._views(rows)
         now = z[some]
         step = shortest_z(self._J[some], self.e[some], now, mu[:, None] + self._soft2) - now
@@ -176,5 +182,5 @@ def twists(z: Array, L: Array) -> Array:
 
 def turn_of(step: Array, L: Array) -> Array:
     """How far steps (b, 6 n) of z turn a goal at most, (b,), [rad]."""
-    turned = twists(step, L[:, :, 3:])
-    return np.asarray(np.sqrt((turned * turned).sum(axis=2).max(axis=1, initial=0.0)))
+    rotations = twists(step, L[:, :, 3:])
+    return np.asarray(np.sqrt((rotations * rotations).sum(axis=2).max(axis=1, initial=0.0)))

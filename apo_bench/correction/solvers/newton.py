@@ -1,4 +1,8 @@
-"""Newton-Raphson with the singular value decomposition (Eq. 12 to 23), re-based at every turn.
+"""Newton-Raphson with the singular value decomposition, as in the paper (Eq. 12 to 23), re-based at every iteration.
+
+Eq. 12 is J dq = -e, with J = df/dq, and Eq. 14 decomposes J = U W V^t. Eq. 22 inverts the singular values in W that
+count and puts 0 for the others, which is W*, so that dq = -V W* U^t e (Eq. 23). Eq. 13 adds dq to q; here the poses
+take dq in and q starts at 0 again, since the derivatives of the appendix hold at q = 0 only.
 
 Two numbers that the paper does not give decide whether redundant directions stay where they were seen:
 
@@ -23,8 +27,8 @@ from apo_bench.geometry import Array
 LENGTH_M = 0.04
 """Way of a point per radian, at which a rotation weighs as much as a translation."""
 SINGULAR_CUT_OFF = 0.02
-"""Singular values below this part of the largest one count as zero (w_l+1 .. w_n of Eq. 15)."""
-_TURNS = 30
+"""Singular values below this part of the largest one count as zero (w_l+1 .. w_n of Eq. 15, W = diag(w_j))."""
+_ITERATIONS = 30
 REST_M = 1e-9
 """Scaled step below which the solver has come to rest."""
 
@@ -52,7 +56,7 @@ def solve_newton(
     *,
     cut_off: float = SINGULAR_CUT_OFF,
     length_m: float = LENGTH_M,
-    turns: int = _TURNS,
+    iterations: int = _ITERATIONS,
 ) -> Solution:
     """Change the free goals, as little as the contacts ask for, until the equations hold or nothing moves any more.
 
@@ -64,9 +68,11 @@ def solve_newton(
         goals: (n, 4, 4), where to begin, world frame, [m].
         free: Operations whose motion parameters may change, counted from 0.
     """
-    solution = descend(equations, goals, free, cut_off=cut_off, length_m=length_m, turns=turns)
-    if solution.at_rest and any(turn.rank > solution.rank for turn in solution.trace):
-        again = descend(equations, goals, free, cut_off=cut_off, length_m=length_m, turns=turns, at_most=solution.rank)
+    solution = descend(equations, goals, free, cut_off=cut_off, length_m=length_m, iterations=iterations)
+    if solution.at_rest and any(iterate.rank > solution.rank for iterate in solution.trace):
+        again = descend(
+            equations, goals, free, cut_off=cut_off, length_m=length_m, iterations=iterations, at_most=solution.rank
+        )
         if again.at_rest and again.gap_m <= solution.gap_m + REST_M:
             return again
     return solution
@@ -79,17 +85,17 @@ def descend(
     *,
     cut_off: float = SINGULAR_CUT_OFF,
     length_m: float = LENGTH_M,
-    turns: int = _TURNS,
+    iterations: int = _ITERATIONS,
     at_most: int | None = None,
 ) -> Solution:
-    """One descent: at each turn T <- T dT(dq), q <- 0, with the rank that the cut-off finds, or `at_most` if less."""
+    """One descent: at each iteration T <- T dT(dq), q <- 0, of the rank that the cut-off finds or `at_most`."""
     now = np.array(goals)
     changing = np.array(sorted(free), dtype=np.intp)
     trace = list[Iterate]()
-    # Columns of angles as the way of a point, so that one cut-off serves all (Eq. 14 with scaled unknowns).
+    # Columns of angles as the way of a point, so that one cut-off serves all (Eq. 12 with scaled unknowns).
     units = np.array([1.0, 1.0, 1.0, length_m, length_m, length_m] * len(changing))
     columns = (6 * changing[:, None] + np.arange(6)).ravel()
-    for turn in range(turns + 1):
+    for iteration in range(iterations + 1):
         e, J = equations.linearised(now)
         try:
             step, rank = least_step(J[:, columns] / units, e, cut_off, at_most)
@@ -97,7 +103,7 @@ def descend(
             return Solution(np.array(goals), trace[0].gap_m if trace else largest(e), 0, False, False, tuple(trace))
         size = float(np.linalg.norm(step))
         trace.append(Iterate(largest(e), rank, size))
-        if size < REST_M or turn == turns:
+        if size < REST_M or iteration == iterations:
             break
         # T <- T dT(dq), q <- 0: the derivatives of the appendix hold at q = 0 only.
         now[changing] = now[changing] @ displacement((step / units).reshape(-1, 6))
@@ -105,7 +111,7 @@ def descend(
 
 
 def least_step(J: Array, e: Array, cut_off: float, at_most: int | None = None) -> tuple[Array, int]:
-    """The shortest dq with the least |J dq + e|, and the rank (Eq. 15 to 23): dq = -V W^-1 U^t e.
+    """The shortest dq with the least |J dq + e|, and the rank (Eq. 15 to 23): dq = -V W* U^t e.
 
     Raises:
         numpy.linalg.LinAlgError: A number is not finite.

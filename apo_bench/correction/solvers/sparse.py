@@ -155,7 +155,7 @@ def sparse_rank(Jt: Any) -> int:
 
 
 def _largest(Jt: Any) -> float:
-    """The largest eigenvalue of J J^t, roughly: twenty turns of the power method from a fixed start."""
+    """The largest eigenvalue of J J^t, roughly: twenty iterations of the power method from a fixed start."""
     y = np.cos(np.arange(Jt.shape[1]))
     size = 1.0
     for _ in range(20):

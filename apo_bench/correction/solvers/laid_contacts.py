@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Assembly, Pattern
 from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.solvers.compact import CompactEquations, moments
-from apo_bench.correction.solvers.words import Words
+from apo_bench.correction.solvers.pose_products import Words
 from apo_bench.geometry import Array, pose, remembered
 
 _ONE = np.eye(4)
@@ -17,7 +17,7 @@ _ONE = np.eye(4)
 
 @final
 @dataclass(frozen=True, eq=False)
-class Laid:
+class LaidContacts:
     """The equations of all contacts, and their vertices, laid at some goals."""
 
     system: CompactEquations
@@ -28,9 +28,9 @@ class Laid:
     """(*, c, 4): as of `CompactEquations.forms`, at these goals."""
     pattern: Pattern
 
-    def only(self, some: slice) -> "Laid":
+    def only(self, some: slice) -> "LaidContacts":
         """Those of some of the observations."""
-        return Laid(self.system.only(some), self.vertex[some], self.forms[some], self.pattern)
+        return LaidContacts(self.system.only(some), self.vertex[some], self.forms[some], self.pattern)
 
     def gaps(self, forms: Array) -> Array:
         """The largest |e| of each contact, (*, c), [m]."""
@@ -45,7 +45,7 @@ class Laid:
         return np.asarray(cosines > self.pattern.opposing)
 
 
-def laid_contacts(assembly: Assembly, start: Array, plane: Array, goals: Array) -> Laid:
+def laid_contacts(assembly: Assembly, start: Array, plane: Array, goals: Array) -> LaidContacts:
     """The equations of all contacts of an assembly, vertices where they are at the goals, (*, n, 4, 4).
 
     Vertices of the environment's face are where they are; those of the manipulated face are laid onto the other one:
@@ -63,7 +63,7 @@ def laid_contacts(assembly: Assembly, start: Array, plane: Array, goals: Array) 
     vertex = (maps.take(corners.pattern.contact, axis=-3) @ corners.vertex)[..., 0]
     points = corners.points @ np.swapaxes(maps, -1, -2)
     forms = (plane[:, None] @ products)[..., 0, :]
-    return Laid(CompactEquations(corners.words, constants, plane, points), vertex, forms, corners.pattern)
+    return LaidContacts(CompactEquations(corners.words, constants, plane, points), vertex, forms, corners.pattern)
 
 
 class _Corners(NamedTuple):

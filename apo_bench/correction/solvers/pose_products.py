@@ -1,4 +1,7 @@
-"""Words of motion parameters, D_a^-1 D_b of each contact, as arrays that are multiplied out for many observations."""
+"""The product of poses in each contact equation, D_a^-1 D_b, at the goals of many observations at once.
+
+Such a product is a word, and the poses in it, start poses and goals or their inverses, are its letters.
+"""
 
 from dataclasses import dataclass
 from functools import cached_property
