@@ -1,14 +1,29 @@
 """Correction of an observation by its face contacts. Knows no simulator and never meets the truth.
 
-How one round of `contact` works, in the order of its calls:
+"The paper", and every number of an equation or section without another source, is T. Suehiro and K. Ikeuchi, "Towards
+an Assembly Plan from Observation: Fine localization based on face contact constraints". `apo_bench.assembly.equations`
+writes its contact equations out, `solvers.newton` its solver.
 
-1. `contact.ContactCorrector.together`: what is done with an observation, and with what is in doubt.
-2. `problem.problem_of`: contacts become equations (`solvers/laid.py`, `solvers/compact.py`), noise becomes L.
-3. `solvers/gauss_newton.py`, `_nearest`: the loop. Each turn is one step of `solvers/linear_step.py`: linearise the
-   equations (Eq. 14), then the shortest z on them; `solvers/kernels.py` does the same in loops for a compiler.
-4. `solved.solve`: what the nearest goals leave open, their rank and covariance (`solvers/posterior.py`), and the test.
-5. `contact._report`; or `starts.best_start` and `suspects.suspects`, if the test fails or a goal has turned far.
+What one correction by `contact` calls:
 
-`correctors.correct` is the door for all correctors, `baselines` what `contact` is compared with (`paper` is the method
-as it was published), `robust` the one that doubts observations, `own_code` the processes of correctors of one's own.
+    correctors.correct                      the door for all correctors: checks, and lowers round faces to planes
+      contact.ContactCorrector.together     many at once; alone what is large, or states tails or shared errors
+        contact._corrected
+          problem.problem_of                contacts become equations (solvers.laid_contacts), noise becomes L
+          solved.solve                      the nearest goals with rank, covariance and test
+            solvers.gauss_newton._nearest   the loop; each iteration linearises the equations, then takes the shortest z
+                                            on them (solvers.linear_step, solvers.sparse, or solvers.kernels compiled)
+            chi_square.chi_squares          the squared length of the correction
+            solved._solved                  gaps, rank and covariance (solvers.posterior)
+            solved._solved_in_full          instead, where contacts contradict each other, or with inequalities, play or
+                                            tails; chi_square.relaxed_chi_square in it runs the loop again
+          contact._report                   the Correction, if it is in no doubt; otherwise
+          contact._in_doubt                 not converged, the test fails, a goal turned far, faces look the same way
+            starts.best_start               other starts, each solved as above; none where only the test has failed
+            suspects.suspects               each relation left out in turn, if the test fails; `drop` then leaves it out
+            contact._report                 the Correction
+            status.opposing                 `inconsistent` where faces look the same way
+
+`baselines` are what `contact` is compared with (`paper` is the method as it was published), `robust` is the corrector
+that doubts observations, `own_code` the processes of correctors of one's own.
 """

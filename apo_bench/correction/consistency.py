@@ -36,14 +36,14 @@ def fit_deviation(assembly: Assembly, play_m: float) -> Array:
     return frozen(np.repeat(each, 3))
 
 
-def p_value(chi_square: float, freedom: int) -> float:
-    """The chance of a chi-square at least as large; 1 where nothing is tested."""
+def p_value(chi_square: float, degrees: int) -> float:
+    """The chance of a chi-square at least as large, of so many degrees of freedom; 1 where nothing is tested."""
     if not isfinite(chi_square):
         return 0.0
-    return float(chdtrc(freedom, chi_square)) if freedom else 1.0
+    return float(chdtrc(degrees, chi_square)) if degrees else 1.0
 
 
-def softened_length(z: Array, Jt: Array, S: Array) -> Array:
+def softened_chi_square(z: Array, Jt: Array, S: Array) -> Array:
     """The squared length, (b,), of corrections z, (b, 6 n), if equations may be off by covariance S, (3 c, 3 c), [m^2].
 
     Near z equations are linear in the little that play leaves, so the shortest sum of what is left of z and of what

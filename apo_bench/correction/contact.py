@@ -52,9 +52,10 @@ class ContactCorrector:
         """Correct an observation.
 
         Returns:
-            `converged`, `not_seen`, `inconsistent` (the contacts contradict each other), `doubtful` (of `refuse` and
-            `drop`: the test fails), `not_converged` or `not_finite`; only the first is meant to be executed. `freed`
-            are all operations that a contact depends on; `covariance` is the posterior.
+            `converged`, `not_seen`, `inconsistent` (a gap is left, mostly since the contacts contradict each other, or
+            faces look the same way), `doubtful` (of `refuse` and `drop`: the test fails), `not_converged` (no gap is
+            left, but steps go on: these may not be the nearest goals) or `not_finite`; only the first is meant to be
+            executed. `freed` are all operations that a contact depends on; `covariance` is the posterior.
 
         Raises:
             InputError: A covariance is not positive definite.
@@ -67,6 +68,7 @@ class ContactCorrector:
         Raises:
             InputError: As of one.
         """
+        # For who calls this directly: what `correctors.correct` has lowered already comes back as it is.
         observations = lowered_together(observations)
         results = [None if observation.seen.all() else refused_correction(observation) for observation in observations]
         whole = [i for i, correction in enumerate(results) if correction is None]
@@ -90,7 +92,9 @@ class ContactCorrector:
         """Correct a batch, lowered, every operation seen: all at once, then by itself what is in doubt."""
         problem = problem_of(observations, self.level, self.compiled)
         corrections = []
-        for i, (before_m, solved) in enumerate(zip(problem.seen_gap_m(), solve(problem, problem.every), strict=True)):
+        for i, (before_m, solved) in enumerate(
+            zip(problem.seen_gap_m(), solve(problem, problem.all_contacts), strict=True)
+        ):
             sure = (solved.test.passes or self.doubt == "apply") and not solved.far and not solved.away
             if sure and _status(solved, observations[i].gap_m) == "converged":
                 corrections.append(self._report(problem, i, solved, before_m))
@@ -98,16 +102,16 @@ class ContactCorrector:
                 corrections.append(self._in_doubt(problem.only(i), solved, before_m))
         return corrections
 
-    def _in_doubt(self, problem: Problem, first: Solved, before_m: float) -> Correction:
+    def _in_doubt(self, problem: Problem, solved: Solved, before_m: float) -> Correction:
         """Correct an observation whose first solution is none, or far, or fails the test: other starts, suspects."""
         if self.elsewhere:
-            problem, first = best_start(problem, first)
-        solved = first
-        test = first.test
-        lost = not first.at_rest and first.worst_m <= problem.observation.gap_m
-        if not test.passes and self.doubt != "apply" and first.finite and not lost:
-            test = replace(test, suspects=suspects(problem, problem.every))
-        kept = problem.every
+            problem, solved = best_start(problem, solved)
+        test = solved.test
+        # Contacts hold, but steps go on (status `not_converged`): a nearer solution may pass, so nothing is suspected.
+        still_moving = not solved.at_rest and solved.worst_m <= problem.observation.gap_m
+        if not test.passes and self.doubt != "apply" and solved.finite and not still_moving:
+            test = replace(test, suspects=suspects(problem, problem.all_contacts))
+        kept = problem.all_contacts
         dropped = tuple[str, ...]()
         while self.doubt == "drop" and not solved.test.passes and solved.finite and len(dropped) < DROPS:
             worst = suspects(problem, kept) if dropped else test.suspects
@@ -131,17 +135,17 @@ class ContactCorrector:
         solved: Solved,
         before_m: float,
         dropped: tuple[str, ...] = (),
-        first: Consistency | None = None,
+        test_before: Consistency | None = None,
         turned: str = "",
     ) -> Correction:
         """The correction of observation i.
 
         Args:
-            first: The test before anything was dropped; None if that is the one of what was solved.
+            test_before: The test before anything was dropped; None if that is the one of what was solved.
         """
         gap_m = problem.observations[i].gap_m
         rank = solved.rank
-        test = first or solved.test
+        test = test_before or solved.test
         status = _status(solved, gap_m)
         if status == "converged" and self.doubt in ("refuse", "drop") and not solved.test.passes:
             status = "doubtful"
@@ -155,9 +159,10 @@ class ContactCorrector:
             gap_before_m=before_m,
             gap_after_m=solved.worst_m,
             rank=rank,
+            # The rank is known where the solver ended only, and stands in every iterate.
             trace=tuple([Iterate(open_m, rank, step) for open_m, step in solved.trace]),
             test=test,
-            test_after=solved.test if dropped and first else None,
+            test_after=solved.test if dropped and test_before else None,
             covariance=solved.covariance if status == "converged" else None,
             dropped=dropped,
         )
@@ -168,9 +173,16 @@ contact_apply = ContactCorrector("apply")
 contact_refuse = ContactCorrector("refuse")
 contact_drop = ContactCorrector("drop")
 contact_fast = contact
+"""The old name of the compiled `contact`, which is compiled by default now: rows and sweeps may name it."""
 
 
 def _status(solved: Solved, gap_m: float) -> str:
+    """How the solver ended.
+
+    A gap that is open says `inconsistent`, whether the solver rests or has used up its iterations; `not_converged` says
+    that contacts hold and steps go on. `status.solver_status`, of the solver of the paper, differs: there what holds
+    has converged, and a gap says `not_converged` unless the solver rests.
+    """
     if not solved.finite:
         return "not_finite"
     if solved.kept_m <= gap_m:

@@ -50,7 +50,8 @@ def correct(observation: Observation, corrector: Any = CORRECTOR, look: Look | N
     chosen = checked_corrector(corrector)
     name = corrector if isinstance(corrector, str) else getattr(chosen, "__name__", type(chosen).__name__)
     ours = _ours(chosen)
-    # The equations know planes alone: for what comes with the package round faces are lowered to planes here, once.
+    # The equations know planes alone, so correctors of the package get round faces lowered to planes; `contact` lowers
+    # by itself what others hand it, and leaves this as it is.
     flat = lowered_observation(observation)
     given = flat if ours else observation
     try:
@@ -87,6 +88,7 @@ def checked_corrector(corrector: Any) -> Any:
 def _admitted(returned: Any, observation: Observation, chosen: Any, name: str) -> Correction:
     """What a corrector returned, as a `Correction` that makes sense."""
     if isinstance(returned, Correction) and _ours(chosen):
+        # `ContactCorrector` has asked already which faces look the same way (`Solved.away`, `_in_doubt`).
         return returned if isinstance(chosen, ContactCorrector) else opposing(observation, returned)
     if not isinstance(returned, Correction):
         return goals_as_given(

@@ -23,7 +23,7 @@ from apo_bench.correction.problem import problem_of
 from apo_bench.correction.relation_equations import RelationHold, by_relation, relation_holds
 from apo_bench.correction.shared_estimate import SharedEstimate, estimate_shared
 from apo_bench.correction.solvers.compact import linearised_by
-from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR, Freedom, freedom
+from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR, Freedom, freedom_of
 from apo_bench.correction.solvers.whitened import twists_of
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose, right_jacobian
@@ -134,7 +134,7 @@ def explain(observation: Observation, goals: Array, dropped: Collection[str] = (
     _, Jt = linearised_by(system, goals, B)
     every = relation_holds(assembly)
     relations = by_relation(assembly, system, Jt, kept)
-    known = freedom(relations.Jt)
+    known = freedom_of(relations.Jt)
     if known is None:
         raise _too_many(n)
     spans = twists_of(B, known.free)

@@ -16,7 +16,7 @@ from apo_bench.geometry import Array
 DRAWS = 2000
 
 
-def drawn_lengths(observation: Observation, L: Array, Jt: Array, S: Array | None) -> Array:
+def drawn_chi_squares(observation: Observation, L: Array, Jt: Array, S: Array | None) -> Array:
     """Squared lengths of corrections of errors that are drawn, (DRAWS,), sorted.
 
     Args:
@@ -25,7 +25,7 @@ def drawn_lengths(observation: Observation, L: Array, Jt: Array, S: Array | None
         S: (3 c, 3 c), the covariance of what equations are off by, [m^2]; None: nothing.
     """
     r = _drawn(observation, L) @ Jt
-    # As `softened_length`, of errors that are drawn: r of each is J z, and what play adds, factored as S = V w V^t.
+    # As `softened_chi_square`, of errors that are drawn: r of each is J z, and what play adds, factored as S = V w V^t.
     A = Jt.T @ Jt
     if S is not None:
         w, V = np.linalg.eigh(S)
@@ -36,10 +36,10 @@ def drawn_lengths(observation: Observation, L: Array, Jt: Array, S: Array | None
     return np.sort((r * np.linalg.solve(A, r.T).T).sum(axis=1))
 
 
-def drawn_p_value(lengths: Array, length: float) -> float:
-    """The part of drawn lengths, sorted, that are not shorter; never 0, since one more might be."""
-    above = len(lengths) - int(np.searchsorted(lengths, length))
-    return (1.0 + above) / (1.0 + len(lengths))
+def drawn_p_value(drawn: Array, chi_square: float) -> float:
+    """The part of drawn squared lengths, sorted, that are not less; never 0, since one more might be."""
+    above = len(drawn) - int(np.searchsorted(drawn, chi_square))
+    return (1.0 + above) / (1.0 + len(drawn))
 
 
 def drawn_radius(observation: Observation, L: Array, free: Array, level: float) -> float:

@@ -31,8 +31,8 @@ class _Demands(NamedTuple):
 
     exact: NDArray[np.bool_]
     """(c,): contacts that are equations; the others are inequalities."""
-    every: bool
-    """Whether that is all of them."""
+    all_exact: bool
+    """Whether all of them are equations."""
     low: Array
     """(c,), [m]: the least distance of each contact; so is `high` the largest."""
     high: Array
@@ -40,7 +40,7 @@ class _Demands(NamedTuple):
     """(c, 4): planes shifted to where equations are asked to be."""
     slack_m: Array | None
     """(3 c,): the standard deviation of each equation that play of parts that fit leaves, [m]; None: nowhere any."""
-    play: Array | None
+    play_covariance: Array | None
     """(3 c, 3 c): the covariance of the equations that play causes, [m^2]; None: none."""
 
 
@@ -67,12 +67,16 @@ class Problem:
 
     @property
     def observation(self) -> Observation:
-        """The only one."""
+        """The first of a batch; of a batch of one, the only one.
+
+        Of larger batches only what all have in common is read off it: `ContactCorrector.together` makes batches of one
+        where observations state tails or shared errors.
+        """
         return self.observations[0]
 
     @property
-    def every(self) -> NDArray[np.bool_]:
-        """All contacts, (c,)."""
+    def all_contacts(self) -> NDArray[np.bool_]:
+        """The choice of all contacts, (c,): true throughout."""
         return np.ones(len(self.demands.exact), dtype=np.bool_)
 
     def only(self, i: int) -> Problem:
@@ -109,9 +113,9 @@ class Problem:
             own[~self.demands.exact] = wall.overstepped(at)
         return gaps
 
-    def play(self, chosen: NDArray[np.bool_]) -> Array | None:
+    def play_covariance(self, chosen: NDArray[np.bool_]) -> Array | None:
         """The covariance of the equations of the contacts that are chosen, (c,), that play causes, [m^2]."""
-        S = self.demands.play
+        S = self.demands.play_covariance
         if S is None or chosen.all():
             return S
         rows = np.repeat(chosen, 3)
@@ -155,7 +159,7 @@ def problem_of(
     there = goals if at is None else at
     laid = laid_contacts(assembly, start, demands.plane, there)
     inequalities = tuple[Inequalities, ...]()
-    if not demands.every:
+    if not demands.all_exact:
         systems = (equations(assembly, first.start, T) for T in there)
         inequalities = tuple(bounded(system, demands.exact, demands.low, demands.high) for system in systems)
     L = np.array([noise_factor(observation) for observation in observations]) if shared else _factors(observations)

@@ -7,7 +7,7 @@ from apo_bench.assembly import Correction, Observation, lowered_observation
 from apo_bench.correction.heavy_tails import drawn_radius
 from apo_bench.correction.problem import seen_system
 from apo_bench.correction.solvers.compact import linearised_by
-from apo_bench.correction.solvers.posterior import freedom
+from apo_bench.correction.solvers.posterior import freedom_of
 from apo_bench.correction.solvers.whitened import coordinates_of, noise_factor
 from apo_bench.geometry import Array, pose, right_jacobian
 
@@ -29,7 +29,7 @@ def contains_truth(observation: Observation, correction: Correction, truth: Arra
     L = noise_factor(observation)
     xi = pose.log(pose.inverse(observation.goals) @ correction.goals)
     system = seen_system(observation).among(_equal(observation, correction.dropped))
-    known = freedom(linearised_by(system, correction.goals, right_jacobian(xi) @ L)[1])
+    known = freedom_of(linearised_by(system, correction.goals, right_jacobian(xi) @ L)[1])
     if known is None or not known.free.shape[1]:
         return None
     free = known.free

@@ -7,7 +7,7 @@ import numpy as np
 
 from apo_bench.assembly import Observation, SharedError, joint_covariance
 from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
-from apo_bench.correction.solvers.posterior import freedom
+from apo_bench.correction.solvers.posterior import freedom_of
 from apo_bench.correction.solvers.whitened import noise_factor, twists_of
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
@@ -52,7 +52,7 @@ def estimate_shared(
     """
     L = noise_factor(observation)
     seen = observation.goals
-    known = freedom(linearised_by(system, seen @ pose.exp(xi), Jr @ L)[1])
+    known = freedom_of(linearised_by(system, seen @ pose.exp(xi), Jr @ L)[1])
     if known is None:
         raise InputError(f"{len(seen)} operations that share errors were given; take fewer of them.")
     joint = joint_covariance(seen, observation.covariance, observation.shared)

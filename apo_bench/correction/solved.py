@@ -1,4 +1,4 @@
-"""The nearest goals by some of the contacts, and the test of the correction that leads there."""
+"""The nearest goals by some of the contacts, with all that `contact` says of them: gaps, rank, covariance, test."""
 
 from collections.abc import Sequence
 from math import cos, radians
@@ -8,12 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Consistency, largest
-from apo_bench.correction.consistency import CONTRADICTION_M, p_value, softened_length
-from apo_bench.correction.heavy_tails import drawn_lengths, drawn_p_value
+from apo_bench.correction.chi_square import chi_square_test, chi_squares, relaxed_chi_square
+from apo_bench.correction.consistency import CONTRADICTION_M, p_value
 from apo_bench.correction.problem import Problem
 from apo_bench.correction.solvers.gauss_newton import NearestGoals
 from apo_bench.correction.solvers.inequalities import active_rank, nearest_between
-from apo_bench.correction.solvers.posterior import jacobian_rank, marginals, projections
+from apo_bench.correction.solvers.posterior import marginals, projections
 from apo_bench.geometry import Array
 
 FAR_DEG = 45.0
@@ -58,15 +58,17 @@ def solve(problem: Problem, kept: NDArray[np.bool_]) -> list[Solved]:
     """
     chosen = kept & problem.demands.exact
     nearest = problem.nearest(chosen)
-    chi_square, simple = _lengths(problem, chosen, nearest)
-    if problem.observation.tails is not None or not (problem.demands.every or problem.demands.exact[kept].all()):
+    chi_square, simple = chi_squares(problem, chosen, nearest)
+    if problem.observation.tails is not None or not (problem.demands.all_exact or problem.demands.exact[kept].all()):
         simple[:] = False
-    every = _solved(problem, kept, nearest, chi_square.tolist())
+    solutions = _solved(problem, kept, nearest, chi_square.tolist())
     return [
         solved
         if easy and solved.kept_m <= observation.gap_m
         else _solved_in_full(problem.only(i), kept, nearest.at(i).batch())
-        for i, (observation, easy, solved) in enumerate(zip(problem.observations, simple.tolist(), every, strict=True))
+        for i, (observation, easy, solved) in enumerate(
+            zip(problem.observations, simple.tolist(), solutions, strict=True)
+        )
     ]
 
 
@@ -75,7 +77,7 @@ def tested(problem: Problem, kept: NDArray[np.bool_]) -> Consistency:
     if not problem.demands.exact[kept].all():
         return solve(problem, kept)[0].test
     nearest = problem.nearest(kept)
-    return _test_of_length(problem, kept, nearest, *_length(problem, kept, nearest))
+    return chi_square_test(problem, kept, nearest, *relaxed_chi_square(problem, kept, nearest))
 
 
 def pull(problem: Problem, kept: NDArray[np.bool_]) -> Array:
@@ -96,18 +98,18 @@ def turned_far(observed: Array, goals: Array) -> NDArray[np.bool_]:
 
 def _solved(problem: Problem, kept: NDArray[np.bool_], nearest: NearestGoals, chi_square: list[float]) -> list[Solved]:
     """What is to say of each of the nearest goals, given the squared lengths of corrections, (b,)."""
-    every = bool(kept.all())
+    all_kept = bool(kept.all())
     goals = nearest.goals
-    forms = nearest.forms if every and problem.demands.every else problem.laid.system.forms(goals)
+    forms = nearest.forms if all_kept and problem.demands.all_exact else problem.laid.system.forms(goals)
     gaps = problem.gaps(goals, forms)
     worst_m = gaps.max(axis=1, initial=0.0).tolist()
-    kept_m = worst_m if every else gaps[:, kept].max(axis=1, initial=0.0).tolist()
+    kept_m = worst_m if all_kept else gaps[:, kept].max(axis=1, initial=0.0).tolist()
     away = np.any(problem.laid.looking_away(forms), axis=1).tolist()
     far = turned_far(problem.goals, goals).tolist()
     at_rest = nearest.at_rest.tolist()
     finite = nearest.finite.tolist()
-    rank, free = projections(nearest.Jt)
-    covariance = [None] * len(rank) if free is None else marginals(nearest.B, free)
+    rank, free_projection = projections(nearest.Jt)
+    covariance = [None] * len(rank) if free_projection is None else marginals(nearest.B, free_projection)
     return [
         Solved(
             goals[i],
@@ -137,7 +139,7 @@ def _solved_in_full(problem: Problem, kept: NDArray[np.bool_], nearest: NearestG
     """
     exact = problem.demands.exact
     chosen = kept & exact
-    chi_square, freedom = _length(problem, chosen, nearest)
+    chi_square, degrees = relaxed_chi_square(problem, chosen, nearest)
     if nearest.finite[0] and largest(problem.gaps(nearest.goals)[:, chosen]) > problem.observation.gap_m:
         nearest = problem.nearest(chosen, np.hypot(problem.slack(chosen), CONTRADICTION_M))
     elif nearest.finite[0] and not exact[kept].all():
@@ -145,51 +147,7 @@ def _solved_in_full(problem: Problem, kept: NDArray[np.bool_], nearest: NearestG
         start = nearest.at(0)
         held = nearest_between(problem.among(chosen).only(0), inequalities, problem.goals[0], problem.L[0], start)
         chi_square += float(held.z @ held.z - start.z @ start.z)
-        freedom += active_rank(start.Jt, inequalities, held)
+        degrees += active_rank(start.Jt, inequalities, held)
         nearest = held.batch()
     (solved,) = _solved(problem, kept, nearest, [chi_square])
-    return solved._replace(test=_test_of_length(problem, chosen, nearest, chi_square, freedom))
-
-
-def _test_of_length(
-    problem: Problem, chosen: NDArray[np.bool_], nearest: NearestGoals, chi_square: float, freedom: int
-) -> Consistency:
-    """The test of one squared length: by the chi-square distribution, or by draws where errors have tails."""
-    p = p_value(chi_square, freedom)
-    tails = problem.observation.tails
-    if tails is not None and freedom and np.isfinite(chi_square) and isinstance(nearest.Jt, np.ndarray):
-        lengths = drawn_lengths(problem.observation, problem.L[0], nearest.Jt[0], problem.play(chosen))
-        p = drawn_p_value(lengths, chi_square)
-    return Consistency(chi_square, freedom, p, problem.level)
-
-
-def _length(problem: Problem, chosen: NDArray[np.bool_], nearest: NearestGoals) -> tuple[float, int]:
-    """The squared length of one correction, of contradictory contacts with what is left of them, and its degrees
-    of freedom.
-    """
-    freedom = jacobian_rank(nearest.Jt[0])
-    if not nearest.finite[0]:
-        return np.inf, freedom
-    (square,), (simple,) = _lengths(problem, chosen, nearest)
-    if simple:
-        return float(square), freedom
-    slack_m = problem.slack(chosen)
-    soft = (
-        slack_m if nearest.at_rest[0] and largest(nearest.e) <= CONTRADICTION_M else np.hypot(slack_m, CONTRADICTION_M)
-    )
-    relaxed = problem.nearest(chosen, soft)
-    softened = soft > 0.0
-    over = relaxed.e[0, softened] / soft[softened]
-    return float(relaxed.z[0] @ relaxed.z[0] + over @ over), freedom
-
-
-def _lengths(problem: Problem, chosen: NDArray[np.bool_], nearest: NearestGoals) -> tuple[Array, NDArray[np.bool_]]:
-    """Squared lengths of corrections, (b,), and whether that is what the test asks for: contacts hold, (b,)."""
-    holds = nearest.finite & nearest.at_rest & (np.abs(nearest.e).max(axis=1, initial=0.0) <= CONTRADICTION_M)
-    S = problem.play(chosen)
-    if S is not None:
-        Jt = nearest.Jt if isinstance(nearest.Jt, np.ndarray) else nearest.Jt[0].toarray()[None]
-        return softened_length(nearest.z, Jt, S), holds
-    if problem.demands.slack_m is not None and problem.slack(chosen).any():
-        holds[:] = False
-    return np.square(nearest.z).sum(axis=1), holds
+    return solved._replace(test=chi_square_test(problem, chosen, nearest, chi_square, degrees))

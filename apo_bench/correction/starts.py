@@ -48,7 +48,7 @@ def best_start(problem: Problem, first: Solved) -> tuple[Problem, Solved]:
         begun = _begun_at(problem, goals)
         if begun.begin is None or np.square(begun.begin).sum() >= length:
             break
-        solved = solve(begun, begun.every)[0]
+        solved = solve(begun, begun.all_contacts)[0]
         if solved.z @ solved.z < length and _holds(begun, solved) and _is_flush(begun, solved):
             return begun, solved
     return problem, first

@@ -10,7 +10,11 @@ from apo_bench.records import outcomes
 
 
 def solver_status(solution: Solution, left_m: float, gap_m: float) -> str:
-    """`converged` if what is left, [m], is within `gap_m`; otherwise why not."""
+    """How the solver of the paper ended, of `paper` and its kin: `converged` if what is left, [m], is within `gap_m`.
+
+    Otherwise `inconsistent` where it came to rest with a gap open, and `not_converged` where it still moved. `contact`
+    has a rule of its own (`contact._status`).
+    """
     if not solution.finite:
         return "not_finite"
     if left_m <= gap_m:

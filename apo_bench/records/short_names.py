@@ -1,4 +1,4 @@
-"""Everything that rows and the command line call by a short name, and where it is: data, imported by nobody.
+"""Everything that rows and the command line call by a short name, and where it is: names alone, nothing is imported.
 
 Whoever needs the object behind a name asks `apo_bench.names.resolve`.
 """

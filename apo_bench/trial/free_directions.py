@@ -20,7 +20,7 @@ from apo_bench.correction.robust.hypotheses import UNKNOWN
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
 from apo_bench.correction.solvers.gauss_newton import nearest_goals
 from apo_bench.correction.solvers.inequalities import Inequalities, demanded, violations
-from apo_bench.correction.solvers.posterior import freedom
+from apo_bench.correction.solvers.posterior import freedom_of
 from apo_bench.correction.solvers.whitened import noise_factor, twists_of
 from apo_bench.geometry import Array, pose
 
@@ -98,7 +98,7 @@ def free_space(observation: Observation, goals: Array) -> FreeSpace | None:
     held = _held(observation, goals)
     nearest = nearest_goals(held.compact.among(held.kept & held.exact), goals, held.L)
     # B Z: twists of one standard deviation along the null space Z of the whitened equations
-    known = freedom(nearest.Jt)
+    known = freedom_of(nearest.Jt)
     if known is None or not known.free.shape[1]:
         return None
     return FreeSpace(goals, twists_of(nearest.B, known.free), held)

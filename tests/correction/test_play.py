@@ -8,7 +8,7 @@ import pytest
 from apo_bench import Demonstration, Observation, correct, correct_many, observe
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.consistency import fit_deviation, softened_length
+from apo_bench.correction.consistency import fit_deviation, softened_chi_square
 from apo_bench.correction.contact import contact_refuse
 from apo_bench.correction.play import fit_covariance, plays
 from apo_bench.correction.problem import problem_of
@@ -88,7 +88,7 @@ def test_the_length_that_play_leaves_is_that_of_soft_contacts():
         soft = nearest_goals(system, seen.goals, asked.L[0], slack_m)
         over = soft.e[slack_m > 0.0] / slack_m[slack_m > 0.0]
         S = np.diag(slack_m**2)
-        short = float(softened_length(exact.z[None], exact.Jt[None], S)[0])
+        short = float(softened_chi_square(exact.z[None], exact.Jt[None], S)[0])
         assert short == pytest.approx(float(soft.z @ soft.z + over @ over), rel=5e-3)
 
 

@@ -15,7 +15,7 @@ from apo_bench import Correction, Observation, correct, correct_many
 from apo_bench.assembly import Gap, Operation
 from apo_bench.correction.region import contains_truth
 from apo_bench.correction.solvers.gauss_newton import nearest_goals
-from apo_bench.correction.solvers.posterior import freedom, jacobian_rank, marginals
+from apo_bench.correction.solvers.posterior import freedom_of, jacobian_rank, marginals
 from apo_bench.geometry import Array, pose
 from tests import scenes
 from tests.correction.test_manifold import RANKS, crooked, jacobian, scales, system_of, twisted
@@ -36,7 +36,7 @@ def test_what_is_fixed_and_what_is_free_add_up(seed: int, name: str) -> None:
     seen = twisted(scene.goals, L, rng)
     system = system_of(scene, seen)
     found = nearest_goals(system, seen, L)
-    known = freedom(found.Jt)
+    known = freedom_of(found.Jt)
     assert known is not None
     assert known.rank == jacobian_rank(found.Jt) == RANKS[name]
     assert known.free.shape == (6 * n, 6 * n - RANKS[name])
@@ -50,15 +50,15 @@ def test_what_is_fixed_and_what_is_free_add_up(seed: int, name: str) -> None:
 
 def test_freedom_of_nothing() -> None:
     for shape in ((12, 0), (0, 0)):
-        known = freedom(np.zeros(shape))
+        known = freedom_of(np.zeros(shape))
         assert known is not None
         assert (known.rank, known.redundant, known.spectral_gap) == (0, 0, np.inf)
         assert_allclose(known.free, np.eye(shape[0]), rtol=0, atol=0)
-    assert freedom(np.zeros((606, 3))) is None
+    assert freedom_of(np.zeros((606, 3))) is None
 
 
 def test_every_row_that_counts_leaves_no_gap() -> None:
-    known = freedom(np.eye(6)[:, :4])
+    known = freedom_of(np.eye(6)[:, :4])
     assert known is not None
     assert (known.rank, known.redundant, known.spectral_gap) == (4, 0, np.inf)
 

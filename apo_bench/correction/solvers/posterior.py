@@ -28,7 +28,10 @@ RANK_CUT_OFF = 1e-7
 @final
 @dataclass(frozen=True, eq=False)
 class Freedom:
-    """What the contacts fix and leave free at one solution."""
+    """What the contacts fix and leave free at one solution.
+
+    Degrees of freedom of the chi-square test, `Consistency.freedom`, are another number: `rank`, what is fixed.
+    """
 
     rank: int
     """Directions that the contacts fix."""
@@ -40,7 +43,7 @@ class Freedom:
     """(6 n, 6 n - rank): an orthonormal basis of the free directions, in standard deviations z."""
 
 
-def freedom(Jt: Any) -> Freedom | None:
+def freedom_of(Jt: Any) -> Freedom | None:
     """Read off the transposed Jacobian (6 n, 3 c) at a solution, dense or sparse.
 
     None above `LARGEST_POSTERIOR` unknowns.
