@@ -33,7 +33,8 @@ class Judgement:
     overlap: float | None
     penetration_mm: float | None
     pushed_mm: float | None
-    """How far a part that was in place was pushed at most, whether or not this rule minds."""
+    """How far a part that was in place was moved in the room at most, whether or not this rule minds; the finished
+    assembly is judged by how parts slid on what they touch."""
 
     @property
     def holds(self) -> bool:

@@ -1,6 +1,6 @@
 """Scenario files: a TOML file becomes a checked `Scenario`; every complaint names file, key and remedy.
 
-Lengths in mm, angles in degrees, operations numbered from 1; `scenarios/stick_in_tower.toml` shows every key.
+Lengths in mm, angles in degrees, operations numbered from 1; the file of the scenario `stick_in_tower` shows every key.
 """
 
 import os

@@ -193,7 +193,8 @@ def replay_and_judge(
     """Replay a plan and judge what was reached.
 
     Args:
-        reference: (n, 4, 4) goals that are right; the judge takes the true overlap of faces from them.
+        reference: (n, 4, 4) goals that are right, world frame, [m]; the judge takes from them how
+            faces should overlap, how far apart they may be, and which of the symmetries of a part is meant.
         watch: Called with the `MjData` about every 20 ms of simulated time; or several `Hooks`.
         searches: The robot feels for a hole where a motion into it is stopped by force.
         most_s: Simulated time that the replay may take.

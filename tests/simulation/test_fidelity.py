@@ -13,7 +13,7 @@ from apo_bench.geometry import intrusion_depths, pose
 from apo_bench.simulation.execution.controller import LOOK_S, PATIENCE_S, _until_rest
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
-from apo_bench.simulation.robot import near, robot
+from apo_bench.simulation.robot import obstacles, robot
 from apo_bench.simulation.robot.forces import ForceSensors
 from apo_bench.simulation.robot.in_hand import fast_forward
 from apo_bench.simulation.robot.paths import Trajectory, minimum_jerk, shifted, smooth
@@ -97,8 +97,8 @@ def test_nothing_touches_on_what_is_left_out(monkeypatch, name):
         n = max(1, round(line.seconds / self.step_s))
         s = np.concatenate([[0.0], line.progress(np.arange(1, n + 1) / n)])
         held = self.forces.held
-        moving = near.moving_with_tip(its, self.data, self.tip(), self.opening(), held)
-        spans = near.near_spans(its, self.data, moving, held, line, s)
+        moving = obstacles.moving_with_tip(its, self.data, self.tip(), self.opening(), held)
+        spans = obstacles.near_spans(its, self.data, moving, held, line, s)
         edges = [0, *(edge for span in spans for edge in span), n]
         begin = float(self.data.time)
         left_out[:] = [
@@ -174,13 +174,13 @@ def test_what_is_near_is_told_from_what_is_far():
     its = scene()
     data = initial_state(its.work, shown().layout.start)
     stick = part_pose(its.work, data, "stick")
-    hand = [near.Moving(its.pieces["stick"], np.eye(4))]
+    hand = [obstacles.Moving(its.pieces["stick"], np.eye(4))]
     held = ("stick",)
 
     def spans(start, end):
         line = smooth(start, end, 0.3)
         s = minimum_jerk(np.linspace(0.0, 1.0, 1 + round(line.seconds * 1e3)))
-        return near.near_spans(its, data, hand, held, line, s), len(s) - 1
+        return obstacles.near_spans(its, data, hand, held, line, s), len(s) - 1
 
     high = shifted(stick, (0.0, 0.0, 1.0), 0.2)
     up, n = spans(stick, high)
@@ -203,7 +203,7 @@ def test_no_turn_that_comes_near_anything_is_left_out():
     rng = np.random.default_rng(5)
     data = initial_state(its.work, shown().layout.start)
     others = [part for part in (*its.work.free, *its.work.fixed) if part != "stick"]
-    hand = [near.Moving(its.pieces["stick"], np.eye(4))]
+    hand = [obstacles.Moving(its.pieces["stick"], np.eye(4))]
     came = 0
     left_out = 0
     for _ in range(60):
@@ -211,15 +211,19 @@ def test_no_turn_that_comes_near_anything_is_left_out():
         end = shifted(start, rng.normal(size=3), 0.05) @ pose.at((0.0, 0.0, 0.0), rng.uniform(-30.0, 30.0, 3))
         line = Trajectory(start, end, 0.2, np.asarray)
         s = np.linspace(0.0, 1.0, 201)
-        spans = near.near_spans(its, data, hand, ("stick",), line, s)
+        spans = obstacles.near_spans(its, data, hand, ("stick",), line, s)
         for i, T in enumerate(line.poses(s)):
             depths = [
                 intrusion_depths(
-                    its.pieces["stick"], T[:3, :3], T[None, :3, 3], its.pieces[part], near._pose(its.work, data, part)
+                    its.pieces["stick"],
+                    T[:3, :3],
+                    T[None, :3, 3],
+                    its.pieces[part],
+                    obstacles._pose(its.work, data, part),
                 )
                 for part in others
             ]
-            is_near = np.max(depths) > -near.NEAR_HELD_M[0]
+            is_near = np.max(depths) > -obstacles.NEAR_HELD_M[0]
             came += is_near
             left_out += not any(begin <= i <= end for begin, end in spans)
             assert not is_near or any(begin <= i <= end for begin, end in spans)
@@ -233,11 +237,11 @@ def test_nothing_is_left_out_while_something_moves():
     stick = part_pose(its.work, data, "stick")
     line = Trajectory(shifted(stick, (0, 0, 1), 0.2), shifted(stick, (0, 0, 1), 0.3), 1.0, minimum_jerk)
     s = minimum_jerk(np.linspace(0.0, 1.0, 1001))
-    hand = [near.Moving(its.pieces["stick"], np.eye(4))]
-    assert near.near_spans(its, data, hand, ("stick",), line, s) == []
+    hand = [obstacles.Moving(its.pieces["stick"], np.eye(4))]
+    assert obstacles.near_spans(its, data, hand, ("stick",), line, s) == []
     other = next(part for part in its.work.free if part != "stick")
     data.qvel[its.work.dof[other]] = 0.01
-    assert near.near_spans(its, data, hand, ("stick",), line, s) == [(0, 1000)]
+    assert obstacles.near_spans(its, data, hand, ("stick",), line, s) == [(0, 1000)]
 
 
 def test_sleep_ends_with_the_replay():

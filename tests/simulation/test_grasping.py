@@ -21,7 +21,7 @@ from apo_bench.simulation.execution.grasping import (
 )
 from apo_bench.simulation.execution.prepare import Move, moves
 from apo_bench.simulation.robot.gripper import gripper_boxes
-from apo_bench.simulation.robot.near import obstacle
+from apo_bench.simulation.robot.obstacles import obstacle
 from apo_bench.simulation.robot.paths import turn_from, waypoints_unwound
 from tests.round_scenes import contacts, scenario
 

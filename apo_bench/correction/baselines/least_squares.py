@@ -16,7 +16,7 @@ from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.geometry import Array
 
 CONTACT_M = 1e-6
-"""Stated standard deviation of a contact, tuned by `python benchmarks/tune.py`."""
+"""Stated standard deviation of a contact, tuned by `python benchmarks/tune.py` of the repository."""
 _TOLERANCE = 1e-12
 EVALUATIONS = 300
 

@@ -24,7 +24,8 @@ from apo_bench.correction.solvers.whitened import Whitened, whitened
 from apo_bench.geometry import Array
 
 PENALTY_CONTACT_M = 1e-4
-"""Gap or depth that costs as much as one standard deviation of noise, tuned by `python benchmarks/tune.py`."""
+"""Gap or depth that costs as much as one standard deviation of noise, tuned by `python benchmarks/tune.py`, which is
+beside the package."""
 ADAM_STEPS = 600
 LENGTH = 0.2
 """Step of Adam at the beginning, in standard deviations, tuned likewise."""

@@ -28,6 +28,8 @@ _AT_FIRST_S = 0.05
 """Before the first operation the arm stands so long."""
 LOOK_S = 0.04
 PATIENCE_S = 1.5
+"""Between two operations the arm waits until parts rest: it looks so often, and goes on after so long at most. What it
+waits for is the speed of the parts, which only the simulation knows; it decides when, never where."""
 _SHORTEST_STEP_S = 1.0
 """Every step of a schedule takes longer: four seconds in the fastest replay of the benchmark."""
 _STEPS = ((1.14, 3), (0.86, 2), (0.58, 8), (0.3, 4), (0.0, 1))
@@ -51,8 +53,8 @@ def replay(
     Args:
         watch: Called with the `MjData` about every 20 ms of simulated time; or several `Hooks`.
         parts_at: Where the parts really stand, world frame, [m]; by default where the plan believes them.
-        fidelity: `full`, or `contact`: stretches of a motion on which nothing is near are left out, and what rests
-            untouched is not stepped.
+        fidelity: `full`, or `contact`: stretches of a motion on which nothing is near are left out. With a grasp by
+            friction, what rests untouched sleeps in both.
         cache: What replays of this scene have in common; changes nothing but the time it takes.
         searches: The robot feels for a hole where a motion into it is stopped by force.
         most_s: Simulated time after which no step is begun; a schedule that takes longer for sure is not begun at all.
@@ -75,7 +77,7 @@ def replay(
     robot = Robot(scene, start, hooks, fidelity, error)
     progress = Progress([None] * len(plan.assembly), [])
     with sleeping(scene.work, scene.grasp == "friction"):
-        outcome = refused or _carry_out(plan, robot, todo, progress, cache, keys, most_s)
+        outcome = refused or _run_schedule(plan, robot, todo, progress, cache, keys, most_s)
         final = _settled(robot, plan) if outcome.code != "unstable_simulation" else None
     result = ReplayResult(
         reached=Reached(after=tuple(progress.after), final=final),
@@ -110,7 +112,7 @@ def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None
     return None
 
 
-def _carry_out(
+def _run_schedule(
     plan: Plan,
     robot: Robot,
     todo: tuple[Move, ...],

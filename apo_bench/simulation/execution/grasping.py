@@ -22,7 +22,7 @@ from apo_bench.geometry.holds import holds
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.frames import frame
 from apo_bench.simulation.robot.gripper import gripper_boxes
-from apo_bench.simulation.robot.near import Obstacle, obstacle
+from apo_bench.simulation.robot.obstacles import Obstacle, obstacle
 from apo_bench.simulation.robot.paths import shifted
 from apo_bench.simulation.scene.scene import Scene
 

@@ -13,7 +13,7 @@ from apo_bench.geometry import Array, Ints, all_boxes, pose
 from apo_bench.simulation.frames import quaternion
 from apo_bench.simulation.hooks import BY_HAND, Doing, Hooks, hooks_of
 from apo_bench.simulation.robot.in_hand import TINY_S, take_along
-from apo_bench.simulation.robot.near import Moving, near_spans
+from apo_bench.simulation.robot.obstacles import Moving, near_spans
 from apo_bench.simulation.robot.paths import Trajectory
 from apo_bench.simulation.scene.composing import HANDS
 from apo_bench.simulation.scene.scene import Scene

@@ -1,9 +1,13 @@
 """The arm in motion: lines followed with feed-forward, guards, and watching for trouble.
 
 Every physics step of a replay is taken in `_tick`, or in `servo`, where each depends on the force that was felt in the
-one before it. The controller knows what it commanded, its own joint and finger positions and the force on the part in
-its hand. It never reads where a part is. It is one class, longer than most: to follow, to feel and to look share every
-step.
+one before it. Motions of the arm come there by `_run` (`follow`, `go`) or `wait` (`fingers`, `stand`).
+
+The robot knows what it commanded, its own joint and finger positions and the force on the part in its hand: no command
+depends on where a part is. What reads poses of parts serves the simulation alone: `_look` puts what is carried freely
+back in the hand between ticks (`in_hand.steadied`), `in_hand` records how far it moved there, and at fidelity `contact`
+`_spans` leaves out where nothing is near. It is one class, longer than most: to follow, to feel and to look share
+every step.
 """
 
 import math
@@ -19,7 +23,7 @@ from apo_bench.simulation.hooks import TICK_S, Doing, Hooks, hooks_of
 from apo_bench.simulation.robot.forces import WRIST_S, ForceSensors, Guard
 from apo_bench.simulation.robot.gripper import fingers_of
 from apo_bench.simulation.robot.in_hand import Carried, HoldWatch, fast_forward, steadied, take_along, weld
-from apo_bench.simulation.robot.near import clear, moving_with_tip, near_spans
+from apo_bench.simulation.robot.obstacles import clear, moving_with_tip, near_spans
 from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth, waypoints_unwound
 from apo_bench.simulation.robot.reach import along, at_end, within_speed
 from apo_bench.simulation.robot.robot_error import RobotError
@@ -80,7 +84,7 @@ class Robot:
         damping = model.dof_damping[self._dof] - model.actuator_biasprm[self._drives, 2]
         self._lead = damping / model.actuator_gainprm[self._drives, 0]
         self.step_s = float(model.opt.timestep)
-        self._every = max(1, round(TICK_S / self.step_s))
+        self._steps_of_tick = max(1, round(TICK_S / self.step_s))
         self.q: Array = np.array(self.arm.home)
         self.T: Array = scene.kinematics.forward(self.q)
         self._rest = self.T
@@ -179,7 +183,7 @@ class Robot:
             self.data.ctrl[self._drives] = q + offset @ J_inverse + self._off
             mujoco.mj_step(self.model, self.data)
             force = self.forces.feel(self.step_s)
-            if passed % self._every == 0:
+            if passed % self._steps_of_tick == 0:
                 self._look()
         self.q = q + offset @ J_inverse
         self.T = shifted(self.T, offset, 1.0)
@@ -188,11 +192,11 @@ class Robot:
         """Stand still; each physics step may be taken in so many parts."""
         command = self._commands(self.q[None])
         steps = round(seconds / self.step_s)
-        for done in range(0, steps, self._every):
-            n = min(self._every, steps - done)
+        for done in range(0, steps, self._steps_of_tick):
+            n = min(self._steps_of_tick, steps - done)
             with timestep(self.model, self.step_s / parts):
                 self._tick(np.repeat(command, parts * n, axis=0))
-            if n == self._every:
+            if n == self._steps_of_tick:
                 self._look()
 
     def stand(self, most_s: float = 0.1) -> None:
@@ -296,10 +300,10 @@ class Robot:
     def _run(self, targets: Array, guard: Guard | None) -> int:
         """Step through joint targets (n, joints), one physics step each; returns how many were run."""
         commands = self._commands(targets)
-        for done in range(0, len(commands), self._every):
-            tick = commands[done : done + self._every]
+        for done in range(0, len(commands), self._steps_of_tick):
+            tick = commands[done : done + self._steps_of_tick]
             stopped = self._tick(tick, guard)
-            if stopped or len(tick) == self._every:
+            if stopped or len(tick) == self._steps_of_tick:
                 self._look()
             if stopped:
                 return done + stopped
