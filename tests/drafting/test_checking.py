@@ -10,7 +10,9 @@ import pytest
 from apo_bench.drafting.checking import check_file
 from apo_bench.drafting.draft import draft
 from apo_bench.drafting.posed import on_the_table
+from apo_bench.drafting.touching import clashes
 from apo_bench.drafting.writing import scenario_text
+from apo_bench.parts import load_part
 from apo_bench.parts.making import bore, extrude, join, rectangle, shaft
 from tests.drafting.test_draft import at, made
 
@@ -85,3 +87,11 @@ def test_a_wall_on_either_side_without_play_is_found(tmp_path: Path) -> None:
     )
     notes = draft(on_the_table(parts)).notes
     assert sum("leave no play between them" in note for note in notes) == 1
+
+
+def test_parts_inside_each_other_are_named_with_how_deep(folder: Path) -> None:
+    cube = load_part(folder / "cube.xml")
+    beside = {"a": at(0, 0, 0), "b": at(30.2, 0, 0)}
+    assert clashes({"a": cube, "b": cube}, beside, clearance_mm=0.25) == []
+    (sentence,) = clashes({"a": cube, "b": cube}, beside | {"b": at(26, 3, 2)}, clearance_mm=0.25)
+    assert sentence.startswith("'a' and 'b' are 4 mm inside each other, and parts are rigid here")

@@ -27,6 +27,15 @@ def with_gripper(folder: Path, arm: str) -> Path:
     return path
 
 
+def test_a_file_of_another_language_is_named_by_its_outermost_element(tmp_path: Path) -> None:
+    (tmp_path / "arm.xml").write_text('<robot name="a"><link name="b"/></robot>')
+    with pytest.raises(InputError, match="the outermost element is <robot>; an MJCF file begins with <mujoco>"):
+        load_model(tmp_path / "arm.xml", "arm")
+    (tmp_path / "arm.xml").write_text("<worldbody/>")
+    with pytest.raises(InputError, match="the outermost element is <worldbody>"):
+        load_model(tmp_path / "arm.xml", "arm")
+
+
 def test_a_model_that_is_a_link_to_itself_is_refused(tmp_path: Path) -> None:
     path = with_gripper(tmp_path, "")
     (tmp_path / "arm.xml").unlink()
