@@ -33,8 +33,9 @@ class Judgement:
     overlap: float | None
     penetration_mm: float | None
     pushed_mm: float | None
-    """How far a part that was in place was moved in the room at most, whether or not this rule minds; the finished
-    assembly is judged by how parts slid on what they touch."""
+    """How far a part that was in place was moved in the room at most, whether or not this rule minds. The finished
+    assembly is judged by other lengths: how far movable parts slid on each other, and this one of parts in a mate of a
+    fixed part."""
 
     @property
     def holds(self) -> bool:

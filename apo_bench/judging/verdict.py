@@ -51,8 +51,8 @@ def judge(assembly: Assembly, reached: Reached, reference: Array, criteria: Crit
     Args:
         reached: Snapshots after each operation and at the end. One that is missing, or whose poses are not finite,
             fails the assembly.
-        reference: (n, 4, 4), the true goals, world frame, [m]; they say how large an overlap should be, and which of
-            a part's symmetries is meant.
+        reference: (n, 4, 4), the true goals, world frame, [m]; they say how large an overlap should be, how far
+            apart faces may be, and which of a part's symmetries is meant.
     """
     sound = Reached(after=tuple(map(_sound, reached.after)), final=_sound(reached.final))
     return Verdict(

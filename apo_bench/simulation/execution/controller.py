@@ -28,8 +28,9 @@ _AT_FIRST_S = 0.05
 """Before the first operation the arm stands so long."""
 LOOK_S = 0.04
 PATIENCE_S = 1.5
-"""Between two operations the arm waits until parts rest: it looks so often, and goes on after so long at most. What it
-waits for is the speed of the parts, which only the simulation knows; it decides when, never where."""
+"""After each step of the schedule and at the end the arm waits until parts rest: it looks so often, and goes on after
+so long at most. What it waits for is the speed of the parts, which only the simulation knows; it decides when the arm
+goes on, never where to."""
 _SHORTEST_STEP_S = 1.0
 """Every step of a schedule takes longer: four seconds in the fastest replay of the benchmark."""
 _STEPS = ((1.14, 3), (0.86, 2), (0.58, 8), (0.3, 4), (0.0, 1))

@@ -1,13 +1,10 @@
 """The arm in motion: lines followed with feed-forward, guards, and watching for trouble.
 
-Every physics step of a replay is taken in `_tick`, or in `servo`, where each depends on the force that was felt in the
-one before it. Motions of the arm come there by `_run` (`follow`, `go`) or `wait` (`fingers`, `stand`).
-
-The robot knows what it commanded, its own joint and finger positions and the force on the part in its hand: no command
-depends on where a part is. What reads poses of parts serves the simulation alone: `_look` puts what is carried freely
-back in the hand between ticks (`in_hand.steadied`), `in_hand` records how far it moved there, and at fidelity `contact`
-`_spans` leaves out where nothing is near. It is one class, longer than most: to follow, to feel and to look share
-every step.
+Every physics step of a replay is taken in `_tick`, where motions come by `_run` (`follow`) or `wait` (`fingers`), or in
+`servo`, where each depends on the force that was felt in the one before it. The robot knows what it commanded, its own
+joint and finger positions and the force on the part in its hand: no command depends on where a part is. What reads or
+sets poses of parts is the simulation's own: `_look` and `slip` shift the part in the hand, `in_hand` records it, and at
+fidelity `contact` `follow` and `fingers` leave out steps while nothing is near. One class: all of this shares steps.
 """
 
 import math
