@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -94,3 +95,9 @@ def test_the_help_of_the_command_line_is_light() -> None:
         f"print(code, 'sweep' in said.getvalue(), [name for name in {heavy!r} if name in sys.modules])"
     )
     assert (done.returncode, done.stdout, done.stderr) == (0, "0 True []\n", "")
+
+
+def test_dm_control_need_not_be_there() -> None:
+    """It has no wheels for Python 3.13: neither its modules nor its version are asked for."""
+    asked = [path for path in PACKAGE.rglob("*.py") if re.search('dm_control|"dm-control"', path.read_text("utf-8"))]
+    assert asked == []

@@ -32,7 +32,7 @@ from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstratio
 SCHEMA = "apo-bench/kept-demonstration/1"
 _KIND = "kept demonstration"
 _LARGEST_BYTES = 1_000_000
-_PACKAGES = ("dm-control", "mujoco", "numpy", "scipy", "shapely")
+_PACKAGES = ("mujoco", "numpy", "scipy", "shapely")
 """The packages that a demonstration is made with."""
 _NOT_SHOWN = (
     *("correction/", "depth_camera/", "files/", "observation/", "prediction/", "recognition/", "sweeps/"),

@@ -271,13 +271,11 @@ def test_the_simulator_reads_the_same_boxes(name: str):
 
 def test_several_copies_fit_into_one_scene():
     import mujoco
-    from dm_control import mjcf
 
-    root = mjcf.RootElement(model="room")
+    room = mujoco.MjSpec()
     for name in ("castle1", "castle2", "stick", "table_pockets"):
-        part = mjcf.from_path(str(part_path(name.rstrip("12"))))
-        part.model = name
-        root.attach(part)
-    model = mujoco.MjModel.from_xml_string(root.to_xml_string())
+        part = mujoco.MjSpec.from_file(str(part_path(name.rstrip("12"))))
+        room.attach(part, frame=room.worldbody.add_frame(), prefix=f"{name}/")
+    model = room.compile()
     masses = [model.body(f"{name}/{name.rstrip('12')}").mass[0] for name in ("castle1", "castle2", "stick")]
     assert masses == pytest.approx([0.0792, 0.0792, 0.0528])

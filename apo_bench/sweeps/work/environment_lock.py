@@ -19,7 +19,7 @@ from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.trial.fingerprint import content_hash, noise_content, own_content
 
 _PACKAGES = (
-    *("apo_bench", "mujoco", "dm-control", "mink", "daqp", "gymnasium"),
+    *("apo_bench", "mujoco", "mink", "daqp", "gymnasium"),
     *("numpy", "scipy", "trimesh", "manifold3d", "shapely"),
 )
 """The packages whose version may show in a row."""
