@@ -148,15 +148,20 @@ def tested(place: Path, room: str, longest_s: float) -> Ran:
     return Ran(not ended.returncode, by[1] if by else ended.stdout.splitlines()[-1], seconds)
 
 
+def provenance(root: Path) -> dict[str, str]:
+    """The command that runs, and the commit of the checkout that it tries."""
+    head = subprocess.run(["git", "rev-parse", "HEAD"], cwd=root, capture_output=True, text=True, check=False)
+    return {
+        "command": "python -m benchmarks." + " ".join([Path(sys.argv[0]).stem, *sys.argv[1:]]),
+        "commit": head.stdout.strip(),
+    }
+
+
 def summary(
     sound: Mapping[str, Ran], found: Sequence[tuple[tuple[int, Fault], Ran]], kept: Mapping[str, Any]
 ) -> dict[str, Any]:
     """What is written: errors and rooms that were run now, and of those that were not what was kept."""
-    head = subprocess.run(["git", "rev-parse", "HEAD"], cwd=ROOT, capture_output=True, text=True, check=False)
-    made = {
-        "command": "python -m benchmarks." + " ".join([Path(sys.argv[0]).stem, *sys.argv[1:]]),
-        "commit": head.stdout.strip(),
-    }
+    made = provenance(ROOT)
     errors = {error["number"]: error for error in kept.get("faults", ())} | {
         number: {"number": number, **fault._asdict(), "noticed": not one.passed, "by": one.by, "seconds": one.seconds}
         | made

@@ -11,8 +11,6 @@ no test notices is printed with its line: some of it changes nothing that can be
 import argparse
 import ast
 import json
-import subprocess
-import sys
 import tempfile
 import threading
 from collections import Counter
@@ -23,9 +21,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from benchmarks.faults import ROOT, Ran, copy, tested
+from benchmarks.faults import ROOT, Ran, copy, provenance, tested
 
-SWAPPED: dict[type[ast.AST], type[ast.AST]] = {
+COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
     ast.Lt: ast.LtE,
     ast.LtE: ast.Lt,
     ast.Gt: ast.GtE,
@@ -36,13 +34,14 @@ SWAPPED: dict[type[ast.AST], type[ast.AST]] = {
     ast.IsNot: ast.Is,
     ast.In: ast.NotIn,
     ast.NotIn: ast.In,
+}
+OPERATORS: dict[type[ast.operator], type[ast.operator]] = {
     ast.Add: ast.Sub,
     ast.Sub: ast.Add,
     ast.Mult: ast.Div,
     ast.Div: ast.Mult,
-    ast.And: ast.Or,
-    ast.Or: ast.And,
 }
+CONJUNCTIONS: dict[type[ast.boolop], type[ast.boolop]] = {ast.And: ast.Or, ast.Or: ast.And}
 LONGEST_S = 300
 """Tests that have not ended by then have noticed: most such mutants never end."""
 
@@ -86,11 +85,9 @@ def main() -> None:
 
 
 def summary(root: Path, kept: Sequence[dict[str, object]]) -> dict[str, object]:
-    head = subprocess.run(["git", "rev-parse", "HEAD"], cwd=root, capture_output=True, text=True, check=False)
     survivors = [mutant for mutant in kept if mutant["passed"]]
     return {
-        "command": "python -m benchmarks." + " ".join([Path(sys.argv[0]).stem, *sys.argv[1:]]),
-        "commit": head.stdout.strip(),
+        **provenance(root),
         "mutants": len(kept),
         "noticed": len(kept) - len(survivors),
         "not_noticed": survivors,
@@ -137,13 +134,13 @@ def not_code(node: ast.AST) -> Iterator[ast.AST]:
 
 def changed(node: ast.AST) -> str | None:
     """The source of a node after a change; None where nothing of it is changed."""
-    if isinstance(node, ast.Compare) and type(node.ops[0]) in SWAPPED:
-        operators = [SWAPPED[type(node.ops[0])](), *node.ops[1:]]
-        return f"({ast.unparse(ast.Compare(node.left, operators, node.comparators))})"  # type: ignore[arg-type]
-    if isinstance(node, ast.BinOp) and type(node.op) in SWAPPED:
-        return f"({ast.unparse(ast.BinOp(node.left, SWAPPED[type(node.op)](), node.right))})"  # type: ignore[arg-type]
+    if isinstance(node, ast.Compare) and type(node.ops[0]) in COMPARISONS:
+        operators = [COMPARISONS[type(node.ops[0])](), *node.ops[1:]]
+        return f"({ast.unparse(ast.Compare(node.left, operators, node.comparators))})"
+    if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
+        return f"({ast.unparse(ast.BinOp(node.left, OPERATORS[type(node.op)](), node.right))})"
     if isinstance(node, ast.BoolOp):
-        return f"({ast.unparse(ast.BoolOp(SWAPPED[type(node.op)](), node.values))})"  # type: ignore[arg-type]
+        return f"({ast.unparse(ast.BoolOp(CONJUNCTIONS[type(node.op)](), node.values))})"
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.Not):
         return f"({ast.unparse(node.operand)})"
     if isinstance(node, ast.Constant) and isinstance(node.value, bool):
