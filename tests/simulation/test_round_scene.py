@@ -13,7 +13,7 @@ from apo_bench.geometry import SAGITTA_M, Hull, Piece, physical_pieces, pose
 from apo_bench.parts.making import shaft, solid_of
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.scene.composing import parts_and_hands
+from apo_bench.simulation.scene.composing import room_with_parts
 from apo_bench.simulation.scene.walls import simulated_pieces
 from apo_bench.simulation.scene.world import World, initial_state, part_pose, place
 from tests.round_scenes import PLATE, contacts, peg_in_hole, scenario
@@ -84,7 +84,7 @@ def test_parts_of_boxes_are_simulated_as_their_file_says_them():
             assert int(geom.type[0]) == int(mujoco.mjtGeom.mjGEOM_BOX)
             assert (geom.size == piece.half).all()
             assert int(geom.condim[0]) == 3
-    spec = parts_and_hands(scenario, scene.clearance_mm, scene.physics)
+    spec = room_with_parts(scenario, scene.clearance_mm, scene.physics)
     assert not any(body.explicitinertial for body in spec.bodies)
 
 

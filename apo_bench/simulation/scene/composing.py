@@ -37,13 +37,9 @@ _NET_FORCE = (1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 3, 1)
 """Of a contact sensor: its data field, how contacts are put together (3: one net force), how many it gives."""
 
 
-def parts_and_hands(scenario: Scenario, clearance_mm: float, settings: Physics) -> Any:
-    """Where the human demonstrates: parts, and two hands that each may hold any movable one.
-
-    Raises:
-        InputError: The file of a part has changed since the scenario was loaded.
-    """
-    spec = _parts(scenario, clearance_mm, settings)
+def with_hands(room: Any, scenario: Scenario) -> Any:
+    """Where the human demonstrates: a room with parts, and two hands that each may hold any movable one."""
+    spec = room.copy()
     for i, hand in enumerate(HANDS):
         mocap = spec.worldbody.add_body(name=hand, mocap=True, pos=(0.0, 0.5 + 0.1 * i, 0.3))
         mocap.add_geom(
@@ -58,18 +54,13 @@ def parts_and_hands(scenario: Scenario, clearance_mm: float, settings: Physics) 
     return spec
 
 
-def parts_and_arm(
-    scenario: Scenario, clearance_mm: float, settings: Physics, arm: Arm, grasp: str, first_link: str
-) -> Any:
-    """Where the robot replays: parts and arm, with sensors of force, and with welds where it grasps by them.
+def with_arm(room: Any, scenario: Scenario, settings: Physics, arm: Arm, grasp: str, first_link: str) -> Any:
+    """Where the robot replays: a room with parts, the arm, sensors of force, and welds where it grasps by them.
 
     Args:
         first_link: The first body of the arm that moves.
-
-    Raises:
-        InputError: The file of a part has changed since the scenario was loaded.
     """
-    spec = _parts(scenario, clearance_mm, settings)
+    spec = room.copy()
     if grasp == "weld":
         for part, body in _movable_bodies(scenario, spec).items():
             _add_weld(spec, f"grasp_{part}", f"arm/{arm.mount}", body, _ARM_SOLREF, _ARM_SOLIMP)
@@ -78,8 +69,12 @@ def parts_and_arm(
     return spec
 
 
-def _parts(scenario: Scenario, clearance_mm: float, settings: Physics) -> Any:
-    """The room and every part at its start."""
+def room_with_parts(scenario: Scenario, clearance_mm: float, settings: Physics) -> Any:
+    """The room and every part at its start.
+
+    Raises:
+        InputError: The file of a part has changed since the scenario was loaded.
+    """
     spec = mujoco.MjSpec.from_file(str(folder("assets") / "room.xml"))
     spec.modelname = scenario.name
     if not all(all_boxes(solid.pieces) for solid in scenario.assembly.solids.values()):
@@ -120,10 +115,19 @@ def _add_part(
     spec.attach(own, frame=body.add_frame(), prefix=f"{part}/")
 
 
+def movable_parts(scenario: Scenario) -> tuple[str, ...]:
+    """In the order of the scenario."""
+    return tuple(part for part in scenario.assembly.solids if part not in scenario.assembly.fixed)
+
+
+def fixed_parts(scenario: Scenario) -> tuple[str, ...]:
+    """In the order of the scenario."""
+    return tuple(part for part in scenario.assembly.solids if part in scenario.assembly.fixed)
+
+
 def _movable_bodies(scenario: Scenario, spec: Any) -> Mapping[str, str]:
     """Movable part -> the body that has its mass; the one around it has none."""
-    movable = [part for part in scenario.assembly.solids if part not in scenario.assembly.fixed]
-    return {part: spec.body(f"{part}/").bodies[0].name for part in movable}
+    return {part: spec.body(f"{part}/").bodies[0].name for part in movable_parts(scenario)}
 
 
 def _add_weld(spec: Any, name: str, first: str, second: str, solref: Iterable[float], solimp: Iterable[float]) -> None:
@@ -160,11 +164,9 @@ def _add_force_sensors(spec: Any, scenario: Scenario, arm: str) -> None:
     So the arm is named by its first link that moves: by its base, a fixed part and the arm would feel nothing of each
     other while sleep is on.
     """
-    fixed = [part for part in scenario.assembly.solids if part in scenario.assembly.fixed]
-    movable = [part for part in scenario.assembly.solids if part not in scenario.assembly.fixed]
-    for part in movable:
+    for part in movable_parts(scenario):
         _add_force_sensor(spec, f"all_{part}", f"{part}/", None)
-    for part in (*movable, *fixed):
+    for part in (*movable_parts(scenario), *fixed_parts(scenario)):
         _add_force_sensor(spec, f"arm_{part}", f"{part}/", arm)
 
 

@@ -14,7 +14,7 @@ from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.physics import Physics, physics
-from apo_bench.simulation.scene.composing import parts_and_arm, parts_and_hands
+from apo_bench.simulation.scene.composing import fixed_parts, movable_parts, room_with_parts, with_arm, with_hands
 from apo_bench.simulation.scene.holdable import check_holdable
 from apo_bench.simulation.scene.world import World, world
 
@@ -68,9 +68,10 @@ def build_scene(
     robot = find_arm(arm)
     settings = physics(timestep_s)
     kinematics = Kinematics(robot)
-    shown = _compiled(scenario, parts_and_hands(scenario, clearance, settings))
+    room = room_with_parts(scenario, clearance, settings)
+    shown = _compiled(scenario, with_hands(room, scenario))
     shown.model.opt.sleep_tolerance = _DROWSY_M_S
-    work = _compiled(scenario, parts_and_arm(scenario, clearance, settings, robot, grasp, kinematics.first_link))
+    work = _compiled(scenario, with_arm(room, scenario, settings, robot, grasp, kinematics.first_link))
     if grasp == "friction":
         check_holdable(scenario, work, robot)
     return Scene(
@@ -98,12 +99,9 @@ def scene_xml(
 
     MuJoCo writes six digits; no model of the benchmark is made from such a text.
     """
-    check("grasp", grasp)
-    clearance = scenario.clearance_mm if clearance_mm is None else clearance_mm
-    check_clearance(scenario, clearance)
-    built = find_arm(arm)
-    first_link = Kinematics(built).first_link
-    spec = parts_and_arm(scenario, clearance, physics(timestep_s), built, grasp, first_link)
+    scene = build_scene(scenario, clearance_mm=clearance_mm, grasp=grasp, arm=arm, timestep_s=timestep_s)
+    room = room_with_parts(scenario, scene.clearance_mm, scene.physics)
+    spec = with_arm(room, scenario, scene.physics, scene.arm, scene.grasp, scene.kinematics.first_link)
     spec.compile()
     return str(spec.to_xml())
 
@@ -111,12 +109,4 @@ def scene_xml(
 def _compiled(scenario: Scenario, spec: Any) -> World:
     model = spec.compile()
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    return world(model, _movable(scenario), _fixed(scenario))
-
-
-def _movable(scenario: Scenario) -> tuple[str, ...]:
-    return tuple(part for part in scenario.assembly.solids if part not in scenario.assembly.fixed)
-
-
-def _fixed(scenario: Scenario) -> tuple[str, ...]:
-    return tuple(part for part in scenario.assembly.solids if part in scenario.assembly.fixed)
+    return world(model, movable_parts(scenario), fixed_parts(scenario))
