@@ -1,6 +1,15 @@
 """The topology of an assembly, and the goals that flow over it, in the words of the paper. No solver, no simulator."""
 
-from apo_bench.assembly.correction_record import Consistency, Correction, Iterate, Look, LookingCorrector, Suspect, Try
+from apo_bench.assembly.correction_record import (
+    Consistency,
+    Correction,
+    Hypothesis,
+    Iterate,
+    Look,
+    LookingCorrector,
+    Suspect,
+    Try,
+)
 from apo_bench.assembly.equations import Equations, largest, largest_gap
 from apo_bench.assembly.facing import face_gap, height, opposed
 from apo_bench.assembly.facing_round import Facing, measure_round, round_pairs
@@ -59,6 +68,7 @@ __all__ = (
     "GapKind",
     "Graph",
     "InHand",
+    "Hypothesis",
     "Iterate",
     "Layout",
     "Look",

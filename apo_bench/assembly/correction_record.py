@@ -81,6 +81,32 @@ class Consistency:
 @final
 @copyable
 @dataclass(frozen=True, eq=False)
+class Hypothesis:
+    """One explanation of what was seen: what of it is believed, how likely that is, and the goals that follow."""
+
+    weight: float
+    """Probability beside the other hypotheses of the same correction; all of them add up to 1."""
+    goals: Array
+    """(n, 4, 4), world frame, [m]."""
+    covariance: Array | None
+    """(n, 6, 6), posterior, of the body twist by which each goal may still be wrong, [m, rad]; None if unknown."""
+    believed: Observation
+    """What the goals are the correction of."""
+    left_out: tuple[int, ...] = ()
+    """Operations of which nothing that was seen is believed, counted from 0."""
+    dropped: tuple[str, ...] = ()
+    """Relations that are not believed."""
+    sentence: str = ""
+    """What is believed in place of what was stated, in words; empty if all is believed as stated."""
+
+    def __post_init__(self) -> None:
+        n = len(self.goals)
+        freeze(self, goals=(None, 4, 4), covariance=(n, 6, 6))
+
+
+@final
+@copyable
+@dataclass(frozen=True, eq=False)
 class Correction:
     """What a corrector returns: the goals, and what happened."""
 
@@ -117,6 +143,8 @@ class Correction:
     believed: Observation | None = None
     """What was corrected in place of the observation, which the posterior is of: without outliers, with further looks;
     None if it was the observation."""
+    hypotheses: tuple[Hypothesis, ...] = ()
+    """All that were kept, the likeliest first; empty of correctors that believe one explanation only."""
 
     def __post_init__(self) -> None:
         n = len(self.goals)
