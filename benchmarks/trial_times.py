@@ -4,6 +4,7 @@ The four examples of the paper, methods `none`, `paper` and `contact` at level 1
 its demonstration, from settings to row, as `run_trial` makes it from a scene that is compiled. Each of the two packages
 runs in a process of its own, and the same trial is run by one and then by the other, so that a machine whose speed
 drifts treats both alike. Writes results/trial_times.json, which `python benchmarks/profiling.py` puts on its page.
+With `--scenarios` others are timed and only printed, each by itself, with the time that its scene takes to be built.
 """
 
 from __future__ import annotations
@@ -16,7 +17,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from itertools import product
 from pathlib import Path
@@ -35,27 +36,33 @@ def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("commit", nargs="?", help="the commit to compare with, such as 7a4d1df")
     asked.add_argument("--seeds", type=int, default=5, help="seeds of each kind of trial")
+    asked.add_argument("--scenarios", nargs="+", help="time these, at fidelity contact, and print it")
     asked.add_argument("--serve", action="store_true", help="run the trials that standard input asks for")
     given = asked.parse_args()
     if given.serve:
         return serve(sys.stdin, sys.stdout)
     if given.commit is None:
         asked.error("name a commit to compare with, such as 7a4d1df.")
-    trials = [told for seed in range(given.seeds) for told in cases(seed)]
+    scenarios = given.scenarios or SCENARIOS
+    fidelities = ("contact",) if given.scenarios else FIDELITIES
+    trials = [told for seed in range(given.seeds) for told in cases(seed, scenarios, fidelities)]
     with tree_of(given.commit) as before, server(before) as old, server(ROOT) as new:
         pairs = [both(old, new, told, i % 2 == 1) for i, told in enumerate(trials)]
+    if given.scenarios:
+        print(json.dumps({name: summary(trials, pairs, "scenario", name) for name in scenarios}, indent=2))
+        return
     kept = {
         "command": f"python benchmarks/trial_times.py {given.commit} --seeds {given.seeds}",
         "before": commit(given.commit),
         "after": commit("HEAD"),
-        "fidelities": {fidelity: summary(trials, pairs, fidelity) for fidelity in FIDELITIES},
+        "fidelities": {fidelity: summary(trials, pairs, "fidelity", fidelity) for fidelity in FIDELITIES},
     }
     KEPT.write_text(json.dumps(kept, indent=2) + "\n", encoding="utf-8")
     print(json.dumps(kept["fidelities"], indent=2))
 
 
-def cases(seed: int) -> Iterator[Told]:
-    for scenario, method, fidelity in product(SCENARIOS, METHODS, FIDELITIES):
+def cases(seed: int, scenarios: Sequence[str], fidelities: Sequence[str]) -> Iterator[Told]:
+    for scenario, method, fidelity in product(scenarios, METHODS, fidelities):
         yield {
             "scenario": scenario,
             "level_mm": 1.0,
@@ -91,11 +98,15 @@ def serve(asked: IO[str], answers: IO[str]) -> None:
     from apo_bench.trial.trial import run_trial
 
     scenes: dict[str, Any] = {}
+    building: dict[str, float] = {}
     for line in asked:
         settings = TrialSettings(**json.loads(line))
         name = str(settings.scenario)
         if name not in scenes:
-            scenes[name] = build_scene(load_scenario(name))
+            scenario = load_scenario(name)
+            began = time.perf_counter()
+            scenes[name] = build_scene(scenario)
+            building[name] = time.perf_counter() - began
             run_trial(settings, scenes[name])
         began = time.perf_counter()
         worked = time.process_time()
@@ -104,17 +115,20 @@ def serve(asked: IO[str], answers: IO[str]) -> None:
             "wall_s": time.perf_counter() - began,
             "cpu_s": time.process_time() - worked,
             "sim_s": row["sim_seconds"],
+            "scene_s": building[name],
             "verdict": [row["success"], row["as_demonstrated"]],
         }
         answers.write(json.dumps(said) + "\n")
         answers.flush()
 
 
-def summary(trials: list[Told], pairs: list[tuple[Told, Told]], fidelity: str) -> dict[str, Any]:
-    mine = [pair for told, pair in zip(trials, pairs, strict=True) if told["fidelity"] == fidelity]
+def summary(trials: list[Told], pairs: list[tuple[Told, Told]], by: str, which: str) -> dict[str, Any]:
+    """Of the trials of one fidelity, or of one scenario."""
+    mine = [pair for told, pair in zip(trials, pairs, strict=True) if told[by] == which]
     return {
         "trials": len(mine),
         "wall_s": [round(statistics.median(pair[i]["wall_s"] for pair in mine), 3) for i in (0, 1)],
+        "scene_s": [round(statistics.median(pair[i]["scene_s"] for pair in mine), 3) for i in (0, 1)],
         "wall_ratio": round(statistics.median(new["wall_s"] / old["wall_s"] for old, new in mine), 3),
         "cpu_ratio": round(statistics.median(new["cpu_s"] / old["cpu_s"] for old, new in mine), 3),
         "real_time_factor": [

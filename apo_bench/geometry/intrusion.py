@@ -140,11 +140,23 @@ def _rooms(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_
     balls_b, radii_b = _balls(b)
     boxes_a, halves_a = _upright(a, R_a)
     boxes_b, halves_b = _upright(b, T_b[:3, :3])
-    shift = (at - T_b[:3, 3])[:, None, None]
-    between = shift + (balls_a @ R_a.T)[:, None] - (balls_b @ T_b[:3, :3].T)[None]
-    rooms = np.sqrt((between * between).sum(axis=-1)) - (radii_a[:, None] + radii_b[None])
-    apart = np.abs(shift + boxes_a[:, None] - boxes_b[None]) - (halves_a[:, None] + halves_b[None])
-    return np.asarray(np.maximum(rooms, apart.max(axis=-1)))
+    shift = at - T_b[:3, 3]
+    middles_a = balls_a @ R_a.T
+    middles_b = balls_b @ T_b[:3, :3].T
+    # One axis after the other: reducing arrays of (k, a, b, 3) along their last axis takes three times as long.
+    squared = np.zeros((len(at), len(a), len(b)))
+    apart = np.full(squared.shape, -np.inf)
+    for i in range(3):
+        along = shift[:, i, None, None]
+        between = along + middles_a[:, i, None] - middles_b[:, i]
+        squared += between * between
+        gap = along + boxes_a[:, i, None] - boxes_b[:, i]
+        np.abs(gap, out=gap)
+        gap -= halves_a[:, i, None] + halves_b[:, i]
+        np.maximum(apart, gap, out=apart)
+    np.sqrt(squared, out=squared)
+    squared -= radii_a[:, None] + radii_b
+    return np.maximum(squared, apart, out=apart)
 
 
 def _upright(pieces: tuple[Piece, ...], R: Array) -> tuple[Array, Array]:
