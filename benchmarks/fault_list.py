@@ -1,4 +1,4 @@
-"""Thirty small errors that the tests must notice, each of a kind that people make when they change this code.
+"""Fifty small errors that the tests must notice, each of a kind that people make when they change this code.
 
 They were chosen by reading the code, not the tests: a flipped sign, a wrong index, a dropped term, swapped operands, an
 end of a range that is off by one, a missing check. None stops a module from being imported.
@@ -108,5 +108,69 @@ FAULTS = (
         "or side > push + self.guard.newton:",
         "or side < 0.0:",
         "a spiral goes on although walls hold the part",
+    ),
+    Fault("parts/faces.py", "float(grid[axis][k + forward])", "float(grid[axis][k])", "a face one layer too deep"),
+    Fault("parts/faces.py", "return 1 - 2 * (self.side % 2)", "return 2 * (self.side % 2) - 1", "normals look inwards"),
+    Fault("parts/stated.py", "inertia=1e-15 *", "inertia=1e-12 *", "inertia a thousand times too large"),
+    Fault(
+        "parts/stated.py", "v = v - (v @ axis) * axis", "v = v + (v @ axis) * axis", "a part along the axis is doubled"
+    ),
+    Fault("parts/check.py", "* float(face.normal @ face.outline[0])", "", "the divergence theorem without positions"),
+    Fault(
+        "parts/load.py",
+        "abs(mark.point[surface.axis] - surface.height)",
+        "(mark.point[surface.axis] - surface.height)",
+        "a mark lies on every face above it",
+    ),
+    Fault("parts/load.py", "<= mass <= HEAVIEST_KG", "<= mass", "the heaviest part is not looked for"),
+    Fault(
+        "parts/making/moments.py",
+        "z1 = (high**2 - low**2) / 2.0",
+        "z1 = (high - low) ** 2 / 2.0",
+        "the moment of a prism as if it stood at zero",
+    ),
+    Fault(
+        "parts/making/moments.py",
+        "np.pi * r**4 / 4.0",
+        "np.pi * r**4 / 2.0",
+        "the moment about the axis for one across it",
+    ),
+    Fault(
+        "scenario/layout.py",
+        "goals[shift.operation] @ pose.at(length * shift.axis)",
+        "pose.at(length * shift.axis) @ goals[shift.operation]",
+        "a shift in the frame of the world",
+    ),
+    Fault("scenario/layout.py", "lowered[2, 3] -= extent(", "lowered[2, 3] += extent(", "a smaller part hangs higher"),
+    Fault("scenario/layout.py", "np.degrees(yaw_rad)", "yaw_rad", "radians taken for degrees"),
+    Fault(
+        "scenario/contacts.py",
+        "return Gap(kind, 1e-3 * low, 1e-3 * high)",
+        "return Gap(kind, low, high)",
+        "mm taken for m",
+    ),
+    Fault("scenario/contacts.py", "    if b not in there:", "    if False:", "a contact with what is not there yet"),
+    Fault(
+        "scenario/nominal.py", "(low + high) / 2]", "(high - low) / 2]", "half the width of an interval for its middle"
+    ),
+    Fault(
+        "scenario/nominal.py",
+        "return {part: T if part in",
+        "return {part: T if part not in",
+        "the wrong parts follow the site",
+    ),
+    Fault("scenario/human_error.py", "R.T @ _guided(", "R @ _guided(", "an error in the wrong frame"),
+    Fault("scenario/human_error.py", "turn @ (before.get(", "(before.get(", "what is carried is not turned"),
+    Fault(
+        "scenario/order.py",
+        "for k, operation in enumerate(assembly.operations):",
+        "for k, operation in enumerate(assembly.operations[1:]):",
+        "operations counted one off",
+    ),
+    Fault(
+        "scenario/starts.py",
+        "return any(\n        drop_depths",
+        "return all(\n        drop_depths",
+        "a part must stand on all others",
     ),
 )

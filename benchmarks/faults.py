@@ -1,4 +1,4 @@
-"""Whether the tests notice small errors in the code: thirty of them, one at a time, each in a copy of its own.
+"""Whether the tests notice small errors in the code: fifty of them, one at a time, each in a copy of its own.
 
     python -m benchmarks.faults [--only ROOM ...] [--fault N ...] [--workers 1] [--write [FILE]]
 

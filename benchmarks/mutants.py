@@ -1,65 +1,40 @@
-"""How many random changes of the code the tests notice: each in a copy of its own, drawn with a seed over all rooms.
+"""How many random changes of the code the tests notice, drawn with a seed over all rooms by `mutant_draw.py`.
 
-    python -m benchmarks.mutants [--mutants 300] [--seed 0] [--root FOLDER] [--workers 2] [--only ROOM ...] [--write X]
+    python -m benchmarks.mutants [--mutants 300] [--seed 0] [--root FOLDER] [--only ROOM ...] [--write X]
 
-A mutant is one operator, number, condition or statement of a function or a constant that is another one. The tests of
-its room, those of `tests/ROOM` that `make test` runs, are run in a copy that has it, up to the first that fails. What
-no test notices is printed with its line: some of it changes nothing that can be seen, the rest lacks a test. With
-`--root` another checkout is tried, such as one before tests were taken out. The checkout itself is never changed.
+All mutants stand in one copy of the checkout, each behind a switch (`mutant_switch.py`). The tests of all rooms, those
+of `tests/ROOM` but `extras`, are run once without any, which says what each reaches and how long it takes. With a
+mutant on, only the tests that reach it are run, quickest first up to 30 s, those of its room before all others, up to
+the first that fails. What no test reaches is not noticed. A mutant that runs while tests are imported gets a process of
+its own, and the tests of its room besides; so does compiled code, as text. With `--only`, mutants and tests are those
+of these rooms. What no test notices is printed with its line: some of it changes nothing that can be seen, the rest
+lacks a test. With `--root` another checkout is tried, such as one before tests were taken out. No checkout is changed.
 """
 
 import argparse
 import ast
 import json
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
 import tempfile
-import threading
+import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any
 
 import numpy as np
 
-from benchmarks.faults import ROOT, Ran, copy, provenance, tested
+from benchmarks.faults import ROOT, Ran, copy, provenance
+from benchmarks.mutant_draw import Mutant, changed, drawn, placed, rooms_of, starts_of
+from benchmarks.mutant_switch import LONGEST_S
 
-COMPARISONS: dict[type[ast.cmpop], type[ast.cmpop]] = {
-    ast.Lt: ast.LtE,
-    ast.LtE: ast.Lt,
-    ast.Gt: ast.GtE,
-    ast.GtE: ast.Gt,
-    ast.Eq: ast.NotEq,
-    ast.NotEq: ast.Eq,
-    ast.Is: ast.IsNot,
-    ast.IsNot: ast.Is,
-    ast.In: ast.NotIn,
-    ast.NotIn: ast.In,
-}
-OPERATORS: dict[type[ast.operator], type[ast.operator]] = {
-    ast.Add: ast.Sub,
-    ast.Sub: ast.Add,
-    ast.Mult: ast.Div,
-    ast.Div: ast.Mult,
-}
-CONJUNCTIONS: dict[type[ast.boolop], type[ast.boolop]] = {ast.And: ast.Or, ast.Or: ast.And}
-LONGEST_S = 300
-"""Tests that have not ended by then have noticed: most such mutants never end."""
-
-
-class Mutant(NamedTuple):
-    """One change of one file."""
-
-    file: str
-    """Under `apo_bench`; its first folder is the room whose tests are run."""
-    line: int
-    before: str
-    after: str
-    begin: int
-    """Offset of `before` in the file, in bytes."""
-
-    @property
-    def room(self) -> str:
-        return self.file.split("/")[0]
+CACHE = re.compile(r"^(functools\.)?(cache|lru_cache|cached_property)\b")
+"""Decorators that keep what was computed."""
 
 
 def main() -> None:
@@ -67,14 +42,12 @@ def main() -> None:
     parser.add_argument("--mutants", type=int, default=300)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--root", type=Path, default=ROOT)
-    parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--only", nargs="+", metavar="ROOM", default=())
     parser.add_argument("--write", type=Path)
     arguments = parser.parse_args()
     chosen = drawn(arguments.root, arguments.mutants, np.random.default_rng(arguments.seed), arguments.only)
-    with tempfile.TemporaryDirectory() as work, ThreadPoolExecutor(arguments.workers) as pool:
-        jobs = [pool.submit(run, arguments.root, mutant, Path(work)) for mutant in chosen]
-        ran = [job.result() for job in jobs]
+    with tempfile.TemporaryDirectory() as work:
+        ran = outcomes(arguments.root, chosen, arguments.only or rooms_of(arguments.root), Path(work))
     noticed = Counter(mutant.room for mutant, how in zip(chosen, ran, strict=True) if not how.passed)
     for room, count in sorted(Counter(mutant.room for mutant in chosen).items()):
         print(f"{room:14} {noticed[room]} of {count} noticed")
@@ -94,87 +67,136 @@ def summary(root: Path, kept: Sequence[dict[str, object]]) -> dict[str, object]:
     }
 
 
-def drawn(root: Path, count: int, rng: np.random.Generator, only: Sequence[str] = ()) -> list[Mutant]:
-    """Different mutants, each as likely as any other."""
-    package = root / "apo_bench"
-    rooms = {folder.name for folder in (root / "tests").iterdir() if folder.is_dir()}
-    files = [path for path in sorted(package.rglob("*.py")) if path.relative_to(package).parts[0] in rooms]
-    every = [mutant for path in files for mutant in mutants_of(path.read_bytes(), path.relative_to(package).as_posix())]
-    every = [mutant for mutant in every if not only or mutant.room in only]
-    numbers = rng.choice(len(every), min(count, len(every)), replace=False)
-    return [every[int(number)] for number in numbers]
-
-
-def mutants_of(source: bytes, file: str) -> Iterator[Mutant]:
-    """All mutants of a file that differ from it."""
-    starts = [0]
-    for text in source.splitlines(keepends=True):
-        starts.append(starts[-1] + len(text))
-    tree = ast.parse(source)
-    left_out = {id(inner) for node in ast.walk(tree) for part in not_code(node) for inner in ast.walk(part)}
-    for node in ast.walk(tree):
-        if id(node) in left_out or (after := changed(node)) is None:
-            continue
-        assert isinstance(node, ast.expr | ast.stmt)
-        begin = starts[node.lineno - 1] + node.col_offset
-        end = starts[(node.end_lineno or node.lineno) - 1] + (node.end_col_offset or 0)
-        yield Mutant(file, node.lineno, source[begin:end].decode(), after, begin)
-
-
-def not_code(node: ast.AST) -> Iterator[ast.AST]:
-    """What of a node says nothing about what happens: annotations, words of messages, what a room exports."""
-    for name in ("annotation", "returns"):
-        if isinstance(part := getattr(node, name, None), ast.AST):
-            yield part
-    if isinstance(node, ast.JoinedStr):
-        yield node
-    if isinstance(node, ast.Raise) and node.exc is not None:
-        yield node.exc
-
-
-def changed(node: ast.AST) -> str | None:
-    """The source of a node after a change; None where nothing of it is changed."""
-    if isinstance(node, ast.Compare) and type(node.ops[0]) in COMPARISONS:
-        operators = [COMPARISONS[type(node.ops[0])](), *node.ops[1:]]
-        return f"({ast.unparse(ast.Compare(node.left, operators, node.comparators))})"
-    if isinstance(node, ast.BinOp) and type(node.op) in OPERATORS:
-        return f"({ast.unparse(ast.BinOp(node.left, OPERATORS[type(node.op)](), node.right))})"
-    if isinstance(node, ast.BoolOp):
-        return f"({ast.unparse(ast.BoolOp(CONJUNCTIONS[type(node.op)](), node.values))})"
-    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.Not):
-        return f"({ast.unparse(node.operand)})"
-    if isinstance(node, ast.Constant) and isinstance(node.value, bool):
-        return str(not node.value)
-    if isinstance(node, ast.Constant) and isinstance(node.value, int):
-        return str(node.value + 1)
-    if isinstance(node, ast.Constant) and isinstance(node.value, float):
-        return repr(2.0 * node.value if node.value else 1.0)
-    if isinstance(node, ast.AugAssign | ast.Raise | ast.Continue | ast.Break):
-        return "pass"
-    if isinstance(node, ast.Expr) and isinstance(node.value, ast.Call):
-        return "pass"
-    return None
-
-
-def run(root: Path, mutant: Mutant, work: Path) -> Ran:
-    """Run the tests of a room in a copy that has the mutant; the copies of one thread lie at one place."""
-    place = work / threading.current_thread().name / "copy"
+def outcomes(root: Path, mutants: Sequence[Mutant], rooms: Sequence[str], work: Path) -> list[Ran]:
+    """What the tests of some rooms say of each mutant, in a copy that has them all, in `work`."""
+    place = work / "copy"
     copy(root, place)
+    as_text = {mutant.file for mutant in mutants if b"njit" in (root / "apo_bench" / mutant.file).read_bytes()}
+    for path in [*(place / "apo_bench").rglob("*.py"), *(place / "tests").rglob("*.py")]:
+        file = path.relative_to(place / "apo_bench").as_posix() if path.is_relative_to(place / "apo_bench") else ""
+        numbers = {
+            (mutant.begin, mutant.before): (number, mutant.after)
+            for number, mutant in enumerate(mutants, start=1)
+            if mutant.file == file and file not in as_text
+        }
+        if numbers or b"cache" in path.read_bytes():
+            path.write_text(switched(path.read_bytes(), numbers), encoding="utf-8")
+    switch = (ROOT / "benchmarks" / "mutant_switch.py").read_bytes()
+    (place / "mutant_switch.py").write_bytes(switch)
+    known = [(number, mutant.room, mutant.file in as_text) for number, mutant in enumerate(mutants, start=1)]
+    (place / "mutants.json").write_text(json.dumps(known))
+    pytest(place, [f"tests/{room}" for room in rooms], {"MUTANT_NOTES": "1"}, None)
+    ran = []
+    for line in (place / "outcomes.jsonl").read_text().splitlines():
+        outcome = json.loads(line)
+        mutant = mutants[outcome["number"] - 1]
+        if not outcome["tests"]:
+            how = Ran(True, "no test reaches it", 0.0)
+        elif outcome["early"]:
+            how = imported(place, mutant, outcome, mutant.file in as_text)
+        else:
+            how = Ran(outcome["passed"], outcome["by"] or f"{len(outcome['tests'])} tests pass", outcome["seconds"])
+        if how.passed:
+            print(
+                f"NOT NOTICED {mutant.file}:{mutant.line}: {mutant.before!r} -> {mutant.after!r} ({how.by})", flush=True
+            )
+        ran.append(how)
+    return ran
+
+
+def imported(place: Path, mutant: Mutant, outcome: Mapping[str, Any], as_text: bool) -> Ran:
+    """The tests of a mutant that is there while the package is imported, or, as text, while it is compiled."""
     path = place / "apo_bench" / mutant.file
     source = path.read_bytes()
-    end = mutant.begin + len(mutant.before.encode())
-    try:
+    (place / "chosen.json").write_text(json.dumps(outcome["tests"]))
+    env = {"MUTANT": str(outcome["number"])}
+    if as_text:
+        end = mutant.begin + len(mutant.before.encode())
         path.write_bytes(source[: mutant.begin] + mutant.after.encode() + source[end:])
-        ran = tested(place, mutant.room, LONGEST_S)
-    except RuntimeError:  # the tests could not even be collected
-        ran = Ran(False, "nothing could be imported", 0.0)
+        env["NUMBA_CACHE_DIR"] = str(place.parent / f"compiled_{outcome['number']}")
+    try:
+        ran = pytest(place, sorted({test.split("::")[0] for test in outcome["tests"]}), env, LONGEST_S)
     finally:
         path.write_bytes(source)
-    if ran.seconds == LONGEST_S:
-        ran = ran._replace(passed=False)
-    if ran.passed:
-        print(f"NOT NOTICED {mutant.file}:{mutant.line}: {mutant.before!r} -> {mutant.after!r}", flush=True)
-    return ran
+    return ran if ran.by else ran._replace(by=f"{len(outcome['tests'])} tests pass")
+
+
+def pytest(place: Path, paths: Sequence[str], more: Mapping[str, str], longest_s: float | None) -> Ran:
+    """Tests in the copy, up to the first that fails; what hypothesis draws is the same every time."""
+    options = ["-q", "-x", "-n", "0", "-m", "not extras", "--tb=no", "-rfE", "--hypothesis-seed=0"]
+    options += ["-p", "mutant_switch", "-p", "no:cacheprovider", f"--basetemp={place.parent / 'pytest'}"]
+    env = os.environ | {"PYTHONPATH": str(place), "NUMBA_CACHE_DIR": str(place.parent / "compiled")}
+    env |= {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", **more}
+    shutil.rmtree(place / ".hypothesis", ignore_errors=True)
+    began = time.monotonic()
+    process = subprocess.Popen(
+        [sys.executable, "-m", "pytest", *options, *paths],
+        cwd=place,
+        env=env,
+        text=True,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        start_new_session=True,
+    )
+    try:
+        words, _ = process.communicate(timeout=longest_s)
+    except subprocess.TimeoutExpired:
+        os.killpg(process.pid, signal.SIGKILL)
+        process.communicate()
+        return Ran(False, f"no end within {longest_s:g} s", float(longest_s or 0))
+    if "MUTANT_NOTES" in more:
+        print(words if process.returncode else words.strip().splitlines()[0], flush=True)
+        if process.returncode:
+            raise RuntimeError("the tests could not be run as they are")
+    by = re.search(r"^(?:FAILED|ERROR) (.+?)(?: - .*)?$", words, re.MULTILINE)
+    how = by[1] if by else "" if not process.returncode else "nothing could be imported"
+    return Ran(not process.returncode, how, round(time.monotonic() - began, 1))
+
+
+def switched(source: bytes, numbers: Mapping[tuple[int, str], tuple[int, str]]) -> str:
+    """A file that asks at each mutant whether it is on.
+
+    Args:
+        numbers: The number of each mutant and what stands there when it is on, by its begin and what stands there now.
+    """
+    tree = Switch(source, numbers).visit(ast.parse(source))
+    first = next(
+        (
+            at
+            for at, node in enumerate(tree.body)
+            if not (isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant))
+            and not (isinstance(node, ast.ImportFrom) and node.module == "__future__")
+        ),
+        len(tree.body),
+    )
+    tree.body.insert(first, ast.parse("import mutant_switch as _switch").body[0])
+    return ast.unparse(ast.fix_missing_locations(tree))
+
+
+class Switch(ast.NodeTransformer):
+    """Puts the questions into a file, and notes beside each cache who uses it."""
+
+    def __init__(self, source: bytes, numbers: Mapping[tuple[int, str], tuple[int, str]]) -> None:
+        self.source = source
+        self.starts = starts_of(source)
+        self.numbers = numbers
+
+    def visit(self, node: ast.AST) -> Any:
+        known = None
+        if isinstance(node, ast.expr | ast.stmt) and changed(node) is not None:
+            known = self.numbers.get(placed(node, self.source, self.starts))
+        node = self.generic_visit(node)
+        if isinstance(node, ast.FunctionDef):
+            caches = [at for at, by in enumerate(node.decorator_list) if CACHE.search(ast.unparse(by))]
+            for at in caches[:1]:
+                node.decorator_list.insert(at, ast.parse("_switch.shared", mode="eval").body)
+        if known is None:
+            return node
+        number, after = known
+        asks = ast.parse(f"_switch.on({number})", mode="eval").body
+        if isinstance(node, ast.stmt):
+            return ast.If(asks, ast.parse(after).body, [node])
+        return ast.IfExp(asks, ast.parse(after, mode="eval").body, node)
 
 
 if __name__ == "__main__":

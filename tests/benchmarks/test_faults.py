@@ -47,8 +47,8 @@ def test_an_error_is_made_where_its_text_is_once_and_nowhere_else(root: Path) ->
     assert (root / "apo_bench" / "toy" / "one.py").read_text() == CODE.replace("a > b", "a < b")
 
 
-def test_errors_are_thirty_and_most_are_where_results_are_decided() -> None:
+def test_errors_are_fifty_and_most_are_where_results_are_decided() -> None:
     rooms = Counter(fault.room for fault in FAULTS)
-    assert len({(fault.file, fault.before) for fault in FAULTS}) == sum(rooms.values()) == 30
-    assert min(rooms[room] for room in ("geometry", "correction", "judging", "sweeps")) >= 5
+    assert len({(fault.file, fault.before) for fault in FAULTS}) == sum(rooms.values()) == 50
+    assert min(rooms[room] for room in ("geometry", "correction", "judging", "sweeps", "parts", "scenario")) >= 5
     assert all(fault.before != fault.after for fault in FAULTS)

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.mutants import Mutant, drawn, mutants_of, run
+from benchmarks.mutant_draw import drawn, mutants_of
+from benchmarks.mutants import outcomes
 
 SOURCE = b'''"""Words."""
 MOST: int = 3
@@ -39,15 +40,50 @@ def test_each_mutant_is_another_program_at_one_place() -> None:
         assert ast.dump(ast.parse(whole)) != ast.dump(ast.parse(SOURCE))
 
 
+CODE = """from functools import cache
+
+MOST = 4
+
+
+@cache
+def once():
+    return 1 + 1
+
+
+def up(x):
+    return x - -1
+
+
+def unused(x):
+    return x * 2
+"""
+TESTS = """from apo_bench.room.a import MOST, once, up
+
+
+def test_up():
+    assert up(1) == 2
+
+
+def test_most():
+    assert MOST == 4
+
+
+def test_once_without_a_look():
+    once()
+
+
+def test_once():
+    assert once() == 2
+"""
+
+
 @pytest.fixture
 def checkout(tmp_path: Path) -> Path:
     (tmp_path / "apo_bench" / "room").mkdir(parents=True)
     (tmp_path / "tests" / "room").mkdir(parents=True)
     (tmp_path / "apo_bench" / "__init__.py").touch()
-    (tmp_path / "apo_bench" / "room" / "a.py").write_text("def up(x):\n    return x + 1\n\n\nunused = 5\n")
-    (tmp_path / "tests" / "room" / "test_a.py").write_text(
-        "from apo_bench.room.a import up\n\n\ndef test():\n    assert up(1) == 2\n"
-    )
+    (tmp_path / "apo_bench" / "room" / "a.py").write_text(CODE)
+    (tmp_path / "tests" / "room" / "test_a.py").write_text(TESTS)
     (tmp_path / "pytest.ini").write_text("[pytest]\npythonpath = .\nmarkers =\n    extras\n")
     for command in (["init", "-q"], ["add", "-A"]):
         subprocess.run(["git", *command], cwd=tmp_path, check=True)
@@ -57,18 +93,17 @@ def checkout(tmp_path: Path) -> Path:
 def test_a_seed_draws_the_same_mutants(checkout: Path) -> None:
     first, again = (drawn(checkout, 2, np.random.default_rng(3)) for _ in range(2))
     assert first == again
-    assert len(set(drawn(checkout, 100, np.random.default_rng(0)))) == 3
+    assert len(set(drawn(checkout, 100, np.random.default_rng(0)))) == 9
     assert drawn(checkout, 100, np.random.default_rng(0), ["other"]) == []
 
 
 def test_what_a_test_sees_is_noticed(checkout: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
-    work = tmp_path_factory.mktemp("work")
-    mutants = {mutant.before: mutant for mutant in drawn(checkout, 3, np.random.default_rng(0))}
-    assert not run(checkout, mutants["x + 1"], work).passed
-    assert run(checkout, mutants["5"], work).passed
-    assert (checkout / "apo_bench" / "room" / "a.py").read_text().endswith("unused = 5\n")
-
-
-def test_code_that_cannot_be_imported_is_noticed(checkout: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
-    broken = Mutant("room/a.py", 1, "def up(x):", "def up(x:", 0)
-    assert not run(checkout, broken, tmp_path_factory.mktemp("work")).passed
+    mutants = drawn(checkout, 9, np.random.default_rng(0))
+    ran = outcomes(checkout, mutants, ["room"], tmp_path_factory.mktemp("work"))
+    by = {(mutant.line, mutant.before): how for mutant, how in zip(mutants, ran, strict=True)}
+    assert by[12, "x - -1"].by.endswith("::test_up")
+    assert by[3, "4"].by.endswith("::test_most"), "it is there while the tests are imported"
+    assert by[8, "1 + 1"].by.endswith("::test_once"), "although the cache was filled for the test before"
+    assert {place for place, how in by.items() if how.passed} == {(16, "x * 2"), (16, "2")}
+    assert by[16, "2"].by == "no test reaches it"
+    assert (checkout / "apo_bench" / "room" / "a.py").read_text() == CODE
