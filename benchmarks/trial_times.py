@@ -131,11 +131,15 @@ def summary(trials: list[Told], pairs: list[tuple[Told, Told]], by: str, which: 
         "scene_s": [round(statistics.median(pair[i]["scene_s"] for pair in mine), 3) for i in (0, 1)],
         "wall_ratio": round(statistics.median(new["wall_s"] / old["wall_s"] for old, new in mine), 3),
         "cpu_ratio": round(statistics.median(new["cpu_s"] / old["cpu_s"] for old, new in mine), 3),
-        "real_time_factor": [
-            round(statistics.median(pair[i]["sim_s"] / pair[i]["wall_s"] for pair in mine), 1) for i in (0, 1)
-        ],
+        "real_time_factor": [factor([pair[i] for pair in mine]) for i in (0, 1)],
         "verdicts_differ": sum(old["verdict"] != new["verdict"] for old, new in mine),
     }
+
+
+def factor(answers: list[Told]) -> float | None:
+    """How much faster than real time trials are in the median; None if none of them came to a replay."""
+    factors = [told["sim_s"] / told["wall_s"] for told in answers if told["sim_s"] is not None]
+    return round(statistics.median(factors), 1) if factors else None
 
 
 @contextmanager
