@@ -40,7 +40,7 @@ class Freedom:
     spectral_gap: float
     """The smallest singular value that counts over the largest that does not; infinite if every one counts."""
     free: Array
-    """(6 n, 6 n - rank): an orthonormal basis of the free directions, in standard deviations z."""
+    """(6 n, 6 n - rank): an orthonormal basis of the free directions, in standard deviations z, by `settled_basis`."""
 
 
 def freedom_of(Jt: Any) -> Freedom | None:
@@ -60,7 +60,22 @@ def freedom_of(Jt: Any) -> Freedom | None:
     rank = int(np.count_nonzero(w > RANK_CUT_OFF * w[0]))
     left = w[rank:].max(initial=0.0)
     gap = float(w[rank - 1] / left) if rank and left > 0.0 else np.inf
-    return Freedom(rank, equations_ - rank, gap, U[:, rank:])
+    return Freedom(rank, equations_ - rank, gap, settled_basis(U[:, rank:]))
+
+
+def settled_basis(N: Array) -> Array:
+    """The orthonormal basis of a span that is nearest to fixed directions (orthogonal Procrustes; Schoenemann, 1966).
+
+    A decomposition returns some basis of a null space; rounding decides which. This one depends on the span alone.
+
+    Args:
+        N: (m, f), any orthonormal basis of it.
+    """
+    # cos k^2 of whole numbers has no pattern, so no span lies across the fixed directions but by chance. Of all
+    # rotations Q the one with the least |N Q - F| is U V^t of N^t F = U W V^t.
+    F = np.cos(np.square(np.arange(1.0, N.size + 1.0))).reshape(N.shape)
+    U, _, Vt = np.linalg.svd(N.T @ F)
+    return np.asarray(N @ (U @ Vt))
 
 
 def jacobian_rank(Jt: Any) -> int:
