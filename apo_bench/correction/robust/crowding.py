@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Observation, measure_round, placements
+from apo_bench.correction.solvers.posterior import settled_basis
 from apo_bench.geometry import Array, Face, RoundFace, face_area, overlap_area, pose
 from apo_bench.geometry.intrusion import intrusion
 
@@ -76,9 +77,13 @@ def places(goal: Array, covariance: Array, number: int) -> Iterator[Array]:
     free = w > _FREE_M**2
     if not free.any():
         return
-    # Halton points, spread evenly, as normal deviates along the free axes of the covariance.
+    # Halton points, spread evenly, as normal deviates z along a basis N of the free axes. The covariance there is
+    # N^t C N = S S with S symmetric: axes as free as each other are not told apart, so rounding decides nothing.
+    N = settled_basis(V[:, free])
+    axes = N.T @ V[:, free]
+    S = axes * np.sqrt(w[free]) @ axes.T
     z = norm.ppf(qmc.Halton(int(free.sum()), scramble=False).random(number + 1)[1:])
-    twists = (z[np.argsort((z * z).sum(axis=1))] * np.sqrt(w[free])) @ V[:, free].T / _WEIGHTS
+    twists = z[np.argsort((z * z).sum(axis=1))] @ (N @ S).T / _WEIGHTS
     yield from goal @ pose.exp(twists)
 
 
