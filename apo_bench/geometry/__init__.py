@@ -4,6 +4,7 @@ from apo_bench.geometry.arrays import Array, Ints, NotReal, copyable, freeze, fr
 from apo_bench.geometry.clearance import physical_pieces
 from apo_bench.geometry.convex import ball_around, separating_axes, shadow
 from apo_bench.geometry.drop import TOUCH_M, drop_depths
+from apo_bench.geometry.flips import Flips, approximate_symmetries
 from apo_bench.geometry.holds import FINGER_ROOM_M, PAD_M, PadPlace, held_span, held_width, holds_whole
 from apo_bench.geometry.hull import SAGITTA_M, Cylinder, Hull, cylinder_hull, first_of_each, sides_of
 from apo_bench.geometry.intrusion import intrusion_depths, upright_bounds, ways_out
@@ -40,6 +41,7 @@ __all__ = (
     "Box",
     "Cylinder",
     "Face",
+    "Flips",
     "Hull",
     "Ints",
     "Mate",
@@ -52,6 +54,7 @@ __all__ = (
     "Solid",
     "across_axis",
     "all_boxes",
+    "approximate_symmetries",
     "ball_around",
     "beside",
     "copyable",

@@ -1,0 +1,118 @@
+"""The turns after which a part nearly fills the same space: where an estimator of poses takes one side for another."""
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.geometry import pose
+from apo_bench.geometry.arrays import Array, remembered
+from apo_bench.geometry.exact_turns import depth_inside
+from apo_bench.geometry.polygon import across_axis
+from apo_bench.geometry.solid import Piece, Solid
+from apo_bench.geometry.symmetry import revolution, symmetries, turn_about
+
+LEAST_SHARE = 0.7
+"""A turned part that covers less of itself is not mistaken."""
+_POINTS = 500
+"""About so many points stand for the volume of a part."""
+_GOLDEN = 1.2207440846057596
+"""The real root of g^4 = g + 1."""
+_ALIGNED = 1e-2
+"""Products of inertia below this part of the trace: the axes of the frame are principal axes."""
+_SAME = 1e-6
+_TURNS_RAD = (np.pi / 2, np.pi, -np.pi / 2)
+
+
+class Flips(NamedTuple):
+    """Body displacements F, m of them: seen at `T F`, a part looks nearly as it does at `T`."""
+
+    turns: Array
+    """(m, 4, 4), turns by 90 and 180 degrees about axes through the centre of volume, [m]; never the identity."""
+    shares: Array
+    """(m,), the part of its volume that the turned part covers."""
+    exact: NDArray[np.bool_]
+    """(m,), whether the turn is one of `symmetries`: nothing can be seen then, but contacts name other faces."""
+
+
+@remembered
+def approximate_symmetries(solid: Solid, least_share: float = LEAST_SHARE) -> Flips:
+    """The turns by 90 and 180 degrees with which a solid covers at least this share of its own volume.
+
+    They are about its box axes, or its principal axes where these are others, through the centre of volume. The share
+    is measured at about 500 points, so within about 0.04. Symmetries that are exact are kept and marked. Of a part of revolution turns about its axis are left out, since no contact depends on them,
+    and one that turns it end over end stands for all.
+
+    Args:
+        least_share: From 0 to 1.
+    """
+    points, weights = _points(solid)
+    body = revolution(solid)
+    if body is None:
+        axes = _axes(solid)
+        turns = np.array([turn_about(solid.centroid, axis, angle) for axis in axes for angle in _TURNS_RAD])
+    else:
+        turns = turn_about(body.point, across_axis(body.axis), np.pi)[None]
+    exact = np.array([_is_exact(solid, F) for F in turns])
+    shares = np.ones(len(turns))
+    turned = np.concatenate([np.zeros((0, 3)), *(pose.apply(F, points) for F in turns[~exact])])
+    # Share = volume of the points that lie in the part after the turn, over the volume of all points.
+    shares[~exact] = _covered(solid.pieces, turned).reshape(-1, len(points)) @ weights / weights.sum()
+    kept = shares >= least_share
+    answer = Flips(turns[kept], shares[kept], exact[kept])
+    for array in answer:
+        array.flags.writeable = False
+    return answer
+
+
+def _points(solid: Solid) -> tuple[Array, Array]:
+    """Points (k, 3) inside a solid, and the volume that each stands for, (k,): evenly in the box of every piece.
+
+    The sequence R3 of M. Roberts, "The unreasonable effectiveness of quasirandom sequences", 2018.
+    """
+    pieces = solid.pieces
+    own = np.repeat(np.arange(len(pieces)), max(2, _POINTS // len(pieces)))
+    # Point i of the sequence is (1/2 + i (1/g, 1/g^2, 1/g^3)) mod 1: even along every axis, unlike a grid, which a
+    # quarter turn carries onto itself.
+    steps = _GOLDEN ** -np.arange(1.0, 4.0)
+    unit = (0.5 + np.arange(len(own))[:, None] * steps) % 1.0
+    half = np.array([piece.half for piece in pieces])[own]
+    points = np.array([piece.center for piece in pieces])[own] + (2.0 * unit - 1.0) * half
+    weights = half.prod(axis=1)
+    counts = np.zeros(len(points))
+    drawn = np.zeros(len(points), dtype=np.bool_)
+    for i, piece in enumerate(pieces):
+        inside = _inside(piece, points)
+        counts += inside
+        drawn |= inside & (own == i)
+    # A point of a piece that lies in c pieces at once is drawn in each of them, so it counts 1 / c.
+    return points[drawn], weights[drawn] / counts[drawn]
+
+
+def _axes(solid: Solid) -> Array:
+    """Three axes, one in each row, (3, 3): those of the frame if they are principal, else the principal ones."""
+    J = solid.inertia
+    if J is None or np.abs(J - np.diag(np.diag(J))).max() < _ALIGNED * np.trace(J):
+        return np.eye(3)
+    return np.asarray(np.linalg.eigh(J)[1].T)
+
+
+def _covered(pieces: tuple[Piece, ...], points: Array) -> NDArray[np.bool_]:
+    """Which points, (k, 3), are in one of the pieces, (k,)."""
+    covered = np.zeros(len(points), dtype=np.bool_)
+    for piece in pieces:
+        covered |= _inside(piece, points)
+    return covered
+
+
+def _inside(piece: Piece, points: Array) -> NDArray[np.bool_]:
+    """Which points, (k, 3), are in a piece, (k,); only those in the box around it are compared with its planes."""
+    near = np.flatnonzero((np.abs(points - piece.center) <= piece.half + _SAME).all(axis=1))
+    inside = np.zeros(len(points), dtype=np.bool_)
+    inside[near] = depth_inside(piece, points[near]) >= -_SAME
+    return inside
+
+
+def _is_exact(solid: Solid, F: Array) -> bool:
+    """Whether a turn is a symmetry."""
+    return bool((np.abs(symmetries(solid) - F).max(axis=(1, 2)) < _SAME).any())

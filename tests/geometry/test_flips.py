@@ -1,0 +1,68 @@
+"""Turns with which a part nearly covers itself: shares that are known by hand, and what is left out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from apo_bench import load_scenario
+from apo_bench.geometry import approximate_symmetries, is_rigid, pose, symmetries
+from tests import scenes
+
+pytestmark = pytest.mark.numeric
+
+NEAR = 0.05
+"""Shares are measured at about 500 points."""
+
+
+def test_a_box_that_is_nearly_a_cube_is_turned_by_quarters_too() -> None:
+    """Half sizes 10, 10, 9 mm: a quarter turn about x lays 20 by 18 over 18 by 20, which cover 18 of 20."""
+    flips = approximate_symmetries(scenes.cuboid("nearly", (20, 20, 18)))
+    assert len(flips.turns) == 9
+    assert int(flips.exact.sum()) == 5
+    assert_allclose(flips.shares[flips.exact], 1.0)
+    assert_allclose(flips.shares[~flips.exact], 0.9, atol=NEAR)
+
+
+def test_a_long_box_is_turned_by_halves_only() -> None:
+    flips = approximate_symmetries(scenes.cuboid("brick", (50, 25, 10)))
+    assert len(flips.turns) == 3
+    assert flips.exact.all()
+    assert_allclose(np.trace(flips.turns[:, :3, :3], axis1=1, axis2=2), -1.0, atol=1e-12)
+
+
+def test_the_least_share_is_what_is_left_out_by() -> None:
+    part = scenes.cuboid("nearly", (20, 20, 16))
+    assert len(approximate_symmetries(part, 0.7).turns) == 9
+    assert len(approximate_symmetries(part, 0.9).turns) == 5
+
+
+def test_a_part_without_any_like_sides_has_none() -> None:
+    corner = scenes.solid("corner", [], ((0, 0, 0), (20, 10, 5)), ((15, 25, 0), (5, 15, 5)))
+    assert approximate_symmetries(corner, 0.95).turns.shape == (0, 4, 4)
+
+
+@pytest.mark.parametrize("name", ["vanished_fixture", "nested_bushings"])
+def test_turns_are_about_the_centre_of_volume_and_known_symmetries_are_marked(name: str) -> None:
+    for solid in load_scenario(name).assembly.solids.values():
+        flips = approximate_symmetries(solid)
+        assert is_rigid(flips.turns).all()
+        for F, exact in zip(flips.turns, flips.exact, strict=True):
+            assert_allclose(pose.apply(F, solid.centroid[None])[0], solid.centroid, atol=1e-12)
+            assert exact == (np.abs(symmetries(solid) - F).max(axis=(1, 2)) < 1e-6).any()
+            assert np.abs(F - np.eye(4)).max() > 0.5
+
+
+def test_a_castle_over_end_is_taken_for_one() -> None:
+    """Turned by 180 degrees about y, which no symmetry does, it covers most of itself."""
+    castle = load_scenario("vanished_fixture").assembly.solids["castle1"]
+    flips = approximate_symmetries(castle)
+    over = np.abs(flips.turns[:, :3, :3] - np.diag([-1.0, 1.0, -1.0])).max(axis=(1, 2)) < 1e-9
+    assert over.sum() == 1
+    assert not flips.exact[over][0]
+
+
+def test_of_a_part_of_revolution_one_turn_end_over_end_is_left() -> None:
+    spindle = load_scenario("nested_bushings").assembly.solids["spindle"]
+    assert len(approximate_symmetries(spindle).turns) == 1
