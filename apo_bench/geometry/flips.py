@@ -40,8 +40,9 @@ def approximate_symmetries(solid: Solid, least_share: float = LEAST_SHARE) -> Fl
     """The turns by 90 and 180 degrees with which a solid covers at least this share of its own volume.
 
     They are about its box axes, or its principal axes where these are others, through the centre of volume. The share
-    is measured at about 500 points, so within about 0.04. Symmetries that are exact are kept and marked. Of a part of revolution turns about its axis are left out, since no contact depends on them,
-    and one that turns it end over end stands for all.
+    is measured at about 500 points, so within about 0.04. Symmetries that are exact are kept and marked. Of a part of
+    revolution turns about its axis are left out, since no contact depends on them, and one that turns it end over end
+    stands for all.
 
     Args:
         least_share: From 0 to 1.
