@@ -102,11 +102,14 @@ def pytest_runtest_logreport(report: pytest.TestReport) -> None:
 
 @pytest.hookimpl(wrapper=True, tryfirst=True)
 def pytest_runtest_protocol(item: Any) -> Iterator[None]:
-    os.environ["MUTANT_READER"] = item.nodeid
-    with reading(item.nodeid):
+    global reader
+    os.environ["MUTANT_READER"] = reader = item.nodeid
+    try:
         for fixtures in item._fixtureinfo.name2fixturedefs.values() if noting else ():
             note("uses", item.nodeid, name_of(fixtures[-1]))
         return (yield)
+    finally:
+        reader = "import"
 
 
 @pytest.hookimpl(wrapper=True)

@@ -1,6 +1,7 @@
 """Random changes of the code: what is changed, and that a test that would notice one does."""
 
 import ast
+import json
 import subprocess
 from pathlib import Path
 
@@ -99,11 +100,16 @@ def test_a_seed_draws_the_same_mutants(checkout: Path) -> None:
 
 def test_what_a_test_sees_is_noticed(checkout: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
     mutants = drawn(checkout, 9, np.random.default_rng(0))
-    ran = outcomes(checkout, mutants, ["room"], tmp_path_factory.mktemp("work"))
+    work = tmp_path_factory.mktemp("work")
+    ran = outcomes(checkout, mutants, ["room"], work)
     by = {(mutant.line, mutant.before): how for mutant, how in zip(mutants, ran, strict=True)}
     assert by[12, "x - -1"].by.endswith("::test_up")
     assert by[3, "4"].by.endswith("::test_most"), "it is there while the tests are imported"
     assert by[8, "1 + 1"].by.endswith("::test_once"), "although the cache was filled for the test before"
     assert {place for place, how in by.items() if how.passed} == {(16, "x * 2"), (16, "2")}
     assert by[16, "2"].by == "no test reaches it"
+    early = {
+        json.loads(line)["number"] for line in (work / "copy" / "outcomes.jsonl").open() if '"early": true' in line
+    }
+    assert [mutants[number - 1].before for number in early] == ["4"], "no other needs a process of its own"
     assert (checkout / "apo_bench" / "room" / "a.py").read_text() == CODE
