@@ -186,6 +186,7 @@ BROKEN = {
     "class_without_name": (FIT, "<default/>", "a nested <default> has no class="),
     "two_densities": ('size="0.01 0.02 0.01"', 'size="0.01 0.02 0.01" density="600"', "densities from 600 to 1000"),
     "too_light": ('<geom type="box"/>', '<geom type="box" density="1"/>', "weighs 4.8e-05 kg"),
+    "too_heavy": (HIGH, '<geom name="high" pos="0 0 9.02" size="9 9 9"/>', "weighs 5.83e+06 kg"),
     "unknown_class": (HIGH, '<geom name="high" class="cube" size="1 1 1"/>', "class 'cube'"),
     "turned": ('name="high"', 'name="high" euler="0 0 45"', "has euler="),
     "unnamed": ('name="high" ', "", "has no name"),
