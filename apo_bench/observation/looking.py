@@ -1,7 +1,9 @@
 """Looks at a demonstration that has been observed once: fresh draws of the same noise, as many as are allowed."""
 
 from collections.abc import Collection
+from copy import deepcopy
 from dataclasses import replace
+from functools import partial
 from typing import final
 
 import numpy as np
@@ -27,12 +29,15 @@ class Looks:
         rng: np.random.Generator,
         allowed: int,
         assembly: Assembly | None = None,
+        first: np.random.Generator | None = None,
     ) -> None:
         """Args:
             noise: As in `observe`.
             rng: Not the one that the first observation was drawn from, which would change that of others.
             allowed: How many looks.
             assembly: What the corrector was told, if that is not right.
+            first: As the first observation was drawn from, not used yet: noise that has a method `again` (assembly,
+                demonstration, rng, first) may repeat what was false in that.
 
         Raises:
             InputError: The number is not allowed.
@@ -44,6 +49,7 @@ class Looks:
         self._demonstration = demonstration
         self._noise = noise
         self._rng = rng
+        self._first = first
         self._assembly = assembly or demonstration.assembly
 
     def __call__(self, operations: Collection[int]) -> Observation:
@@ -55,7 +61,12 @@ class Looks:
             raise InputError(
                 f"a look at the operations {[*chosen]} was asked for; give one or more whole numbers from 0 to {n - 1}."
             )
-        look = observe(self._demonstration, self._noise, self._rng)
+        look = observe(self._demonstration, self._later(), self._rng)
         self.left -= 1
         self.seen_again += len(chosen)
         return replace(look, assembly=self._assembly, seen=look.seen & np.isin(np.arange(n), [*chosen]))
+
+    def _later(self) -> Noise:
+        """The noise of a look after the first."""
+        again = getattr(self._noise, "again", None)
+        return self._noise if again is None or self._first is None else partial(again, first=deepcopy(self._first))

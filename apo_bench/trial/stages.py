@@ -115,7 +115,8 @@ def looks_at(
     Args:
         assembly: As in `Looks`.
     """
-    return Looks(simulated.demonstration, noise, stream(seed, LOOKS, salt), allowed, assembly)
+    first = stream(seed, OBSERVATION, salt)
+    return Looks(simulated.demonstration, noise, stream(seed, LOOKS, salt), allowed, assembly, first)
 
 
 def demonstration_failure(demonstration: Demonstration) -> Outcome:

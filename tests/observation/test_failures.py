@@ -1,0 +1,108 @@
+"""How cameras fail: each kind does what it says, as often as it says, and looks repeat as often as they should."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from apo_bench import Demonstration, InputError, draw_layout, load_scenario
+from apo_bench.geometry import approximate_symmetries, pose
+from apo_bench.observation.looking import Looks
+from apo_bench.observation.models.failures import AlongRay, DisplacedView, Flipped, Stale, Swapped
+from apo_bench.observation.noise import Level
+from apo_bench.observation.observing import observe
+
+KINDS = (Flipped, Stale, Swapped, AlongRay, DisplacedView)
+LEVEL = Level(1.0, 1.0)
+
+
+@cache
+def demonstration():
+    scenario = load_scenario("vanished_fixture")
+    layout = draw_layout(scenario, np.random.default_rng(0), 0.0)
+    return Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((5, 6, 6)))
+
+
+def failures(kind, seed, **settings):
+    shown = demonstration()
+    return kind(LEVEL, **settings).failures(shown.assembly, shown, np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_one_seed_gives_the_same_bytes_and_level_zero_the_truth(kind):
+    one, other = (observe(demonstration(), kind(LEVEL), np.random.default_rng(4)) for _ in range(2))
+    assert one.goals.tobytes() == other.goals.tobytes()
+    assert one.outliers.gross == pytest.approx(0.3)
+    exact = observe(demonstration(), kind(Level(0.0, 0.0)), np.random.default_rng(4))
+    assert exact.goals.tobytes() == demonstration().goals.tobytes()
+
+
+@pytest.mark.parametrize(("kind", "low", "high"), [(Flipped, 0.25, 0.35), (Stale, 0.25, 0.35), (AlongRay, 0.25, 0.35)])
+def test_failures_are_as_often_as_stated(kind, low, high):
+    """0.3 of 1500 draws: 0.05 is four standard deviations."""
+    assert low < np.mean([failures(kind, seed).false for seed in range(300)]) < high
+    assert not any(failures(kind, seed, rate=0.0).false.any() for seed in range(20))
+
+
+def test_a_flip_is_by_an_approximate_symmetry():
+    shown = demonstration()
+    flipped = failures(Flipped, 1, rate=1.0)
+    assert flipped.false.all()
+    for operation, T, seen in zip(shown.assembly.operations, shown.goals, flipped.goals, strict=True):
+        turns = approximate_symmetries(shown.assembly.solids[operation.main]).turns
+        assert (np.abs(turns - pose.inverse(T) @ seen).max(axis=(1, 2)) < 1e-9).any()
+
+
+def test_a_stale_pose_is_where_the_part_was_before():
+    shown = demonstration()
+    stale = failures(Stale, 1, rate=1.0)
+    mains = [operation.main for operation in shown.assembly.operations]
+    assert mains[1] == mains[3]
+    assert_array_equal(stale.goals[3], shown.goals[1])
+    assert_array_equal(stale.goals[1], shown.start[mains[1]])
+
+
+def test_swaps_exchange_two_views_of_like_parts():
+    shown = demonstration()
+    swapped = next(f for f in (failures(Swapped, seed) for seed in range(99)) if f.false[0])
+    assert shown.assembly.operations[2].main == "castle2"
+    assert_array_equal(swapped.goals[0], shown.goals[2])
+    assert_array_equal(swapped.goals[2], shown.goals[0])
+
+
+def test_an_error_along_the_ray_is_on_it():
+    shown = demonstration()
+    model = AlongRay(LEVEL, rate=1.0)
+    off = failures(AlongRay, 3, rate=1.0).goals[:, :3, 3] - shown.goals[:, :3, 3]
+    length = np.linalg.norm(off, axis=1)
+    assert ((length >= 0.02) & (length <= 0.06)).all()
+    assert_allclose(np.cross(off, model.camera.rays(shown.goals)), 0.0, atol=1e-12)
+
+
+def test_a_displaced_view_has_one_displacement():
+    shown = demonstration()
+    seen = failures(DisplacedView, 5)
+    moved = (seen.goals @ pose.inverse(shown.goals))[seen.false]
+    assert len(moved) == 2
+    assert_allclose(moved[0], moved[1], atol=1e-12)
+
+
+@pytest.mark.parametrize("repeat", [0.0, 0.8])
+def test_a_later_look_repeats_what_was_false_as_often_as_stated(repeat):
+    """Of some 450 failures; 0.1 is more than four standard deviations of either share."""
+    shown = demonstration()
+    repeated = []
+    for seed in range(300):
+        model = AlongRay(LEVEL, repeat=repeat)
+        first = model.failures(shown.assembly, shown, np.random.default_rng(seed))
+        look = Looks(shown, model, np.random.default_rng([seed, 1]), 1, first=np.random.default_rng(seed))
+        seen = look(range(5))
+        near = np.linalg.norm(seen.goals[:, :3, 3] - first.goals[:, :3, 3], axis=1) < 6e-3
+        repeated += near[first.false].tolist()
+    assert abs(np.mean(repeated) - repeat) < 0.1
+
+
+def test_a_share_that_makes_no_sense_is_refused():
+    with pytest.raises(InputError, match=r"a share of failures of 1.5 was given; give a number from 0 to 1"):
+        Flipped(LEVEL, rate=1.5)
