@@ -23,13 +23,16 @@ class OutlierModel:
     times: float = 10.0
     relation: float = 0.001
     """Part of the relations that are wrong."""
+    flip: float = 0.25
+    """Part of the gross ones of a part that nearly looks the same after some turns that are turned so."""
 
     def __post_init__(self) -> None:
-        rates = (self.gross, self.broad, 1.0 - self.gross - self.broad, self.relation)
+        rates = (self.gross, self.broad, 1.0 - self.gross - self.broad, self.relation, self.flip)
         if not all(0.0 < rate < 1.0 for rate in rates):
             raise InputError(
-                f"rates of {self.gross!r} gross, {self.broad!r} broad, {self.relation!r} wrong relations were given; "
-                "all must be above 0, gross and broad together and wrong relations below 1."
+                f"rates of {self.gross!r} gross, {self.broad!r} broad, {self.relation!r} wrong relations, "
+                f"{self.flip!r} turned were given; all must be above 0, gross and broad together and each other one "
+                "below 1."
             )
         if not 1.0 < self.times < np.inf:
             raise InputError(f"times={self.times!r} was given; a broad observation needs a finite number above 1.")
@@ -39,6 +42,13 @@ class OutlierModel:
         """-2 log of the probability of an inlier, a broad and a gross observation, beside that of an inlier."""
         inlier = 1.0 - self.gross - self.broad
         return 0.0, -2.0 * float(np.log(self.broad / inlier)), -2.0 * float(np.log(self.gross / inlier))
+
+    def gross_surprises(self, flips: int) -> tuple[float, float]:
+        """The same of a gross observation that is no flip, and of one that is a certain one of so many flips."""
+        gross = self.surprises[2]
+        if not flips:
+            return gross, np.inf
+        return gross - 2.0 * float(np.log1p(-self.flip)), gross - 2.0 * float(np.log(self.flip / flips))
 
     @property
     def relation_surprise(self) -> float:

@@ -10,7 +10,7 @@ from math import sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Contact, Suspect
+from apo_bench.assembly import Assembly, Contact, Suspect
 from apo_bench.correction.problem import Problem
 from apo_bench.correction.solved import pull, tested
 
@@ -33,13 +33,18 @@ def suspects(problem: Problem, kept: NDArray[np.bool_]) -> tuple[Suspect, ...]:
 
 def contact_suspects(problem: Problem, kept: NDArray[np.bool_], relation: str) -> tuple[Suspect, ...]:
     """Every contact of one relation, `R3`, left out in turn; each is called `R3: stick.py on castle1.spy`."""
-    assembly = problem.observation.assembly
-    contacts = assembly.relations()
-    together = dict[Contact, list[int]]()
+    single = contacts_of(problem.observation.assembly, relation)
+    return _ranked(problem, kept, [(name, group) for name, group in single.items() if kept[list(group)].any()])
+
+
+def contacts_of(assembly: Assembly, relation: str) -> dict[str, tuple[int, ...]]:
+    """The contacts of one relation, `R3`, by their names, `R3: stick.py on castle1.spy`: numbers in `relations()`."""
+    relations = assembly.relations()
+    together = dict[Contact, tuple[int, ...]]()
     for j in assembly.arcs()[int(relation.removeprefix("R")) - 1]:
-        if kept[j]:
-            together.setdefault(assembly.given(contacts[j].contact), []).append(j)
-    return _ranked(problem, kept, [(f"{relation}: {contact}", tuple(js)) for contact, js in together.items()])
+        contact = assembly.given(relations[j].contact)
+        together[contact] = (*together.get(contact, ()), j)
+    return {f"{relation}: {contact}": group for contact, group in together.items()}
 
 
 def _ranked(

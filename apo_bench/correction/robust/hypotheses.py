@@ -50,7 +50,7 @@ class Case:
 
 @final
 @dataclass(frozen=True, eq=False)
-class Hypothesis:
+class SolvedHypothesis:
     """What is believed, and what comes of that."""
 
     case: Case
@@ -105,7 +105,7 @@ class Hypothesis:
         surprise = sum(merged(views, state, model).surprise for views, state in states)
         return float(unlikely + surprise + len(self.dropped) * model.relation_surprise)
 
-    def at(self, goals: Array, unknown: Sequence[int]) -> Hypothesis:
+    def at(self, goals: Array, unknown: Sequence[int]) -> SolvedHypothesis:
         """The same with the inferred goals of some operations elsewhere, at these of goals (n, 4, 4)."""
         there = np.array(self.observation.goals)
         there[list(unknown)] = goals[list(unknown)]
@@ -132,12 +132,12 @@ def unbelieved(states: States) -> tuple[int, ...]:
     return tuple(k for k, state in enumerate(states) if all(belief == GROSS for belief in state))
 
 
-def hypothesis(case: Case, states: States, dropped: tuple[str, ...] = ()) -> Hypothesis:
+def hypothesis(case: Case, states: States, dropped: tuple[str, ...] = ()) -> SolvedHypothesis:
     """Solve for the goals that are most likely with these states, and without these relations."""
     believed = believed_observation(case, states)
     trusted = all(state and set(state) == {INLIER} for state in states) and not dropped
     correction = as_stated(believed) if trusted else _corrected(believed, dropped)
-    return Hypothesis(case, states, dropped, believed, correction)
+    return SolvedHypothesis(case, states, dropped, believed, correction)
 
 
 def as_stated(observation: Observation) -> Correction:

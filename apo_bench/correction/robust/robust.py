@@ -9,14 +9,14 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Look, Observation, OutlierModel, largest_gap
+from apo_bench.assembly import Correction, Hypothesis, Look, Observation, OutlierModel, largest_gap
 from apo_bench.correction.consistency import TEST_LEVEL
 from apo_bench.correction.contact import contact_apply
 from apo_bench.correction.inferred import inferred_goals
 from apo_bench.correction.robust.crowding import least_crowded
-from apo_bench.correction.robust.hypotheses import Case, Hypothesis, as_stated
+from apo_bench.correction.robust.hypotheses import Case, SolvedHypothesis, as_stated
 from apo_bench.correction.robust.search import Search
-from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, Sightings, looked_again, views_of
+from apo_bench.correction.robust.views import BROAD, FLIPPED, GROSS, INLIER, Sightings, looked_again, views_of
 from apo_bench.correction.status import refused_correction
 from apo_bench.geometry import Array
 
@@ -78,7 +78,7 @@ class RobustCorrector:
 contact_robust = RobustCorrector()
 
 
-def unsure(search: Search, best: Hypothesis | None) -> tuple[int, ...]:
+def unsure(search: Search, best: SolvedHypothesis | None) -> tuple[int, ...]:
     """Operations that are worth another look: of which nothing is believed as it was stated, or not surely."""
     if best is None:
         return tuple(range(search.operations))
@@ -91,7 +91,7 @@ def unsure(search: Search, best: Hypothesis | None) -> tuple[int, ...]:
     return tuple(doubted)
 
 
-def with_room(hypothesis: Hypothesis) -> Hypothesis:
+def with_room(hypothesis: SolvedHypothesis) -> SolvedHypothesis:
     """A hypothesis whose left-out operations lead to where there is room for their parts."""
     unknown = hypothesis.left_out
     covariance = hypothesis.correction.covariance
@@ -112,7 +112,7 @@ def _baseless(observation: Observation, views: Sightings) -> tuple[int, ...]:
 
 
 def _report(
-    observation: Observation, first: Hypothesis, search: Search, best: Hypothesis, again: list[int]
+    observation: Observation, first: SolvedHypothesis, search: Search, best: SolvedHypothesis, again: list[int]
 ) -> Correction:
     """The correction of what is believed, with what was seen at first."""
     correction = best.correction
@@ -127,6 +127,26 @@ def _report(
         test_after=correction.test,
         left_out=best.left_out,
         believed=best.observation,
+        hypotheses=_hypotheses(search, best),
+    )
+
+
+def _hypotheses(search: Search, best: SolvedHypothesis) -> tuple[Hypothesis, ...]:
+    """All that were kept; the likeliest with its parts where there is room for them, as the goals that are returned."""
+    return tuple(
+        Hypothesis(
+            weight,
+            solved.correction.goals,
+            solved.correction.covariance,
+            solved.observation,
+            solved.left_out,
+            solved.dropped,
+            _disbelieved(solved).removeprefix("; "),
+        )
+        for weight, solved in (
+            (weight, best if (solved.states, solved.dropped) == (best.states, best.dropped) else solved)
+            for weight, solved in search.weighted()
+        )
     )
 
 
@@ -138,18 +158,24 @@ def _unexplained(correction: Correction) -> str:
     return f"; the correction is longer than the stated noise explains (p = {p:.2g}), no outlier does"
 
 
-def _doubts(search: Search, best: Hypothesis) -> str:
+def _doubts(search: Search, best: SolvedHypothesis) -> str:
     """What is not believed, and how likely it is that a relation is wrong in place of an observation."""
-    broad = tuple(k for k, state in enumerate(best.states) if BROAD in state and k not in best.left_out)
-    lists = (("left out what was seen of", best.left_out), ("seen badly:", broad))
-    words = "".join(f"; {what} {_operations(those)}" for what, those in lists if those)
-    words += "".join(f"; left out {relation}" for relation in best.dropped)
+    words = _disbelieved(best)
     rival = search.rival(best)
     if rival is None:
         return words
     wrong = search.weight(best, lambda one: bool(one.dropped))
     named = (best if best.dropped else rival).dropped[0]
     return f"{words}; an observation is to blame with {_share(1.0 - wrong)}, a relation ({named}) with {_share(wrong)}"
+
+
+def _disbelieved(best: SolvedHypothesis) -> str:
+    """`; left out what was seen of operation 2; seen turned: operation 3`, or empty."""
+    broad = tuple(k for k, state in enumerate(best.states) if BROAD in state and k not in best.left_out)
+    turned = tuple(k for k, state in enumerate(best.states) if max(state, default=0) >= FLIPPED)
+    lists = (("left out what was seen of", best.left_out), ("seen badly:", broad), ("seen turned:", turned))
+    words = "".join(f"; {what} {_operations(those)}" for what, those in lists if those)
+    return words + "".join(f"; left out {relation}" for relation in best.dropped)
 
 
 def _looks(again: list[int]) -> str:

@@ -20,17 +20,18 @@ from apo_bench.correction.consistency import p_value
 from apo_bench.correction.problem import seen_system
 from apo_bench.correction.robust.hypotheses import (
     Case,
-    Hypothesis,
+    SolvedHypothesis,
     States,
     believed_observation,
     hypothesis,
     soft_deviation,
     unbelieved,
 )
-from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, State, beliefs
+from apo_bench.correction.robust.views import FLIPPED, GROSS, INLIER, State, beliefs
 from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.posterior import jacobian_rank
 from apo_bench.correction.solvers.whitened import noise_factor
+from apo_bench.correction.suspects import contacts_of
 
 MOST_EXACT = 12
 """Operations up to which every set is looked at; of more, sets grow by one operation at a time."""
@@ -43,6 +44,9 @@ _MOST_SOLVED = 24
 _BY = 15.0
 """An operation that is less likely to be wrong, by so much in -2 log, counts like one more of a set."""
 _MOST_STARTS = 32
+_MOST_KEPT = 16
+_LEAST_KEPT = 1e-3
+"""Hypotheses that are told of at most, and how likely one is at least beside the likeliest."""
 
 
 @final
@@ -56,12 +60,12 @@ class Search:
         self._case = case
         self._level = level
         self._beliefs = [beliefs(views, case.model) for views in case.views]
-        self._solved: dict[tuple[States, tuple[str, ...]], Hypothesis] = {}
+        self._solved: dict[tuple[States, tuple[str, ...]], SolvedHypothesis] = {}
         self.operations = len(case.views)
-        self.first: Hypothesis | None = None
+        self.first: SolvedHypothesis | None = None
         """What is likeliest of each operation by itself."""
 
-    def likeliest(self) -> Hypothesis | None:
+    def likeliest(self) -> SolvedHypothesis | None:
         """None if nothing that was tried has a solution."""
         start = self._start()
         self.first = self._try(start)
@@ -70,27 +74,41 @@ class Search:
         best = self._smallest(start)
         if best is not None:
             self._refined(best)
+            # Where a relation is to blame, the likeliest observation to blame in its place may have been turned.
+            rival = self.rival(best) if best.dropped else None
+            if rival is not None:
+                self._refined(rival)
         return min(self._known(), key=_badness, default=None)
 
-    def share(self, best: Hypothesis, k: int) -> float:
+    def share(self, best: SolvedHypothesis, k: int) -> float:
         """How likely it is, of all hypotheses that were solved, that operation k is not in the state that was found."""
         return self.weight(best, lambda other: other.states[k] != best.states[k])
 
-    def rival(self, best: Hypothesis) -> Hypothesis | None:
+    def rival(self, best: SolvedHypothesis) -> SolvedHypothesis | None:
         """The likeliest explanation of the other kind: with a wrong relation, or without one."""
         others = [other for other in self._known() if bool(other.dropped) != bool(best.dropped)]
         return min(others, key=_badness, default=None)
 
-    def weight(self, best: Hypothesis, which: Callable[[Hypothesis], bool]) -> float:
+    def weight(self, best: SolvedHypothesis, which: Callable[[SolvedHypothesis], bool]) -> float:
         """How likely some of the hypotheses are together."""
         known = self._known()
         weights = np.exp([-0.5 * (other.badness - best.badness) for other in known])
         return float(weights @ [which(other) for other in known] / weights.sum())
 
-    def _known(self) -> list[Hypothesis]:
+    def weighted(self) -> list[tuple[float, SolvedHypothesis]]:
+        """What was solved with how likely it is beside the rest, the likeliest first; the unlikely ones left out."""
+        known = sorted(self._known(), key=_badness)[:_MOST_KEPT]
+        if not known:
+            return []
+        weights = np.exp([-0.5 * (solved.badness - known[0].badness) for solved in known])
+        kept = [(weight, solved) for weight, solved in zip(weights, known, strict=True) if weight >= _LEAST_KEPT]
+        whole = sum(weight for weight, _ in kept)
+        return [(float(weight / whole), solved) for weight, solved in kept]
+
+    def _known(self) -> list[SolvedHypothesis]:
         return [solved for solved in self._solved.values() if np.isfinite(solved.badness)]
 
-    def _try(self, states: States, dropped: tuple[str, ...] = ()) -> Hypothesis:
+    def _try(self, states: States, dropped: tuple[str, ...] = ()) -> SolvedHypothesis:
         key = states, dropped
         if key not in self._solved:
             self._solved[key] = hypothesis(self._case, states, dropped)
@@ -104,13 +122,16 @@ class Search:
             return several[0]
         return min(several, key=lambda states: ContactAgreement(self._case, states).disagreement())
 
-    def _smallest(self, start: States) -> Hypothesis | None:
+    def _smallest(self, start: States) -> SolvedHypothesis | None:
         """The likeliest of the smallest sets, or single relations, whose test holds; else of all that were solved."""
         tried = [self._try(start, (relation,)) for relation in self._relations(start)]
-        for sets in self._sets(start):
+        gross = self._case.model.surprises[GROSS]
+        for size, sets in enumerate(self._sets(start), start=1):
             tried += [self._try(states) for states in sets]
             held = [solved for solved in tried if solved.p_value >= self._level]
-            if held:
+            # A wrong relation is no answer while as many gross views as could be tried next are likelier.
+            dearer = (size + 1) * gross > self._case.model.relation_surprise
+            if held and (dearer or not all(solved.dropped for solved in held)):
                 return min(held, key=_badness)
         return min(self._known(), key=_badness, default=None)
 
@@ -149,17 +170,25 @@ class Search:
         """The likeliest state of an operation in which a view is believed."""
         return next(state for _, state in self._beliefs[k] if set(state) != {GROSS})
 
-    def _refined(self, best: Hypothesis) -> None:
+    def _refined(self, best: SolvedHypothesis) -> None:
         """One state after the other changed for the better, until none is; or relations in place of observations."""
         while True:
-            near = [self._try(states, best.dropped) for states in _near(best.states)]
+            near = [self._try(states, best.dropped) for states in self._near(best.states)]
             near += [self._try(states, (relation,)) for states, relation in self._instead(best)]
             best = min(near, key=_badness, default=best)
             if not best.badness < best.badness:
                 return
             best = best
 
-    def _instead(self, best: Hypothesis) -> Iterator[tuple[States, str]]:
+    def _near(self, states: States) -> Iterator[States]:
+        """With one view, that is no inlier, in another state."""
+        for k, (views, state) in enumerate(zip(self._case.views, states, strict=True)):
+            for i, (view, now) in enumerate(zip(views, state, strict=True)):
+                every = range(FLIPPED + len(view.flips)) if now != INLIER else ()
+                others = (belief for belief in every if belief != now)
+                yield from (changed(states, (k,), ((*state[:i], belief, *state[i + 1 :]),)) for belief in others)
+
+    def _instead(self, best: SolvedHypothesis) -> Iterator[tuple[States, str]]:
         """A relation in place of an operation that is in doubt and that it depends on."""
         doubted = [k for k, state in enumerate(best.states) if any(belief != INLIER for belief in state)]
         for k in () if best.dropped else doubted:
@@ -167,13 +196,18 @@ class Search:
             yield from ((states, relation) for relation in self._relations(states, k))
 
     def _relations(self, states: States, of: int | None = None) -> Iterator[str]:
-        """Relations, or those that depend on an operation, without which the rest agrees."""
+        """Relations, and single contacts of them, without which the rest agrees; or those an operation is part of."""
         assembly = self._case.observation.assembly
         rest = ContactAgreement(self._case, states)
         letters = pattern(assembly).letters - len(assembly.solids)
         for i, arc in enumerate(assembly.arcs()):
+            # What agrees without one contact agrees without the whole relation, but for the share of false alarms.
             if (of is None or (letters[list(arc)] == of).any()) and rest.agreement((), arc) >= _LENIENT:
-                yield f"R{i + 1}"
+                relation = f"R{i + 1}"
+                yield relation
+                single = contacts_of(assembly, relation)
+                if len(single) > 1:
+                    yield from (name for name, group in single.items() if rest.agreement((), group) >= _LENIENT)
 
 
 def changed(states: States, which: Sequence[int], to: Sequence[State]) -> States:
@@ -182,15 +216,7 @@ def changed(states: States, which: Sequence[int], to: Sequence[State]) -> States
     return tuple(new.get(k, state) for k, state in enumerate(states))
 
 
-def _near(states: States) -> Iterator[States]:
-    """With one view, that is no inlier, in another state."""
-    for k, state in enumerate(states):
-        for i, now in enumerate(state):
-            others = [belief for belief in (INLIER, BROAD, GROSS) if belief != now] if now != INLIER else []
-            yield from (changed(states, (k,), ((*state[:i], belief, *state[i + 1 :]),)) for belief in others)
-
-
-def _badness(solved: Hypothesis) -> float:
+def _badness(solved: SolvedHypothesis) -> float:
     return solved.badness
 
 

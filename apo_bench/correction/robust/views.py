@@ -1,6 +1,7 @@
 """What was seen of each operation, once or several times, and what comes of it if some of that is not believed.
 
-A view is an inlier, seen with the stated noise; broad, seen with some times that; or gross, so that it says nothing.
+A view is an inlier, seen with the stated noise; broad, seen with some times that; gross, so that it says nothing; or
+flipped, seen with the stated noise but turned, as a part that nearly looks the same after that turn may be.
 Views of one operation that are believed are merged into one Gaussian. That they agree is evidence that they are right,
 since gross views lie anywhere.
 """
@@ -12,11 +13,13 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Observation, OutlierModel
-from apo_bench.geometry import Array, frozen, pose
+from apo_bench.geometry import Array, approximate_symmetries, frozen, pose
 
 INLIER = 0
 BROAD = 1
 GROSS = 2
+FLIPPED = 3
+"""By the first of the turns of its part; the next number by the next one."""
 State = tuple[int, ...]
 """One of these for each view of an operation; empty if it was never seen."""
 ROOM = frozen(np.diag(np.repeat([0.5, (8.0 * np.pi**2) ** (1 / 3)], 3) ** 2 / (2.0 * np.pi)))
@@ -37,6 +40,8 @@ class Sighting(NamedTuple):
     """(4, 4)."""
     covariance: Array
     """(6, 6), [m, rad]."""
+    flips: Array
+    """(m, 4, 4), body displacements after which its part nearly looks the same."""
 
 
 class Merged(NamedTuple):
@@ -60,27 +65,46 @@ def views_of(observation: Observation) -> Sightings:
 
 def looked_again(views: Sightings, observation: Observation) -> Sightings:
     """With what was seen this time."""
-    new = zip(views, observation.seen, observation.goals, observation.covariance, strict=True)
-    return tuple((*old, Sighting(goal, C)) if seen else old for old, seen, goal, C in new)
+    assembly = observation.assembly
+    flips = [approximate_symmetries(assembly.solids[operation.main]).turns for operation in assembly.operations]
+    new = zip(views, observation.seen, observation.goals, observation.covariance, flips, strict=True)
+    return tuple((*old, Sighting(goal, C, turns)) if seen else old for old, seen, goal, C, turns in new)
 
 
 def merged(views: Sequence[Sighting], state: State, model: OutlierModel) -> Merged:
     """What the views of one operation say together."""
-    believed = [
-        view if belief == INLIER else Sighting(view.goal, view.covariance * model.times**2)
-        for view, belief in zip(views, state, strict=True)
-        if belief != GROSS
-    ]
-    surprise = sum(model.surprises[belief] for belief in state)
+    pairs = list(zip(views, state, strict=True))
+    believed = [_read(view, belief, model) for view, belief in pairs if belief != GROSS]
+    surprise = sum(_surprise(view, belief, model) for view, belief in pairs)
     anywhere = _log_volume(ROOM)
     if not believed:
         return Merged(None, ROOM, surprise + anywhere * max(0, len(views) - 1))
     surprise += anywhere * (len(views) - len(believed))
     if len(believed) == 1:
-        return Merged(*believed[0], surprise)
+        return Merged(believed[0].goal, believed[0].covariance, surprise)
     goal, covariance, length = _mean(believed)
     apart = sum(_log_volume(view.covariance) for view in believed) - _log_volume(covariance)
     return Merged(goal, covariance, surprise + length + apart)
+
+
+def _read(view: Sighting, belief: int, model: OutlierModel) -> Sighting:
+    """What a view says of the goal if it is believed so."""
+    if belief == INLIER:
+        return view
+    if belief == BROAD:
+        return view._replace(covariance=view.covariance * model.times**2)
+    # The true goal is T F where T was seen, so a body twist xi at T is Ad(F^-1) xi there.
+    F = view.flips[belief - FLIPPED]
+    A = pose.adjoint(pose.inverse(F))
+    C = A @ view.covariance @ A.T
+    return view._replace(goal=view.goal @ F, covariance=(C + C.T) / 2)
+
+
+def _surprise(view: Sighting, belief: int, model: OutlierModel) -> float:
+    """-2 log of how likely a state of a view is, beside an inlier."""
+    if belief < GROSS:
+        return model.surprises[belief]
+    return model.gross_surprises(len(view.flips))[belief != GROSS]
 
 
 def beliefs(views: Sequence[Sighting], model: OutlierModel) -> list[tuple[float, State]]:

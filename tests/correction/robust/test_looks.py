@@ -113,7 +113,7 @@ def test_views_that_agree_are_merged_and_believed():
 
 def test_of_views_that_do_not_agree_one_is_believed_the_latest_first():
     one = views_of(look("carried_bridge", 4))[0][0]
-    other = Sighting(one.goal @ pose.exp([0.1, 0.0, 0.0, 0.0, 0.0, 1.0]), one.covariance)
+    other = Sighting(one.goal @ pose.exp([0.1, 0.0, 0.0, 0.0, 0.0, 1.0]), one.covariance, one.flips)
     assert [state for _, state in beliefs((one, other), MODEL)[:2]] == [(GROSS, INLIER), (INLIER, GROSS)]
     many = beliefs((one, other, one, one, other, one), MODEL)
     assert many[0][1] == (INLIER, GROSS, INLIER, INLIER, GROSS, INLIER)
