@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.raw_solid import RawSolid, Region, square_to
+from apo_bench.cad.solids.raw_solid import RawSolid, Region, square_to
 from apo_bench.geometry import Array, Face, RoundFace, sides_of, straightened
 from apo_bench.parts.making.outline import COARSE_SIDES
 

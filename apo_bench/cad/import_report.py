@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.cad.importing import Imported
 from apo_bench.cad.meshes.mesh_file import CadFile
-from apo_bench.cad.raw_solid import RawSolid, Region, SolidPlace
+from apo_bench.cad.solids.raw_solid import RawSolid, Region, SolidPlace
 
 _KIND_WORDS = {"plane": ("flat", "flat"), "cylinder": ("cylinder", "cylinders"), "cone": ("cone", "cones")}
 

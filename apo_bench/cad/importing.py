@@ -13,10 +13,10 @@ from apo_bench.cad.contact_faces import contact_faces
 from apo_bench.cad.faces.regions import regions_of
 from apo_bench.cad.meshes.mesh_file import CadFile, read_meshes
 from apo_bench.cad.meshes.shells import closed_solids
-from apo_bench.cad.naming import with_names
 from apo_bench.cad.pieces.cutting import Cut, cut
-from apo_bench.cad.raw_solid import RawSolid, without_copies
 from apo_bench.cad.solid_moments import solid_moments
+from apo_bench.cad.solids.naming import with_names
+from apo_bench.cad.solids.raw_solid import RawSolid, without_copies
 from apo_bench.cad.step.step_file import STEP_SUFFIXES, read_step
 from apo_bench.cad.time_limit import time_limit
 from apo_bench.errors import InputError

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.raw_solid import RawSolid, Region
+from apo_bench.cad.solids.raw_solid import RawSolid, Region
 from apo_bench.geometry import Array
 from apo_bench.io.figures import default_looks
 

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.cad.naming import free_name, part_name
-from apo_bench.cad.raw_solid import SolidPlace
+from apo_bench.cad.solids.naming import free_name, part_name
+from apo_bench.cad.solids.raw_solid import SolidPlace
 from apo_bench.geometry import pose
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from apo_bench.cad.pieces.corners import mesh_of
 from apo_bench.cad.pieces.cutting import Cut
-from apo_bench.cad.raw_solid import Mesh, RawSolid, Region
+from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, Region
 from apo_bench.geometry import Array
 from apo_bench.parts.making.moments import Moments
 

@@ -16,7 +16,7 @@ from apo_bench.errors import InputError
 
 if TYPE_CHECKING:
     from apo_bench.cad.importing import Imported
-    from apo_bench.cad.raw_solid import RawSolid
+    from apo_bench.cad.solids.raw_solid import RawSolid
 
 part = typer.Typer(name="part", cls=Grouped, rich_markup_mode=None, help="Parts from CAD files.")
 
@@ -37,8 +37,8 @@ def part_import(
     """Make part files from a CAD file: find its faces, cut it into convex pieces, and say what was done."""
     from apo_bench.cad.import_report import report_form, unit_line
     from apo_bench.cad.importing import raw_solids
-    from apo_bench.cad.naming import renamed
     from apo_bench.cad.poses_file import named_places, write_places
+    from apo_bench.cad.solids.naming import renamed
 
     names = _pairs(name or [])
     if not 1.0 <= density <= 25_000.0:
@@ -70,8 +70,8 @@ def _written(
     """Parts with their pictures; and why others of the file became none."""
     from apo_bench.cad.import_report import import_lines
     from apo_bench.cad.importing import import_part
-    from apo_bench.cad.naming import free_name, part_name
     from apo_bench.cad.part_picture import draw_part
+    from apo_bench.cad.solids.naming import free_name, part_name
 
     imported: list[Imported] = []
     left_out: list[str] = []

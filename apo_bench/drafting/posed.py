@@ -7,7 +7,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.cad.naming import free_name
+from apo_bench.cad.solids.naming import free_name
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Solid, pose, world_bounds
 from apo_bench.io.documents import JsonNode, read_toml

@@ -28,7 +28,7 @@ CORRECTOR = "contact-robust"
 """The corrector where none is asked for."""
 LOOKING = ("contact-robust",)
 """Correctors that can ask to see operations again."""
-SIMULATED = MappingProxyType({"settle": "apo_bench.simulation.settling:settle"})
+SIMULATED = MappingProxyType({"settle": "apo_bench.simulation.scene.settling:settle"})
 """Correctors that need a simulator; `correct` does not know them, a trial does."""
 UNCORRECTED = ("oracle", "none", "by-heart")
 """Plans without a corrector: the truth, what was seen, the scenario's own goals where they fit best what was seen."""

@@ -36,7 +36,7 @@ _PACKAGES = ("mujoco", "numpy", "scipy", "shapely")
 """The packages that a demonstration is made with."""
 _NOT_SHOWN = (
     *("correction/", "depth_camera/", "files/", "observation/", "prediction/", "recognition/", "sweeps/"),
-    *("simulation/execution/", "simulation/sensor/", "simulation/settling.py", "trial/"),
+    *("simulation/execution/", "simulation/sensor/", "simulation/scene/settling.py", "trial/"),
 )
 _SHOWN = ("trial/kept_demonstrations.py", "trial/stages.py")
 

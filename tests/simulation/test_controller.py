@@ -205,5 +205,5 @@ def test_the_room_says_by_which_files_a_plan_goes_and_steps_are_taken_where_it_s
     named = re.findall(r"`([a-z_/]+\.py)`", simulation.__doc__ or "")
     assert all((folder / each).is_file() for each in named)
     stepping = {str(each.relative_to(folder)) for each in folder.rglob("*.py") if "mujoco.mj_step(" in each.read_text()}
-    assert stepping == {"robot/robot.py", "human/hands.py", "arms/rig.py", "settling.py"}
+    assert stepping == {"robot/robot.py", "human/hands.py", "arms/rig.py", "scene/settling.py"}
     assert stepping & set(named) == {"robot/robot.py", "human/hands.py"}

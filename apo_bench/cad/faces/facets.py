@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.cad.raw_solid import Mesh, connected
+from apo_bench.cad.solids.raw_solid import Mesh, connected
 from apo_bench.geometry import Array
 
 SMOOTH_RAD = np.radians(35.0)

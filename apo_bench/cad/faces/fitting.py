@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.cad.faces.facets import FLAT, SMOOTH_RAD, Facets
-from apo_bench.cad.raw_solid import Mesh, Region, square_to
+from apo_bench.cad.solids.raw_solid import Mesh, Region, square_to
 from apo_bench.geometry import WHOLE_TURN, Array
 
 _MOST_POINTS = 400

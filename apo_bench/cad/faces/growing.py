@@ -7,7 +7,7 @@ import numpy as np
 
 from apo_bench.cad.faces.facets import Facets
 from apo_bench.cad.faces.fitting import ON_WALL, Round, axis_of, circle_through, on_it, refined
-from apo_bench.cad.raw_solid import Mesh, connected
+from apo_bench.cad.solids.raw_solid import Mesh, connected
 from apo_bench.geometry import Array
 
 _FEWEST = 3

@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench.cad.faces.facets import FLAT, Facets, facets_of
 from apo_bench.cad.faces.fitting import fitted_plane, round_region
 from apo_bench.cad.faces.growing import FoundWall, smooth_groups, walls_of
-from apo_bench.cad.raw_solid import Mesh, Region, square_to
+from apo_bench.cad.solids.raw_solid import Mesh, Region, square_to
 from apo_bench.geometry import WHOLE_TURN
 
 _LARGER = 8.0

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.raw_solid import Mesh
+from apo_bench.cad.solids.raw_solid import Mesh
 from apo_bench.geometry import Array
 
 _AT_ONCE = 200_000

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.cad.meshes.three_mf import read_3mf
-from apo_bench.cad.raw_solid import Mesh
+from apo_bench.cad.solids.raw_solid import Mesh
 from apo_bench.errors import InputError
 from apo_bench.io.reading import read_bytes
 

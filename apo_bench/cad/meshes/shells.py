@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.cad.meshes.crossing import crossing
-from apo_bench.cad.raw_solid import Mesh, RawSolid, SolidPlace, connected, put_together
+from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, SolidPlace, connected, put_together
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
 

@@ -14,7 +14,7 @@ from xml.parsers.expat import ExpatError, ParserCreate
 
 import numpy as np
 
-from apo_bench.cad.raw_solid import Mesh
+from apo_bench.cad.solids.raw_solid import Mesh
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
 

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.raw_solid import Mesh, square_to
+from apo_bench.cad.solids.raw_solid import Mesh, square_to
 from apo_bench.geometry import Array, Hull
 
 _MOST_CORNERS = 600

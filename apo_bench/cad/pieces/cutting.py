@@ -7,7 +7,7 @@ import numpy as np
 from apo_bench.cad.pieces.corners import corners_of, extremes, is_thick, without_near
 from apo_bench.cad.pieces.halving import at_shoulders, convex_parts, settled
 from apo_bench.cad.pieces.round_walls import as_cylinders, bored, filling, least_pieces, with_round_shafts
-from apo_bench.cad.raw_solid import Mesh, RawSolid
+from apo_bench.cad.solids.raw_solid import Mesh, RawSolid
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Hull
 from apo_bench.parts.allowed import MOST_PIECES

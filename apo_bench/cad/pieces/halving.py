@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.cad.pieces.corners import SAME_CORNER_MM, corners_of, mesh_of
-from apo_bench.cad.raw_solid import Region
+from apo_bench.cad.solids.raw_solid import Region
 from apo_bench.geometry import Array
 
 _MOST_CUTS = 400

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.cad.pieces.corners import SAME_CORNER_MM, corners_of, extremes, is_thick, without_near
-from apo_bench.cad.raw_solid import Mesh, Region
+from apo_bench.cad.solids.raw_solid import Mesh, Region
 from apo_bench.geometry import Array, Cylinder, Hull, cylinder_hull, sides_of
 from apo_bench.parts.allowed import THINNEST_M, WIDEST_M
 

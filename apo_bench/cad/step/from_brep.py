@@ -9,8 +9,8 @@ import numpy as np
 from apo_bench.cad.faces.facets import facets_of
 from apo_bench.cad.faces.fitting import plane_region, round_region
 from apo_bench.cad.meshes.shells import INSIDE_OUT, check_closed, check_uncrossed, has_three
-from apo_bench.cad.naming import with_names
-from apo_bench.cad.raw_solid import Mesh, RawSolid, Region, connected, put_together, square_to
+from apo_bench.cad.solids.naming import with_names
+from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, Region, connected, put_together, square_to
 from apo_bench.cad.step.open_cascade import TRIANGLES_RAD, BrepFace, BrepSolid
 from apo_bench.cad.step.strips import wall_strips
 from apo_bench.cad.step.surfaces import Flat, Wall, is_same, surface_of

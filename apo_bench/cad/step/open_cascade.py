@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.cad.raw_solid import SolidPlace
+from apo_bench.cad.solids.raw_solid import SolidPlace
 from apo_bench.cad.step.step_tree import leaves_of, matrix_of, shapes_in
 from apo_bench.geometry import Array
 

@@ -17,7 +17,7 @@ from apo_bench.cad.meshes.mesh_file import (
     CadFile,
     read_cad_bytes,
 )
-from apo_bench.cad.raw_solid import RawSolid, without_copies
+from apo_bench.cad.solids.raw_solid import RawSolid, without_copies
 from apo_bench.cad.step.from_brep import raw_of
 from apo_bench.cad.step.open_cascade import READER_BYTES, READER_S, BrepSolid
 from apo_bench.errors import InputError

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.cad.raw_solid import Rgb
+from apo_bench.cad.solids.raw_solid import Rgb
 from apo_bench.geometry import Array
 
 _NO_NAME = re.compile(

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.cad.faces.fitting import Round, border_of
-from apo_bench.cad.raw_solid import Mesh, square_to
+from apo_bench.cad.solids.raw_solid import Mesh, square_to
 from apo_bench.geometry import Array
 
 _LEVEL = 1e-6

@@ -1,1 +1,1 @@
-"""The scene: room, parts and arm as MuJoCo models, and pictures of them."""
+"""The scene: room, parts and arm as MuJoCo models, pictures of them, and where parts come to rest when let go."""

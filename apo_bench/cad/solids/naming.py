@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from apo_bench.cad.raw_solid import Mesh, RawSolid, Region
+from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, Region
 from apo_bench.errors import InputError, unknown
 from apo_bench.parts.allowed import FACE_OR_PART_NAME, LONGEST_FACE_NAME
 

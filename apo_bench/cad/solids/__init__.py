@@ -1,0 +1,1 @@
+"""Solids as a CAD file holds them: closed meshes whose faces have parameters and names, [mm]."""
