@@ -23,6 +23,8 @@ _COVERED = 0.02
 _FREE_M = 2e-3
 _WEIGHTS = np.array([1.0, 1.0, 1.0, 0.05, 0.05, 0.05])
 """A direction is free if the goal may be off by more than this along it, [m]; a radian weighs as much as 50 mm."""
+_EQUAL = 1e-6
+"""Variances that differ by less than this part are equal but for rounding."""
 _DEEP_M = 5e-4
 """Parts that should not touch may be so deep in each other before another place is tried."""
 
@@ -77,13 +79,14 @@ def places(goal: Array, covariance: Array, number: int) -> Iterator[Array]:
     free = w > _FREE_M**2
     if not free.any():
         return
-    # Halton points, spread evenly, as normal deviates z along a basis N of the free axes. The covariance there is
-    # N^t C N = S S with S symmetric: axes as free as each other are not told apart, so rounding decides nothing.
-    N = settled_basis(V[:, free])
-    axes = N.T @ V[:, free]
-    S = axes * np.sqrt(w[free]) @ axes.T
+    # Halton points, spread evenly, as normal deviates along the free axes of the covariance. Axes that are as free as
+    # each other are any of their span, so rounding would decide which: they are settled together.
+    w = w[free]
+    V = V[:, free]
+    new = np.flatnonzero(np.diff(w) > _EQUAL * w[1:]) + 1
+    axes = np.hstack([settled_basis(group) for group in np.split(V, new, axis=1)])
     z = norm.ppf(qmc.Halton(int(free.sum()), scramble=False).random(number + 1)[1:])
-    twists = z[np.argsort((z * z).sum(axis=1))] @ (N @ S).T / _WEIGHTS
+    twists = (z[np.argsort((z * z).sum(axis=1))] * np.sqrt(w)) @ axes.T / _WEIGHTS
     yield from goal @ pose.exp(twists)
 
 

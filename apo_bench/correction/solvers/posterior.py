@@ -19,6 +19,8 @@ LARGEST_POSTERIOR = 600
 """Unknowns above which free directions are not spelled out: a basis of them is a dense matrix."""
 UNCLEAR = (1e-14, 1e-9)
 """Squares of pivots, in parts of the largest: with none between these, rounding is told from rank quickly."""
+_TIE = 1e-3
+"""Parts of an axis in a span that differ by less are as good as equal."""
 _BLOCK = 32
 """Columns that LAPACK treats at once, of large matrices."""
 RANK_CUT_OFF = 1e-7
@@ -64,17 +66,25 @@ def freedom_of(Jt: Any) -> Freedom | None:
 
 
 def settled_basis(N: Array) -> Array:
-    """The orthonormal basis of a span that is nearest to fixed directions (orthogonal Procrustes; Schoenemann, 1966).
+    """The orthonormal basis of a span that is nearest to axes (orthogonal Procrustes; Schoenemann, 1966).
 
     A decomposition returns some basis of a null space; rounding decides which. This one depends on the span alone.
 
     Args:
         N: (m, f), any orthonormal basis of it.
     """
-    # cos k^2 of whole numbers has no pattern, so no span lies across the fixed directions but by chance. Of all
-    # rotations Q the one with the least |N Q - F| is U V^t of N^t F = U W V^t.
-    F = np.cos(np.square(np.arange(1.0, N.size + 1.0))).reshape(N.shape)
-    U, _, Vt = np.linalg.svd(N.T @ F)
+    # The axes are those that lie in the span the most, given those before: the pivots of a Cholesky factor of the
+    # projection N N^t. Of axes that are as good but for rounding the first is taken.
+    m, f = N.shape
+    P = N @ N.T
+    sooner = np.linspace(1.0, 1.0 - _TIE, m)
+    axes = list[int]()
+    for _ in range(f):
+        i = int((P.diagonal() * sooner).argmax())
+        axes.append(i)
+        P = P - np.outer(P[:, i], P[i]) / P[i, i]
+    # Of all rotations Q the one with the least |N Q - E|, E the axes, is U V^t of N^t E = U W V^t.
+    U, _, Vt = np.linalg.svd(N[axes].T)
     return np.asarray(N @ (U @ Vt))
 
 
