@@ -46,3 +46,9 @@ def kind(value: Any) -> str:
         return "None" if value is None else "a class"
     name = type(value).__name__
     return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
+
+
+def require(holds: object, sentence: str) -> None:
+    """Raise an `InputError` with this sentence unless something holds."""
+    if not holds:
+        raise InputError(sentence)

@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.assembly.goals import Observation, Plan, Step
 from apo_bench.assembly.topology import Contact
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array, copyable, freeze
 
 
@@ -160,11 +160,11 @@ class Correction:
         Raises:
             InputError: The correction did not converge, so its goals are not meant to be executed.
         """
-        if not self.ok:
-            raise InputError(
-                f"the correction ended as {self.status} ({self.sentence}), which no robot should carry out; look at "
-                "`correction.ok` first."
-            )
+        require(
+            self.ok,
+            f"the correction ended as {self.status} ({self.sentence}), which no robot should carry out; look at "
+            "`correction.ok` first.",
+        )
         targets = np.zeros((0, 4, 4)) if self.targets is None else self.targets
         return Plan(observation.assembly, observation.start, self.goals, self.schedule, targets)
 

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly.facing_round import Facing, measure_round, round_pairs
-from apo_bench.geometry import Array, Face, RoundFace, Solid, ball_around, face_area, pose
+from apo_bench.geometry import Array, Face, RoundFace, Solid, across_axis, balls_apart, face_area, pose
 from apo_bench.geometry.overlap import overlap
 
 
@@ -43,7 +43,7 @@ def facing(
         share: Pairs that cover less of the smaller face are left out.
         known: Pairs, by name, that need not be measured again.
     """
-    if _far(a, T_a, b, T_b, gap_m):
+    if balls_apart(a.pieces, T_a, b.pieces, T_b) > gap_m:
         return
     posed_a = _posed(a, T_a)
     posed_b = _posed(b, T_b)
@@ -70,14 +70,6 @@ def face_gap(a: Face | RoundFace, T_a: Array, b: Face | RoundFace, T_b: Array) -
     common = overlap(a, T_a, b, T_b)
     middle = (common.corners if len(common.corners) else pose.apply(T_b, b.outline)).mean(axis=0)
     return float((T_a[:3, :3] @ a.normal) @ (middle - pose.apply(T_a, a.outline[:1])[0]))
-
-
-def _far(a: Solid, T_a: Array, b: Solid, T_b: Array, gap_m: float) -> bool:
-    """Whether the balls around two solids are farther apart than a gap."""
-    middle_a, radius_a = ball_around(a.pieces)
-    middle_b, radius_b = ball_around(b.pieces)
-    between = T_a[:3, :3] @ middle_a + T_a[:3, 3] - T_b[:3, :3] @ middle_b - T_b[:3, 3]
-    return bool(np.sqrt(between @ between) > radius_a + radius_b + gap_m)
 
 
 class _Posed(NamedTuple):
@@ -143,7 +135,5 @@ def _pair(a: _Posed, i: int, T_a: Array, b: _Posed, j: int, T_b: Array, share: f
 
 def _axes(n: Array, R: Array) -> tuple[Array, Array]:
     """Two unit vectors across n and each other; the first follows the axis of the part that is most across."""
-    u = R[:, int(np.abs(n @ R).argmin())]
-    u = u - (u @ n) * n
-    u = u / np.sqrt(u @ u)
+    u = across_axis(n, R[:, int(np.abs(n @ R).argmin())])
     return u, np.array([n[1] * u[2] - n[2] * u[1], n[2] * u[0] - n[0] * u[2], n[0] * u[1] - n[1] * u[0]])

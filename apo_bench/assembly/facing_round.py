@@ -15,7 +15,7 @@ import numpy as np
 
 from apo_bench.assembly.kinds import contact_kind, geometric_play
 from apo_bench.geometry import Array, Face, RoundFace, Solid, pose
-from apo_bench.geometry.mate import mate
+from apo_bench.geometry.mate import angle_between, mate
 
 _TIGHTEST_M = -0.1e-3
 _LOOSEST_M = 0.6e-3
@@ -142,7 +142,7 @@ def _cone(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Facing:
         slope=np.array([*_offsets(rows, p), *_tilts(tilts, u)]),
         lengths=3,
         gap_m=float(np.linalg.norm(rows @ (p - q))),
-        angle_rad=float(np.arctan2(np.linalg.norm(np.cross(u, w)), u @ w)),
+        angle_rad=angle_between(u, w),
         share=max(0.0, common),
         half_m=((low + high) / 2,) * len(tilts),
     )

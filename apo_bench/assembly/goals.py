@@ -18,7 +18,7 @@ from apo_bench.assembly.outlier_model import OutlierModel
 from apo_bench.assembly.shared_error import SharedError
 from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import Assembly
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array, copyable, freeze, pose
 
 Poses = Mapping[str, Array]
@@ -113,11 +113,11 @@ class Observation:
         Raises:
             InputError: An operation was not seen.
         """
-        if not self.seen.all():
-            raise InputError(
-                f"operation {int(np.argmin(self.seen)) + 1} was not seen, so the observation cannot be replayed as is; "
-                "observe the demonstration again."
-            )
+        require(
+            self.seen.all(),
+            f"operation {int(np.argmin(self.seen)) + 1} was not seen, so the observation cannot be replayed as is; "
+            "observe the demonstration again.",
+        )
         return Plan(self.assembly, self.start, self.goals)
 
 

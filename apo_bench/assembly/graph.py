@@ -12,7 +12,7 @@ from apo_bench.assembly.equations import equations, largest
 from apo_bench.assembly.goals import Observation, Poses
 from apo_bench.assembly.lowering import lowered
 from apo_bench.assembly.topology import ODL, Assembly, Contact, Gap, Relation, inverted, simplified, spelled
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array
 
 ArcResiduals = Sequence[float | None]
@@ -100,11 +100,11 @@ def relation_graph(assembly: Assembly, step: int | None = None) -> Graph:
         InputError: There is no such step.
     """
     count = len(assembly) if step is None else step
-    if not 1 <= count <= len(assembly):
-        raise InputError(
-            f"step {count} was given, the demonstration has {len(assembly)} operations; give a step "
-            f"from 1 to {len(assembly)}."
-        )
+    require(
+        1 <= count <= len(assembly),
+        f"step {count} was given, the demonstration has {len(assembly)} operations; give a step "
+        f"from 1 to {len(assembly)}.",
+    )
     done = assembly.first(count)
     history = _history(done)
     arcs = _arcs(done, history)

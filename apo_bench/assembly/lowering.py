@@ -25,7 +25,7 @@ import numpy as np
 from apo_bench.assembly.goals import Observation
 from apo_bench.assembly.kinds import WALLS, contact_kind
 from apo_bench.assembly.topology import Assembly, Contact, Gap, PartFace
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array, Face, RoundFace, remembered
 
 _BEHIND = "|"
@@ -116,7 +116,7 @@ class _Sheets:
         contacts = []
         for i in range(count):
             tail = f"{i + 1} of {count}"
-            n = _across(face, np.pi * i / count)
+            n = face.around(np.pi * i / count)
             sheet = self._sheet(planes_of, tail, face.middle[None], n, face.fit, opposes=False)
             contacts.append(Contact(sheet, self._axis(points_of, tail, np.pi * i / count)))
         return contacts
@@ -133,7 +133,7 @@ class _Sheets:
         """The ends of the axis of a face, a single point of a rim; each of several planes has points of its own."""
         face = self._assembly.round_face(of)
         points = face.ends[:1] if face.kind == "rim" else face.ends
-        return self._sheet(of, f"axis {tail}", points, _across(face, turn), face.fit, opposes=False)
+        return self._sheet(of, f"axis {tail}", points, face.around(turn), face.fit, opposes=False)
 
     def _sheet(
         self, of: PartFace, tail: str, points: Array, normal: Array, fit: bool, opposes: bool = True
@@ -154,11 +154,6 @@ def _first(contact: Contact, manipulated: bool) -> tuple[PartFace, PartFace]:
     return (contact.manipulated, contact.environment) if manipulated else (contact.environment, contact.manipulated)
 
 
-def _across(face: RoundFace, turn: float) -> Array:
-    """A direction across the axis of a face, turned from that of its frame, [rad]."""
-    return np.asarray(np.cos(turn) * face.frame[:3, 0] + np.sin(turn) * face.frame[:3, 1])
-
-
 def _outward(face: RoundFace) -> Array:
     """Which way a cone or a rim looks out of its part: a countersink where it widens, a taper where it narrows."""
     if face.kind == "rim":
@@ -168,17 +163,18 @@ def _outward(face: RoundFace) -> Array:
 
 def _check_gap(contact: Contact, kind: str | None, gap: Gap) -> None:
     """Refuse what cannot be asked of round faces."""
-    if kind is None:
-        raise InputError(f"{contact}: these two faces make no contact; name a shaft and its hole, say.")
-    if kind in ("cone in cone", "cone on rim") and gap.kind != "centred":
-        raise InputError(f"{contact} is a {kind} and asks for '{gap}'; only 'centred' is allowed, so leave it out.")
-    if kind == "shaft in hole" and gap.kind == "contact":
-        raise InputError(
-            f"{contact} is a shaft in a hole and asks for 'contact', which does not say where on the wall; "
-            "use 'centred' or 'clearance'."
-        )
-    if kind == "shaft in hole" and gap.low_m is not None and gap.high_m is not None and gap.low_m != -gap.high_m:
-        raise InputError(
-            f"{contact} is a shaft in a hole and asks for '{gap}'; the play of a shaft is a disc, so state the same "
-            "length twice, from minus it to it."
-        )
+    require(kind is not None, f"{contact}: these two faces make no contact; name a shaft and its hole, say.")
+    require(
+        kind not in ("cone in cone", "cone on rim") or gap.kind == "centred",
+        f"{contact} is a {kind} and asks for '{gap}'; only 'centred' is allowed, so leave it out.",
+    )
+    require(
+        kind != "shaft in hole" or gap.kind != "contact",
+        f"{contact} is a shaft in a hole and asks for 'contact', which does not say where on the wall; "
+        "use 'centred' or 'clearance'.",
+    )
+    require(
+        kind != "shaft in hole" or gap.low_m is None or gap.high_m is None or gap.low_m == -gap.high_m,
+        f"{contact} is a shaft in a hole and asks for '{gap}'; the play of a shaft is a disc, so state the same "
+        "length twice, from minus it to it.",
+    )

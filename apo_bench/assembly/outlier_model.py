@@ -5,7 +5,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 
 _LEAST_RATE = 1e-3
 """A rate that is measured as 0 is not known to be smaller."""
@@ -28,14 +28,16 @@ class OutlierModel:
 
     def __post_init__(self) -> None:
         rates = (self.gross, self.broad, 1.0 - self.gross - self.broad, self.relation, self.flip)
-        if not all(0.0 < rate < 1.0 for rate in rates):
-            raise InputError(
-                f"rates of {self.gross!r} gross, {self.broad!r} broad, {self.relation!r} wrong relations, "
-                f"{self.flip!r} turned were given; all must be above 0, gross and broad together and each other one "
-                "below 1."
-            )
-        if not 1.0 < self.times < np.inf:
-            raise InputError(f"times={self.times!r} was given; a broad observation needs a finite number above 1.")
+        require(
+            all(0.0 < rate < 1.0 for rate in rates),
+            f"rates of {self.gross!r} gross, {self.broad!r} broad, {self.relation!r} wrong relations, "
+            f"{self.flip!r} turned were given; all must be above 0, gross and broad together and each other one "
+            "below 1.",
+        )
+        require(
+            1.0 < self.times < np.inf,
+            f"times={self.times!r} was given; a broad observation needs a finite number above 1.",
+        )
 
     @property
     def surprises(self) -> tuple[float, float, float]:

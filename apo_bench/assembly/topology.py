@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.kinds import WALLS, contact_kind, geometric_play
-from apo_bench.geometry import Array, Face, RoundFace, Solid, copyable, pose, remembered
+from apo_bench.geometry import Array, Face, RoundFace, Solid, copyable, freeze, pose, remembered
 
 
 class PartFace(NamedTuple):
@@ -123,10 +123,7 @@ class Assembly:
     """Contacts of sheets -> the contact of a round face that they are part of."""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "solids", MappingProxyType(dict(self.solids)))
-        object.__setattr__(self, "gaps", MappingProxyType(dict(self.gaps)))
-        object.__setattr__(self, "sheets", MappingProxyType(dict(self.sheets)))
-        object.__setattr__(self, "origin", MappingProxyType(dict(self.origin)))
+        freeze(self, solids=None, gaps=None, sheets=None, origin=None)
 
     def __len__(self) -> int:
         return len(self.operations)

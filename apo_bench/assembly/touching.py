@@ -13,7 +13,7 @@ import numpy as np
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.kinds import contact_kind
 from apo_bench.assembly.topology import Assembly, Contact, PartFace
-from apo_bench.geometry import WHOLE_TURN, Array, Face, RoundFace, pose
+from apo_bench.geometry import WHOLE_TURN, Array, Face, RoundFace, across_axis, pose
 from apo_bench.geometry.overlap import overlap
 
 _QUARTER = np.pi / 2
@@ -64,9 +64,7 @@ def outline_points(assembly: Assembly, of: PartFace, poses: Poses) -> Array:
     T = poses[of.part]
     if isinstance(face, Face):
         return np.asarray(face.outline @ T[:3, :3].T + T[:3, 3])
-    x = face.frame[:3, 0]
-    y = face.frame[:3, 1]
-    ring = np.outer(np.cos(_RING), x) + np.outer(np.sin(_RING), y)
+    ring = face.around(_RING)
     return pose.apply(T, np.concatenate([end + r * ring for end, r in zip(face.ends, face.radii, strict=True)]))
 
 
@@ -122,9 +120,7 @@ def _directions(still: RoundFace, T: Array, moved: RoundFace, T_moved: Array) ->
     face, T = min((still, T), (moved, T_moved), key=lambda each: each[0].extent_rad)
     if face.extent_rad >= WHOLE_TURN - 1e-9:
         z = T[:3, :3] @ face.axis
-        x = np.eye(3)[int(np.round(np.abs(z), 9).argmin())]
-        x = x - (x @ z) * z
-        x = x / np.sqrt(x @ x)
+        x = across_axis(z, np.eye(3)[int(np.round(np.abs(z), 9).argmin())])
         y = np.cross(z, x)
         yield from (x, -x, y, -y)
         return

@@ -97,16 +97,3 @@ def _cylinder_distance(cylinder: Cylinder, points: Array) -> tuple[Array, Array]
     deepest = beyond.argmax(axis=1)
     weights = np.where(length[:, None] > 0.0, outside / np.maximum(length, 1e-15)[:, None], np.eye(2)[deepest])
     return length + np.minimum(beyond.max(axis=1), 0.0), np.einsum("nk,nki->ni", weights, ways)
-
-
-def convex_passage(convex: Convex, start: Array, ways: Array) -> tuple[Array, Array]:
-    """Where rays, (n, 3), from a point enter a piece, and where they leave it, (n,) each; sooner if they miss."""
-    # n . (s + t w) = d at t = (d - n . s) / (n . w): entered by planes against the way, left by planes along it.
-    rate = ways @ convex.planes[:, :3].T
-    room = convex.planes[:, 3] - convex.planes[:, :3] @ start
-    with np.errstate(divide="ignore", invalid="ignore"):
-        at = room / rate
-    enter = np.where(rate < 0.0, at, -np.inf).max(axis=1)
-    leave = np.where(rate > 0.0, at, np.inf).min(axis=1)
-    missed = ((np.abs(rate) < 1e-15) & (room < 0.0)).any(axis=1)
-    return np.where(missed, np.inf, enter), np.where(missed, -np.inf, leave)

@@ -1,15 +1,13 @@
 """Unions of convex pieces as the range finder meets them: how far points are from them, where rays strike them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.depth_camera.convex import Convex, convex_distance, convex_of, convex_passage, least_distance
-from apo_bench.geometry import Array, Hull, Piece
+from apo_bench.depth_camera.convex import Convex, convex_distance, convex_of, least_distance
+from apo_bench.geometry import Array, Hull, Piece, passage
 
 
 class Shape(NamedTuple):
@@ -24,7 +22,7 @@ class Shape(NamedTuple):
     inside: tuple[Convex | None, ...] = ()
     """What is in each box, in the frame of its middle; None: all of it. Empty of boxes alone."""
 
-    def only(self, kept: NDArray[np.intp]) -> Shape:
+    def only(self, kept: NDArray[np.intp]) -> "Shape":
         """Some of the pieces, by number."""
         inside = tuple(self.inside[k] for k in kept) if self.inside else ()
         return Shape(self.center[kept], self.half[kept], self.turn[kept], inside)
@@ -123,7 +121,7 @@ def strike_distances(shape: Shape, origin: Array, rays: Array) -> tuple[Array, N
             enter = np.fmin(a, b).max(axis=1)
             leave = np.fmax(a, b).min(axis=1)
         else:
-            enter, leave = convex_passage(inside, start, way)
+            enter, leave = passage(inside.planes, start, way)
         hit = (enter <= leave) & (enter > 0.0) & (enter < best[near])
         best[near[hit]] = enter[hit]
         which[near[hit]] = k

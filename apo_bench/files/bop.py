@@ -12,7 +12,7 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
 from apo_bench.io.reading import opened
 from apo_bench.io.strict_csv import check_separator
@@ -75,8 +75,7 @@ def read_results(path: str | Path) -> PoseRows:
         numbers.extend(pose)
         scores.append(score)
         lines.append(line)
-    if not lines:
-        raise InputError(f"{path}: no pose stands in the file; below its first line, one row per pose is needed.")
+    require(lines, f"{path}: no pose stands in the file; below its first line, one row per pose is needed.")
     cells = np.frombuffer(numbers, dtype=np.float64).reshape(-1, 12)
     where = np.frombuffer(ids, dtype=np.int64).reshape(-1, 3)
     R = cells[:, :9].reshape(-1, 3, 3)
@@ -98,11 +97,11 @@ def check_rows(rows: PoseRows) -> PoseRows:
         fault = f"R R^t differs from the identity by {square[k]:.3g}" if square[k] > _NOT_A_ROTATION else "it mirrors"
         raise InputError(f"{rows.spot(k)}, R: a rotation matrix, row by row, is needed; {fault}.")
     distance = np.linalg.norm(rows.t_mm, axis=1)
-    if np.median(distance) < _METRES:
-        raise InputError(
-            f"{rows.spot(0)}, t: millimetres are needed, and the median distance to the camera is "
-            f"{np.median(distance):.3g}; if these are metres, multiply by 1000."
-        )
+    require(
+        np.median(distance) >= _METRES,
+        f"{rows.spot(0)}, t: millimetres are needed, and the median distance to the camera is "
+        f"{np.median(distance):.3g}; if these are metres, multiply by 1000.",
+    )
     _refuse_twice(rows)
     return rows
 
@@ -136,8 +135,7 @@ def _lines(path: str | Path) -> Iterator[tuple[int, str]]:
                     yield line, text
     except UnicodeDecodeError as error:
         raise InputError(f"{path}, line {line}: this is not UTF-8 text; give a CSV file.") from error
-    if not line:
-        raise InputError(f"{path}: the file is empty; {_WANTED} in its first line.")
+    require(line, f"{path}: the file is empty; {_WANTED} in its first line.")
 
 
 def _check_header(text: str, place: str) -> None:
@@ -146,8 +144,7 @@ def _check_header(text: str, place: str) -> None:
         return
     check_separator(place, columns)
     for column in _COLUMNS:
-        if column not in columns:
-            raise InputError(f"{place}: the column '{column}' is missing; {_WANTED}.")
+        require(column in columns, f"{place}: the column '{column}' is missing; {_WANTED}.")
     raise InputError(f"{place}: the columns are {text[:80]}; {_WANTED}.")
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.files.bop import LARGEST_ID, LARGEST_MM, PoseRows, check_rows, read_results
 from apo_bench.io.documents import JsonNode, parse_json
 from apo_bench.io.reading import read_text
@@ -83,8 +83,7 @@ def _which_scene(path: Path, estimates: PoseRows) -> int:
 
 def _read_scene(path: Path, scene: int) -> PoseRows:
     rows = list(_entries(parse_json(read_text(path, "JSON file of one scene", LARGEST_TRUTH_BYTES), str(path)), scene))
-    if not rows:
-        raise InputError(f"{path}: no pose stands in the file; give the scene_gt.json of a scene with parts.")
+    require(rows, f"{path}: no pose stands in the file; give the scene_gt.json of a scene with parts.")
     where, R, t, place = zip(*rows, strict=True)
     score = np.full(len(rows), np.nan)
     return check_rows(
@@ -94,28 +93,29 @@ def _read_scene(path: Path, scene: int) -> PoseRows:
 
 def _entries(root: JsonNode, scene: int) -> Iterator[tuple[tuple[int, int, int], Any, Any, str]]:
     """Every entry: its scene, image and object, R (3, 3), t (3,), and where it stands."""
-    if not isinstance(root.value, dict):
-        root.fail("an object is needed whose keys are the numbers of images")
+    root.require(isinstance(root.value, dict), "an object is needed whose keys are the numbers of images")
     for image, entries in root.value.items():
-        if not (image.isascii() and image.isdigit() and len(image) <= 9):
-            raise InputError(f"{root.file}: the keys are numbers of images, '{image[:40]}' was given.")
+        require(
+            image.isascii() and image.isdigit() and len(image) <= 9,
+            f"{root.file}: the keys are numbers of images, '{image[:40]}' was given.",
+        )
         for i, entry in enumerate(root.child(entries, f"image {image}").items("entry"), start=1):
             place = f"image {image}, entry {i}"
             node = JsonNode(entry.value, root.file, place)
             part = _member(node, "obj_id").integer()
-            if not 0 <= part <= LARGEST_ID:
-                _member(node, "obj_id").fail("a whole number from 0 is needed")
+            _member(node, "obj_id").require(0 <= part <= LARGEST_ID, "a whole number from 0 is needed")
             R = _member(node, "cam_R_m2c").numbers(9).reshape(3, 3)
             t = _member(node, "cam_t_m2c").numbers(3)
-            if max(np.abs(R).max(), np.abs(t).max()) > LARGEST_MM:
-                node.fail(f"numbers of at most {LARGEST_MM:g} are needed")
+            node.require(
+                max(np.abs(R).max(), np.abs(t).max()) <= LARGEST_MM, f"numbers of at most {LARGEST_MM:g} are needed"
+            )
             yield (scene, int(image), part), R, t, place
 
 
 def _member(node: JsonNode, key: str) -> JsonNode:
     """A member of an entry; others than those of the format are nobody's business."""
-    if not isinstance(node.value, dict) or key not in node.value:
-        raise InputError(
-            f"{node.file}, {node.key}: the key '{key}' is missing; needed are obj_id, cam_R_m2c, cam_t_m2c."
-        )
+    require(
+        isinstance(node.value, dict) and key in node.value,
+        f"{node.file}, {node.key}: the key '{key}' is missing; needed are obj_id, cam_R_m2c, cam_t_m2c.",
+    )
     return node.child(node.value[key], key)

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.assembly import Assembly, Observation
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.files.deviations import DEVIATION_DEG, DEVIATION_MM, SHIFT_M, TURN_RAD, is_within
 from apo_bench.geometry import FARTHEST_M, Array, pose
 from apo_bench.io.strict_csv import Columns, CsvRow, read_csv
@@ -64,11 +64,11 @@ def read_table(
             row.fail("operation", f"every operation stands once, this one is in line {rows[k].line} already")
         rows[k] = row
     for k, operation in enumerate(assembly.operations):
-        if k not in rows:
-            raise InputError(
-                f"{path}: the row of operation {k + 1} ({operation.main}) is missing; "
-                f"give one row for each of the {len(assembly)} operations."
-            )
+        require(
+            k in rows,
+            f"{path}: the row of operation {k + 1} ({operation.main}) is missing; "
+            f"give one row for each of the {len(assembly)} operations.",
+        )
     ordered = [rows[k] for k in range(len(assembly))]
     shift = [_deviation(row, "deviation", deviation_mm * 1e-3, SHIFT_M) for row in ordered]
     turn = [_deviation(row, "turn deviation", math.radians(deviation_deg), TURN_RAD) for row in ordered]
@@ -101,11 +101,17 @@ def table(assembly: Assembly, goals: Array) -> str:
 def _operation(row: CsvRow, assembly: Assembly) -> int:
     """Which operation a row is of, counted from 0."""
     text = row.text("operation")
-    if not text.isdecimal() or len(text) > 9 or not 1 <= int(text) <= len(assembly):
-        row.fail("operation", f"a whole number from 1 to {len(assembly)} is needed")
+    row.require(
+        text.isdecimal() and len(text) <= 9 and 1 <= int(text) <= len(assembly),
+        "operation",
+        f"a whole number from 1 to {len(assembly)} is needed",
+    )
     k = int(text) - 1
-    if row.text("part") != assembly.operations[k].main:
-        row.fail("part", f"'{assembly.operations[k].main}' is needed, the part that operation {k + 1} moves")
+    row.require(
+        row.text("part") == assembly.operations[k].main,
+        "part",
+        f"'{assembly.operations[k].main}' is needed, the part that operation {k + 1} moves",
+    )
     return k
 
 
@@ -113,17 +119,17 @@ def _pose(row: CsvRow) -> Array:
     position = [row.number(name, FARTHEST_M) for name in _POSITION]
     x, *others = (row.cells[name] for name in _POSITION)
     for other in others:
-        if other[2] != x[2]:
-            raise InputError(
-                f"{row.file}: the columns '{x[0]}' and '{other[0]}' are of different units; "
-                "give all three positions in mm, or all in m."
-            )
-    q = np.array([row.number(name, 2.0) for name in _QUATERNION])
-    if abs(np.linalg.norm(q) - 1.0) > 1e-3:
-        raise InputError(
-            f"{row.file}, line {row.line}, columns qw to qz: a quaternion of length 1 (within 0.001) is needed, "
-            f"one of length {np.linalg.norm(q):.4g} was given; divide it by its length."
+        require(
+            other[2] == x[2],
+            f"{row.file}: the columns '{x[0]}' and '{other[0]}' are of different units; "
+            "give all three positions in mm, or all in m.",
         )
+    q = np.array([row.number(name, 2.0) for name in _QUATERNION])
+    require(
+        abs(np.linalg.norm(q) - 1.0) <= 1e-3,
+        f"{row.file}, line {row.line}, columns qw to qz: a quaternion of length 1 (within 0.001) is needed, "
+        f"one of length {np.linalg.norm(q):.4g} was given; divide it by its length.",
+    )
     return pose.unpack(np.array([*position, *q]))
 
 
@@ -143,15 +149,14 @@ def _play(rows: Sequence[CsvRow], assumed: float) -> float:
     """The play of parts that fit, [m], which is one number for all rows."""
     stated = [(row, row.number("play", FARTHEST_M)) for row in rows if row.text("play")]
     for row, x in stated:
-        if x < 0.0:
-            row.fail("play", "a length from 0 is needed")
-        if x != stated[0][1]:
-            row.fail("play", f"one length for all rows is needed, line {stated[0][0].line} says another")
+        row.require(x >= 0.0, "play", "a length from 0 is needed")
+        row.require(
+            x == stated[0][1], "play", f"one length for all rows is needed, line {stated[0][0].line} says another"
+        )
     return stated[0][1] if stated else assumed
 
 
 def _flag(row: CsvRow) -> bool:
     text = row.text("seen").lower()
-    if text not in _FLAGS:
-        row.fail("seen", "true or false is needed")
+    row.require(text in _FLAGS, "seen", "true or false is needed")
     return _FLAGS[text]

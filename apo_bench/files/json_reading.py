@@ -108,16 +108,20 @@ def _shared(node: JsonNode, n: int) -> SharedError:
     """An error that operations share."""
     fields = node.fields(("name", "operations", "covariance_mm_deg"), ("frame", "local", "correlation"))
     operations = tuple(entry.integer() - 1 for entry in fields["operations"].items("operation"))
-    if not operations or len(set(operations)) != len(operations) or not all(0 <= k < n for k in operations):
-        fields["operations"].fail(f"operations from 1 to {n}, each once, are needed")
+    fields["operations"].require(
+        operations and len(set(operations)) == len(operations) and all(0 <= k < n for k in operations),
+        f"operations from 1 to {n}, each once, are needed",
+    )
     if "local" in fields and "frame" not in fields:
         fields["local"].fail("a frame is needed with it", "state the frame, or leave this out")
     m = len(operations)
     correlation = None
     if "correlation" in fields:
         correlation = fields["correlation"].numbers(m, m)
-        if np.abs(correlation - correlation.T).max() > 1e-9 or np.abs(np.diag(correlation) - 1.0).max() > 1e-9:
-            fields["correlation"].fail("a symmetric matrix with 1 on its diagonal is needed")
+        fields["correlation"].require(
+            np.abs(correlation - correlation.T).max() <= 1e-9 and np.abs(np.diag(correlation) - 1.0).max() <= 1e-9,
+            "a symmetric matrix with 1 on its diagonal is needed",
+        )
     return SharedError(
         name=fields["name"].text(),
         operations=operations,
@@ -134,12 +138,16 @@ def _tails(node: JsonNode, n: int) -> Tails:
     fields = node.fields(keys)
     units = TO_MM_DEG[[0, 0, 3, 3]]
     axes = fields["axes"].numbers(n, 3, 3)
-    if np.abs(axes @ np.swapaxes(axes, 1, 2) - np.eye(3)).max(initial=0.0) > 1e-6:
-        fields["axes"].fail("a rotation matrix for each operation is needed")
+    fields["axes"].require(
+        np.abs(axes @ np.swapaxes(axes, 1, 2) - np.eye(3)).max(initial=0.0) <= 1e-6,
+        "a rotation matrix for each operation is needed",
+    )
     matrices = {key: fields[key].numbers(2 if key == "limits_mm_deg" else 4) for key in keys[1:-1]}
     for key, numbers in matrices.items():
-        if not (numbers > 0.0).all() or (key == "degrees_of_freedom" and numbers.min() < _LEAST_FREEDOM):
-            fields[key].fail(f"numbers above {_LEAST_FREEDOM if key == 'degrees_of_freedom' else 0.0:g} are needed")
+        fields[key].require(
+            (numbers > 0.0).all() and (key != "degrees_of_freedom" or numbers.min() >= _LEAST_FREEDOM),
+            f"numbers above {_LEAST_FREEDOM if key == 'degrees_of_freedom' else 0.0:g} are needed",
+        )
     return Tails(
         frames=axes,
         scales=matrices["scales_mm_deg"] / units,
@@ -155,10 +163,11 @@ def _scenario(node: JsonNode, wanted: Scenario | None, folder: Path) -> Scenario
 
     name = node.text()
     if wanted is not None:
-        if Path(name).stem != wanted.name:
-            node.fail(
-                f'the scenario "{wanted.name}" was asked for', "give the file of that scenario, or ask for its own"
-            )
+        node.require(
+            Path(name).stem == wanted.name,
+            f'the scenario "{wanted.name}" was asked for',
+            "give the file of that scenario, or ask for its own",
+        )
         return wanted
     return load_scenario(folder / name if name.endswith(".toml") or "/" in name else name)
 
@@ -171,10 +180,16 @@ def _operations(
         for entry in node.items("operation", len(assembly))
     ]
     for k, (entry, operation) in enumerate(zip(entries, assembly.operations, strict=True)):
-        if entry["operation"].integer() != k + 1:
-            entry["operation"].fail(f"{k + 1} is needed", "the operations stand in order, numbered from 1")
-        if entry["part"].text() != operation.main:
-            entry["part"].fail(f'"{operation.main}" is needed', "it is the part that this operation moves")
+        entry["operation"].require(
+            entry["operation"].integer() == k + 1,
+            f"{k + 1} is needed",
+            "the operations stand in order, numbered from 1",
+        )
+        entry["part"].require(
+            entry["part"].text() == operation.main,
+            f'"{operation.main}" is needed',
+            "it is the part that this operation moves",
+        )
     return entries
 
 
@@ -196,13 +211,22 @@ def _poses(node: JsonNode, scenario: Scenario) -> Poses:
 def _covariance(node: JsonNode, *, definite: bool = True) -> Array:
     C = node.numbers(6, 6)
     largest = float(np.abs(C).max())
-    if np.abs(C - C.T).max() > 1e-9 * largest:
-        node.fail("a symmetric 6 x 6 matrix is needed", "entry (i, j) must equal entry (j, i)")
+    node.require(
+        np.abs(C - C.T).max() <= 1e-9 * largest,
+        "a symmetric 6 x 6 matrix is needed",
+        "entry (i, j) must equal entry (j, i)",
+    )
     lowest = float(np.linalg.eigvalsh((C + C.T) / 2)[0])
-    if definite and lowest <= 1e-15 * largest:
-        node.fail("a positive definite 6 x 6 matrix is needed", "every variance must be above 0 and consistent")
-    if not definite and lowest < -1e-9 * largest:
-        node.fail("a positive semidefinite 6 x 6 matrix is needed", "no variance may be negative")
+    node.require(
+        not definite or lowest > 1e-15 * largest,
+        "a positive definite 6 x 6 matrix is needed",
+        "every variance must be above 0 and consistent",
+    )
+    node.require(
+        definite or lowest >= -1e-9 * largest,
+        "a positive semidefinite 6 x 6 matrix is needed",
+        "no variance may be negative",
+    )
     return (C + C.T) / 2 / np.outer(TO_MM_DEG, TO_MM_DEG)
 
 
@@ -231,8 +255,9 @@ def _stated(entry: Mapping[str, JsonNode], assumed: tuple[float, float] | None) 
 
 def _deviation(node: JsonNode, limits: tuple[float, float], unit: float) -> float:
     x = node.number(0.0, above=True)
-    if not is_within(x * unit, limits):
-        node.fail(f"a standard deviation from {limits[0] / unit:g} to {limits[1] / unit:g} is needed")
+    node.require(
+        is_within(x * unit, limits), f"a standard deviation from {limits[0] / unit:g} to {limits[1] / unit:g} is needed"
+    )
     return x
 
 
@@ -246,7 +271,6 @@ def _step(node: JsonNode, goals: Array) -> tuple[Step, Array]:
     stated = isinstance(node.value, dict) and any(key in node.value for key in _POSE)
     fields = node.fields(("operation", *_POSE) if stated else ("operation",), ("undo",) if stated else ("undo", *_POSE))
     number = fields["operation"].integer()
-    if not 1 <= number <= len(goals):
-        fields["operation"].fail(f"an operation from 1 to {len(goals)} is needed")
+    fields["operation"].require(1 <= number <= len(goals), f"an operation from 1 to {len(goals)} is needed")
     step = Step(number - 1, fields["undo"].flag() if "undo" in fields else False)
     return step, _pose(fields) if stated else goals[step.operation]

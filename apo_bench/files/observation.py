@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Observation
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.files.csv_form import read_table
 from apo_bench.files.deviations import DEVIATION_DEG, DEVIATION_MM, check_deviations
 from apo_bench.geometry import FARTHEST_M
@@ -62,8 +62,9 @@ def read_observation_file(
     deviation_mm = DEVIATION_MM if deviation_mm is None else deviation_mm
     deviation_deg = DEVIATION_DEG if deviation_deg is None else deviation_deg
     check_deviations(deviation_mm, deviation_deg)
-    if not isinstance(path, str | Path):
-        raise InputError(f"{path!r} was given as an observation; give the path of a .csv or .json file.")
+    require(
+        isinstance(path, str | Path), f"{path!r} was given as an observation; give the path of a .csv or .json file."
+    )
     known = load_scenario(scenario)
     if Path(path).suffix.lower() != ".csv":
         seen, assumed = json_reading.read_json_observed(path, known, (deviation_mm, deviation_deg))
@@ -86,10 +87,10 @@ def read_stated(path: str | Path, scenario: Scenario) -> Observation:
         _check_near(path, observation)
         return observation
     observation, _, assumed = read_observation_file(path, scenario)
-    if assumed:
-        raise InputError(
-            f"{path}: standard deviations are missing; add columns deviation_mm and deviation_deg, filled in every row."
-        )
+    require(
+        not assumed,
+        f"{path}: standard deviations are missing; add columns deviation_mm and deviation_deg, filled in every row.",
+    )
     return observation
 
 
@@ -113,8 +114,8 @@ def as_planned(scenario: Scenario, deviation_mm: float, deviation_deg: float) ->
 def _check_near(path: str | Path, observation: Observation) -> None:
     """Refuse poses so far away that nothing can be computed with them; a CSV file is checked cell by cell."""
     for k, T in enumerate(observation.goals):
-        if np.abs(T[:3, 3]).max() > FARTHEST_M:
-            raise InputError(
-                f"{path}, operation {k + 1}, position_mm: numbers of at most {FARTHEST_M * 1e3:g} are needed, "
-                f"{np.abs(T[:3, 3]).max() * 1e3:g} was given."
-            )
+        require(
+            np.abs(T[:3, 3]).max() <= FARTHEST_M,
+            f"{path}, operation {k + 1}, position_mm: numbers of at most {FARTHEST_M * 1e3:g} are needed, "
+            f"{np.abs(T[:3, 3]).max() * 1e3:g} was given.",
+        )

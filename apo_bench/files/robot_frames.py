@@ -33,8 +33,7 @@ def read_robot_frames(path: str | Path) -> RobotFrames:
     """
     top = read_toml(path, "robot file").fields_of(_SCHEMA, (), ("base", "flange_to_tip", "quaternion"))
     order = top["quaternion"].text() if "quaternion" in top else "xyzw"
-    if order not in ("xyzw", "wxyz"):
-        top["quaternion"].fail("xyzw or wxyz is needed")
+    top["quaternion"].require(order in ("xyzw", "wxyz"), "xyzw or wxyz is needed")
     return RobotFrames(
         read_any_pose(top["base"]) if "base" in top else np.eye(4),
         read_any_pose(top["flange_to_tip"]) if "flange_to_tip" in top else None,

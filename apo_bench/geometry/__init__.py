@@ -2,8 +2,9 @@
 
 from apo_bench.geometry.arrays import Array, Ints, NotReal, copyable, freeze, frozen, real, remembered
 from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.convex import ball_around, separating_axes, shadow
+from apo_bench.geometry.convex import ball_around, balls_apart, passage, separating_axes, shadow
 from apo_bench.geometry.drop import TOUCH_M, drop_depths
+from apo_bench.geometry.exact_turns import depth_inside
 from apo_bench.geometry.flips import Flips, approximate_symmetries
 from apo_bench.geometry.holds import FINGER_ROOM_M, PAD_M, PadPlace, held_span, held_width, holds_whole
 from apo_bench.geometry.hull import SAGITTA_M, Cylinder, Hull, cylinder_hull, first_of_each, sides_of
@@ -56,9 +57,11 @@ __all__ = (
     "all_boxes",
     "approximate_symmetries",
     "ball_around",
+    "balls_apart",
     "beside",
     "copyable",
     "cylinder_hull",
+    "depth_inside",
     "drop_depths",
     "exit_distance",
     "exp_and_jacobian",
@@ -78,6 +81,7 @@ __all__ = (
     "nearest_alike",
     "nearest_symmetric_pose",
     "overlap_area",
+    "passage",
     "physical_pieces",
     "plane_across",
     "polygons_of",

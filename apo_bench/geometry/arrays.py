@@ -3,7 +3,7 @@
 import copyreg
 from collections.abc import Callable, Mapping
 from dataclasses import fields
-from functools import wraps
+from functools import partial, wraps
 from types import MappingProxyType
 from typing import Any, ParamSpec, TypeVar
 from weakref import WeakKeyDictionary
@@ -57,19 +57,19 @@ def frozen(value: ArrayLike, *shape: int | None) -> Array:
     return array
 
 
-def freeze(record: Any, **shapes: tuple[int | None, ...]) -> None:
+def freeze(record: Any, **shapes: tuple[int | None, ...] | None) -> None:
     """Have fields of a frozen dataclass hold read-only copies of what they were given; those that are None stay so.
 
     Args:
-        shapes: Field -> the shape of its array, as in `frozen`, or of each array in it, if it is a mapping.
+        shapes: Field -> the shape of its array, as in `frozen`, or of each array in it, if it is a mapping; None: it is
+            a mapping of other things.
     """
     for name, shape in shapes.items():
         value = getattr(record, name)
         if isinstance(value, Mapping):
-            object.__setattr__(
-                record, name, MappingProxyType({key: frozen(each, *shape) for key, each in value.items()})
-            )
-        elif value is not None:
+            kept = value if shape is None else {key: frozen(each, *shape) for key, each in value.items()}
+            object.__setattr__(record, name, MappingProxyType(dict(kept)))
+        elif value is not None and shape is not None:
             object.__setattr__(record, name, frozen(value, *shape))
 
 
@@ -85,11 +85,7 @@ def copyable(record: type[Record]) -> type[Record]:
 def _reduced(record: Any) -> tuple[Any, ...]:
     values = {field.name: getattr(record, field.name) for field in fields(record)}
     plain = {name: dict(value) if isinstance(value, MappingProxyType) else value for name, value in values.items()}
-    return _again, (type(record), plain)
-
-
-def _again(record: type[Any], values: Mapping[str, Any]) -> Any:
-    return record(**values)
+    return partial(record.__class__, **plain), ()
 
 
 def remembered(function: Callable[Arguments, Answer]) -> Callable[Arguments, Answer]:

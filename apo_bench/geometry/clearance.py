@@ -1,20 +1,14 @@
 """The physical part: fit faces recede by the clearance, nothing else moves."""
 
-from collections.abc import Sequence
-from typing import Any, NamedTuple
-
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry.arrays import Array, remembered
 from apo_bench.geometry.hull import Hull, cylinder_hull
-from apo_bench.geometry.overlap import SLIVER_M2
 from apo_bench.geometry.polygon import flat_area, plane_across
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Box, Face, Piece, Solid, all_boxes
 
-_IN_PLANE_M = 1e-9
-"""A face and a side of a box this near to each other lie in one plane."""
 _ON_M = 1e-7
 _PARALLEL = 1e-7
 """A side lies on a face if it is this near to its plane, [m], or touches its cylinder or cone so nearly."""
@@ -40,17 +34,16 @@ def physical_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
         InputError: The clearance is negative or not finite, swallows a piece, or a side of a box carries both a fit
             face and another one.
     """
-    if not np.isfinite(clearance_m) or clearance_m < 0:
-        raise InputError(
-            f"a clearance of {1e3 * clearance_m:g} mm was given for part '{solid.name}'; "
-            "give a finite length per side that is not negative."
-        )
+    require(
+        np.isfinite(clearance_m) and clearance_m >= 0,
+        f"a clearance of {1e3 * clearance_m:g} mm was given for part '{solid.name}'; "
+        "give a finite length per side that is not negative.",
+    )
     if not solid.fits:
         return solid.pieces
     if not all_boxes(solid.pieces):
         return _receded_hulls(solid, clearance_m)
-    sides = list(map(_side, solid.faces.values()))
-    return tuple(_receded(solid, box, sides, clearance_m) for box in solid.pieces if isinstance(box, Box))
+    return tuple(_receded(solid, box, clearance_m) for box in solid.pieces if isinstance(box, Box))
 
 
 @remembered
@@ -60,62 +53,30 @@ def _receded_hulls(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
     return tuple(receded_hull(solid, hull, clearance_m) for hull in hulls)
 
 
-class _Side(NamedTuple):
-    """A face as a polygon on an axis-aligned plane."""
-
-    name: str
-    fit: bool
-    axis: int
-    sign: int
-    height: float
-    shape: Any
-
-
-def _side(face: Face) -> _Side:
-    """A face, along the axis that it looks along; its shape in the two coordinates that follow cyclically."""
-    n = face.normal
-    axis = int(np.abs(n).argmax())
-    shape = flat_area(face.outline, face.holes, np.eye(3)[:, [(axis + 1) % 3, (axis + 2) % 3]])
-    return _Side(face.name, face.fit, axis, int(np.sign(n[axis])), float(face.outline[0, axis]), shape)
-
-
-def _receded(solid: Solid, box: Box, sides: Sequence[_Side], clearance_m: float) -> Box:
+def _receded(solid: Solid, box: Box, clearance_m: float) -> Box:
     # Each side that carries a fit face moves inwards: a half size loses half of what both sides lose, the centre goes
     # away from the side that loses more.
-    carries = [[_carries_fit(solid, box, sides, axis, sign) for sign in (-1, 1)] for axis in range(3)]
-    recede = clearance_m * np.array(carries, dtype=np.float64)
-    half = box.half - recede.sum(axis=1) / 2
-    if (half < _THINNEST_M).any():
-        raise InputError(
-            f"a clearance of {1e3 * clearance_m:g} mm leaves less than {2e3 * _THINNEST_M:g} mm of box '{box.name}' "
-            f"of part '{solid.name}'; give less."
-        )
-    return Box(box.name, box.center + (recede[:, 0] - recede[:, 1]) / 2, half)
+    high, low = clearance_m * np.array([_carries_fit(solid, box, side) for side in box.planes]).reshape(2, 3)
+    half = box.half - (low + high) / 2
+    require(
+        (half >= _THINNEST_M).all(),
+        f"a clearance of {1e3 * clearance_m:g} mm leaves less than {2e3 * _THINNEST_M:g} mm of box '{box.name}' "
+        f"of part '{solid.name}'; give less.",
+    )
+    return Box(box.name, box.center + (low - high) / 2, half)
 
 
-def _carries_fit(solid: Solid, box: Box, sides: Sequence[_Side], axis: int, sign: int) -> bool:
-    """Whether a side of the box carries a fit face, or a piece of one; it must then carry no other."""
-    height = box.center[axis] + sign * box.half[axis]
-    near = [s for s in sides if (s.axis, s.sign) == (axis, sign) and abs(s.height - height) < _IN_PLANE_M]
-    if not any(side.fit for side in near):
-        return False
-    on = [side for side in near if side.shape.intersection(_rectangle(box, axis)).area > SLIVER_M2]
-    fit = [side.name for side in on if side.fit]
-    other = [side.name for side in on if not side.fit]
+def _carries_fit(solid: Solid, box: Box, side: Array) -> bool:
+    """Whether a side of the box, (n, d), carries a fit face, or a piece of one; it must then carry no other."""
+    on = [face for face in solid.faces.values() if _on_flat(face, box, side)]
+    fit = [face.name for face in on if face.fit]
+    other = [face.name for face in on if not face.fit]
     if fit and other:
         raise InputError(
             f"box '{box.name}' of part '{solid.name}' has the fit face '{fit[0]}' and the face '{other[0]}' on one "
             "side, which cannot recede for one of them only; cut the box in two, or mark both faces or none."
         )
     return bool(fit)
-
-
-def _rectangle(box: Box, axis: int) -> Any:
-    """The shadow of the box along an axis."""
-    import shapely
-
-    plane = [(axis + 1) % 3, (axis + 2) % 3]
-    return shapely.box(*(box.center - box.half)[plane], *(box.center + box.half)[plane])
 
 
 def receded_hull(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
@@ -202,7 +163,7 @@ def _on_round(face: RoundFace, hull: Hull, side: Array) -> bool:
     return bool(at.max() > face.span[0] + _ON_M and at.min() < face.span[1] - _ON_M)
 
 
-def _on_flat(face: Face, hull: Hull, side: Array) -> bool:
+def _on_flat(face: Face, piece: Piece, side: Array) -> bool:
     """Whether a side lies in the plane of a face and covers some of it."""
     from shapely import MultiPoint
 
@@ -211,13 +172,13 @@ def _on_flat(face: Face, hull: Hull, side: Array) -> bool:
     if n @ face.normal < 1.0 - _PARALLEL or abs(n @ face.outline[0] - d) > _ON_M:
         return False
     to_plane = plane_across(n)
-    own = MultiPoint(_corners_on(hull, side) @ to_plane).convex_hull
+    own = MultiPoint(_corners_on(piece, side) @ to_plane).convex_hull
     return bool(own.intersection(flat_area(face.outline, face.holes, to_plane)).area > _SLIVER * own.area)
 
 
-def _corners_on(hull: Hull, side: Array) -> Array:
+def _corners_on(piece: Piece, side: Array) -> Array:
     """The corners of a side, (k, 3)."""
-    return np.asarray(hull.corners[np.abs(hull.corners @ side[:3] - side[3]) < _ON_M])
+    return np.asarray(piece.corners[np.abs(piece.corners @ side[:3] - side[3]) < _ON_M])
 
 
 def _middle(planes: Array) -> tuple[Array, float]:

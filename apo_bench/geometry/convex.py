@@ -9,6 +9,8 @@ from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.solid import Piece
 
+_ALONG = 1e-12
+"""Cosine between a ray and the normal of a plane that it goes along."""
 _PARALLEL = 1e-6
 """Edges whose cross product is shorter give no direction of their own."""
 
@@ -63,6 +65,25 @@ def _crossed(edges_a: Array, edges_b: Array) -> Array:
     return np.asarray(crossed[kept] / length[kept, None])
 
 
+def passage(planes: Array, start: Array, way: Array) -> tuple[Array, Array]:
+    """How far rays go until they enter a convex piece, and until they leave it, (*,) each; inf and -inf if they miss.
+
+    Args:
+        planes: (s, 4), n . x <= d inside, [m].
+        start, way: (*, 3), where each ray begins and its unit vector; one of them may be the same for all, (3,).
+    """
+    # n . (s + t w) = d at t = (d - n . s) / (n . w): entered by planes against the way, left by planes along it; on
+    # which side of a plane a ray along it is, it says where it begins.
+    rate = way @ planes[:, :3].T
+    room = planes[:, 3] - start @ planes[:, :3].T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = room / rate
+    enter = np.where(rate < -_ALONG, at, -np.inf).max(axis=-1)
+    leave = np.where(rate > _ALONG, at, np.inf).min(axis=-1)
+    missed = ((np.abs(rate) <= _ALONG) & (room < 0.0)).any(axis=-1) | (enter >= leave)
+    return np.where(missed, np.inf, enter), np.where(missed, -np.inf, leave)
+
+
 @lru_cache(maxsize=1024)
 def all_corners(pieces: tuple[Piece, ...]) -> tuple[Array, NDArray[np.intp]]:
     """The corners of all pieces, (k, 3), in the frame of their solid, [m], and where those of each begin."""
@@ -83,3 +104,11 @@ def ball_around(pieces: tuple[Piece, ...]) -> tuple[Array, float]:
     low = (centers - halves).min(axis=0)
     high = (centers + halves).max(axis=0)
     return frozen((low + high) / 2, 3), float(np.linalg.norm(high - low)) / 2
+
+
+def balls_apart(a: tuple[Piece, ...], T_a: Array, b: tuple[Piece, ...], T_b: Array) -> float:
+    """How far the balls around all pieces of two posed solids are apart, [m]; negative where they overlap."""
+    middle_a, radius_a = ball_around(a)
+    middle_b, radius_b = ball_around(b)
+    between = T_a[:3, :3] @ middle_a + T_a[:3, 3] - T_b[:3, :3] @ middle_b - T_b[:3, 3]
+    return float(np.sqrt(between @ between)) - radius_a - radius_b

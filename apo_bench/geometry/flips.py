@@ -58,7 +58,8 @@ def approximate_symmetries(solid: Solid, least_share: float = LEAST_SHARE) -> Fl
     shares = np.ones(len(turns))
     turned = np.concatenate([np.zeros((0, 3)), *(pose.apply(F, points) for F in turns[~exact])])
     # Share = volume of the points that lie in the part after the turn, over the volume of all points.
-    shares[~exact] = _covered(solid.pieces, turned).reshape(-1, len(points)) @ weights / weights.sum()
+    covered = np.any([_inside(piece, turned) for piece in solid.pieces], axis=0)
+    shares[~exact] = covered.reshape(-1, len(points)) @ weights / weights.sum()
     kept = shares >= least_share
     answer = Flips(turns[kept], shares[kept], exact[kept])
     for array in answer:
@@ -80,14 +81,10 @@ def _points(solid: Solid) -> tuple[Array, Array]:
     half = np.array([piece.half for piece in pieces])[own]
     points = np.array([piece.center for piece in pieces])[own] + (2.0 * unit - 1.0) * half
     weights = half.prod(axis=1)
-    counts = np.zeros(len(points))
-    drawn = np.zeros(len(points), dtype=np.bool_)
-    for i, piece in enumerate(pieces):
-        inside = _inside(piece, points)
-        counts += inside
-        drawn |= inside & (own == i)
+    inside = np.array([_inside(piece, points) for piece in pieces])
+    drawn = inside[own, np.arange(len(own))]
     # A point of a piece that lies in c pieces at once is drawn in each of them, so it counts 1 / c.
-    return points[drawn], weights[drawn] / counts[drawn]
+    return points[drawn], weights[drawn] / inside.sum(axis=0)[drawn]
 
 
 def _axes(solid: Solid) -> Array:
@@ -96,14 +93,6 @@ def _axes(solid: Solid) -> Array:
     if J is None or np.abs(J - np.diag(np.diag(J))).max() < _ALIGNED * np.trace(J):
         return np.eye(3)
     return np.asarray(np.linalg.eigh(J)[1].T)
-
-
-def _covered(pieces: tuple[Piece, ...], points: Array) -> NDArray[np.bool_]:
-    """Which points, (k, 3), are in one of the pieces, (k,)."""
-    covered = np.zeros(len(points), dtype=np.bool_)
-    for piece in pieces:
-        covered |= _inside(piece, points)
-    return covered
 
 
 def _inside(piece: Piece, points: Array) -> NDArray[np.bool_]:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import all_corners
+from apo_bench.geometry.convex import all_corners, passage
 from apo_bench.geometry.hull import Hull
 from apo_bench.geometry.polygon import plane_across
 from apo_bench.geometry.solid import Piece, Solid, extent
@@ -182,7 +182,7 @@ def _cast(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Arra
     high = np.full((*T.shape, len(met)), -np.inf)
     for k, i in enumerate(met):
         here = slice(h0[i], h1[i]), slice(t0[i], t1[i])
-        ends = _ends(pieces[i], across, start[here].reshape(-1, 3))
+        ends = passage(pieces[i].planes, start[here].reshape(-1, 3), across)
         low[(*here, k)], high[(*here, k)] = (end.reshape(T[here].shape) for end in ends)
     return _Rays(T.ravel(), H.ravel(), *(end.reshape(T.size, len(met)) for end in (low, high)))
 
@@ -191,20 +191,6 @@ def _over(places: Array, at: Array, first: NDArray[np.intp]) -> tuple[NDArray[np
     """Of rising places, the first in the shadow of each piece and the one behind its last."""
     low = np.searchsorted(places, np.minimum.reduceat(at, first) - _ROUNDING_M)
     return low, np.searchsorted(places, np.maximum.reduceat(at, first) + _ROUNDING_M)
-
-
-def _ends(piece: Piece, across: Array, start: Array) -> tuple[Array, Array]:
-    """Where rays from (r, 3) enter and leave a piece, (r,) each; infinite where they miss it."""
-    # As in a slab test: inwards through planes that look against the ray, outwards through those that look along it.
-    rate = piece.planes[:, :3] @ across
-    room = piece.planes[:, 3] - start @ piece.planes[:, :3].T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        at = room / rate
-    flat = np.abs(rate) < 1e-12
-    low = np.where(rate < 0.0, at, -np.inf)[:, ~flat].max(axis=1, initial=-np.inf)
-    high = np.where(rate > 0.0, at, np.inf)[:, ~flat].min(axis=1, initial=np.inf)
-    missed = (room[:, flat] < 0.0).any(axis=1) | (low >= high)
-    return np.where(missed, np.inf, low), np.where(missed, -np.inf, high)
 
 
 def _clusters(rays: _Rays, within: NDArray[np.bool_]) -> list[tuple[float, float]]:

@@ -12,7 +12,7 @@ from apo_bench.geometry.convex import (
     across_edges,
     across_sides,
     all_corners,
-    ball_around,
+    balls_apart,
     box_axes,
     boxes_around,
     separating_axes,
@@ -41,10 +41,7 @@ def intrusion(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
     Separating axes: two pieces are apart if their shadows are apart along a normal of a side or along a cross product
     of two edges. The depth is the shortest way out.
     """
-    middle_a, reach_a = ball_around(a.pieces)
-    middle_b, reach_b = ball_around(b.pieces)
-    between = T_a[:3, :3] @ middle_a + T_a[:3, 3] - T_b[:3, :3] @ middle_b - T_b[:3, 3]
-    if between @ between > (reach_a + reach_b + _TOUCHING_M) ** 2:
+    if balls_apart(a.pieces, T_a, b.pieces, T_b) > _TOUCHING_M:
         return 0.0
     return max(0.0, float(intrusion_depths(a.pieces, T_a[:3, :3], T_a[None, :3, 3], b.pieces, T_b)[0]))
 

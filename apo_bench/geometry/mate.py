@@ -4,14 +4,13 @@ All that asks whether such a contact is closed asks this: the judge, the checks 
 """
 
 from dataclasses import dataclass
-from functools import lru_cache
-from typing import Any, final
+from typing import final
 
 import numpy as np
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.overlap import NO_OVERLAP, Overlap, face_shape, plane_frame
+from apo_bench.geometry.overlap import NO_OVERLAP, Overlap, own_shape, plane_frame
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Face
 
@@ -87,7 +86,7 @@ def _coaxial(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Mate:
         points = ends[0] + np.outer((np.array([low, high]) - at[0]) / (at[1] - at[0]), ends[1] - ends[0])
         common = _unrolled([(low, high)], b.radius * min(a.extent_rad, b.extent_rad), points)
     rise, sine = _rise(b, T_b, a, T_a) if b.kind == "cone" else (0.0, 0.0)
-    angle = _angle(u, v) if b.kind == "cone" else _between(u, v)
+    angle = angle_between(u, v) if b.kind == "cone" else _between(u, v)
     length = max(0.0, float(high - low))
     return Mate(points, _across(points - origin, along), v, angle, rise, sine, common, length)
 
@@ -105,7 +104,7 @@ def _on_rim(a: RoundFace, T_a: Array, b: RoundFace, T_b: Array) -> Mate:
     fits = min(cone.radii) - _RIM_M * _EDGE_ON <= rim.radius <= max(cone.radii) + _RIM_M * _EDGE_ON
     over = fits and float(np.linalg.norm(off)) < rim.radius
     common = _unrolled([(0.0, _RIM_M)], rim.radius * min(a.extent_rad, b.extent_rad), middle) if over else NO_OVERLAP
-    return Mate(points, off, v, _angle(u, v), rise, sine, common, 0.0)
+    return Mate(points, off, v, angle_between(u, v), rise, sine, common, 0.0)
 
 
 def _on_plane(shaft: RoundFace, T_shaft: Array, flat: Face, T_flat: Array, *, of_plane: bool) -> Mate:
@@ -117,14 +116,14 @@ def _on_plane(shaft: RoundFace, T_shaft: Array, flat: Face, T_flat: Array, *, of
     ends = pose.apply(T_shaft, shaft.ends)
     n = T_flat[:3, :3] @ flat.normal
     axis = T_shaft[:3, :3] @ shaft.axis
-    frame = T_flat @ plane_frame(flat)
-    lines = _lines(pose.apply(pose.inverse(frame), ends)[:, :2], flat) if _reaches(shaft, T_shaft, n) else []
+    flat_ends = pose.apply(pose.inverse(T_flat @ plane_frame(flat)), ends)[:, :2]
+    lines = _lines(flat_ends, flat) if _reaches(shaft, T_shaft, n) else []
     at = np.array(lines).reshape(-1) if lines else np.array([0.0, 1.0])
     points = ends[0] + np.outer([at.min(), at.max()], ends[1] - ends[0])
     heights = (points - pose.apply(T_flat, flat.outline[:1])) @ n - shaft.radius
     common = NO_OVERLAP
     if lines and of_plane:
-        common = _shadow(lines, pose.apply(pose.inverse(frame), ends)[:, :2], shaft.radius, points)
+        common = _shadow(lines, flat_ends, shaft.radius, points)
     elif lines:
         spans = shaft.span[0] + shaft.length * np.array(lines)
         common = _unrolled([(low, high) for low, high in spans], 2.0 * shaft.radius, points)
@@ -147,8 +146,8 @@ def _across(v: Array, axis: Array) -> Array:
     return np.asarray(v - (v @ axis)[..., None] * axis)
 
 
-def _angle(u: Array, v: Array) -> float:
-    """Between two vectors, exact also where the cosine is flat, [rad]."""
+def angle_between(u: Array, v: Array) -> float:
+    """The angle between two vectors, exact also where the cosine is flat, [rad]."""
     return float(np.arctan2(np.linalg.norm(np.cross(u, v)), u @ v))
 
 
@@ -163,7 +162,7 @@ def _reaches(shaft: RoundFace, T: Array, n: Array) -> bool:
         return True
     down = _across(-n, T[:3, :3] @ shaft.axis)
     toward = T[:3, :3] @ shaft.toward
-    return _angle(down, toward) <= shaft.extent_rad / 2 + _EDGE_ON
+    return angle_between(down, toward) <= shaft.extent_rad / 2 + _EDGE_ON
 
 
 def _lines(ends: Array, flat: Face) -> list[tuple[float, float]]:
@@ -174,7 +173,7 @@ def _lines(ends: Array, flat: Face) -> list[tuple[float, float]]:
     # A line that stands on the face covers nothing of it.
     if way @ way < _EDGE_ON**2 * 1e-6:
         return []
-    covered = LineString(ends).intersection(_flat_shape(flat))
+    covered = LineString(ends).intersection(own_shape(flat))
     pieces = [
         piece
         for piece in getattr(covered, "geoms", (covered,))
@@ -182,11 +181,6 @@ def _lines(ends: Array, flat: Face) -> list[tuple[float, float]]:
     ]
     cut = [np.sort((np.asarray(piece.coords)[[0, -1]] - ends[0]) @ way / (way @ way)) for piece in pieces]
     return [(float(low), float(high)) for low, high in cut if high > low]
-
-
-@lru_cache(maxsize=1024)
-def _flat_shape(flat: Face) -> Any:
-    return face_shape(flat, pose.inverse(plane_frame(flat)))
 
 
 def _shadow(lines: list[tuple[float, float]], ends: Array, radius: float, points: Array) -> Overlap:

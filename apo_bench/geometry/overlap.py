@@ -1,7 +1,5 @@
 """How much of one face covers another, and where: the corners at which a contact is measured (Fig. 1)."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, final
@@ -34,7 +32,7 @@ class Overlap:
     def __post_init__(self) -> None:
         freeze(self, corners=(None, 3))
 
-    def share(self, of: Overlap) -> float:
+    def share(self, of: "Overlap") -> float:
         """How much of another overlap on the same lower face this one covers, 0 to 1; 1 if that one is empty."""
         if not of:
             return 1.0
@@ -77,12 +75,12 @@ def overlap_area(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
 def beside(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
     """How far `face`, projected onto the plane of `on`, lies beside it, [m]; 0 if one covers some of the other."""
     upper = face_shape(face, _into_plane(on) @ pose.inverse(T_on) @ T_face)
-    return float(upper.distance(_own_shape(on)))
+    return float(upper.distance(own_shape(on)))
 
 
 def face_area(face: Face) -> float:
     """The area of a face without its holes, [m^2]."""
-    return float(_own_shape(face).area)
+    return float(own_shape(face).area)
 
 
 def _common(face: Face, T_face: Array, on: Face, T_on: Array) -> tuple[Any, list[Any]]:
@@ -92,12 +90,12 @@ def _common(face: Face, T_face: Array, on: Face, T_on: Array) -> tuple[Any, list
     if abs(on.normal @ T_on_face[:3, :3] @ face.normal) < _EDGE_ON:
         return None, []
     upper = face_shape(face, _into_plane(on) @ T_on_face)
-    common = upper.intersection(_own_shape(on))
+    common = upper.intersection(own_shape(on))
     return common, [piece for piece in polygons_of(common) if piece.area > SLIVER_M2]
 
 
 @lru_cache(maxsize=4096)
-def _own_shape(face: Face) -> Any:
+def own_shape(face: Face) -> Any:
     """The face in its own plane."""
     return face_shape(face, _into_plane(face))
 

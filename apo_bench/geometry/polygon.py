@@ -11,9 +11,9 @@ _STRAIGHT_M = 1e-9
 """A point this near to the line through its neighbours is no corner."""
 
 
-def across_axis(axis: Array) -> Array:
-    """A unit vector across an axis, (3,): what is across it of the axis of the frame that is the most so."""
-    x = np.eye(3)[int(np.abs(axis).argmin())]
+def across_axis(axis: Array, toward: Array | None = None) -> Array:
+    """A unit vector across an axis, (3,): what is across it of a direction; none: of the most so axis of the frame."""
+    x = np.eye(3)[int(np.abs(axis).argmin())] if toward is None else toward
     x = x - (x @ axis) * axis
     return np.asarray(x / np.sqrt(x @ x))
 

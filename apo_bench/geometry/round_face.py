@@ -5,8 +5,10 @@ from functools import cached_property
 from typing import Literal, final
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from apo_bench.geometry.arrays import Array, copyable, freeze, frozen
+from apo_bench.geometry.polygon import across_axis
 
 RoundKind = Literal["cylinder", "cone", "rim"]
 WHOLE_TURN = 2.0 * np.pi
@@ -82,6 +84,11 @@ class RoundFace:
             return np.asarray(np.sign(self.slope) * self.axis)
         return -self.axis if self.kind == "rim" and not self.hole else self.axis
 
+    def around(self, turn_rad: ArrayLike) -> Array:
+        """Directions across the axis, (*, 3), turned about it from x of `frame`."""
+        turn = np.asarray(turn_rad)[..., None]
+        return np.asarray(np.cos(turn) * self.frame[:3, 0] + np.sin(turn) * self.frame[:3, 1])
+
     def where_wide(self, radius: float) -> Array:
         """The point of the axis, (3,), where a cone has a radius, [m]; the middle of a rim."""
         if self.kind == "rim":
@@ -92,9 +99,7 @@ class RoundFace:
     def frame(self) -> Array:
         """A frame on the axis, z along it, x towards the middle of the face if there is one, (4, 4)."""
         z = self.axis
-        x = self.toward if self.toward is not None else np.eye(3)[int(np.abs(z).argmin())]
-        x = x - (x @ z) * z
-        x = x / np.sqrt(x @ x)
+        x = across_axis(z, self.toward)
         T = np.eye(4)
         T[:3, :3] = np.column_stack([x, np.cross(z, x), z])
         T[:3, 3] = self.point

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from types import MappingProxyType
 from typing import final
 
 import numpy as np
@@ -134,9 +133,7 @@ class Solid:
     """Of density 1 about the centroid, (3, 3), [m^5]; None: that of its boxes, which do not overlap."""
 
     def __post_init__(self) -> None:
-        freeze(self, centroid=(3,), inertia=(3, 3))
-        object.__setattr__(self, "faces", MappingProxyType(dict(self.faces)))
-        object.__setattr__(self, "rounds", MappingProxyType(dict(self.rounds)))
+        freeze(self, centroid=(3,), inertia=(3, 3), faces=None, rounds=None)
 
     @property
     def fits(self) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
-from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.arrays import Array, frozen
 from apo_bench.geometry.exact_turns import carries_faces, exact_turns, fills_the_same
 from apo_bench.geometry.polygon import across_axis
 from apo_bench.geometry.round_face import RoundFace
@@ -64,8 +64,7 @@ def revolution(solid: Solid) -> Revolution | None:
     coarse = _COARSE * max(max(wall.radii) for wall in rounds)
     if not all(fills_the_same(solid, g, coarse) for g in turns):
         return None
-    over = turn_about(about.point, across_axis(about.axis), np.pi)
-    return about._replace(reversible=carries_faces(solid, over))
+    return about._replace(reversible=carries_faces(solid, _over(about)))
 
 
 def turn_about(point: Array, axis: Array, angle_rad: float) -> Array:
@@ -119,16 +118,9 @@ def _is_circle(about: Revolution, loop: Array) -> bool:
 @lru_cache(maxsize=1)
 def quarter_turns() -> Array:
     """The rotations that carry the axes of a frame onto each other, (24, 3, 3), the identity first."""
-    rotations = []
-    for order in permutations(range(3)):
-        for signs in product((1.0, -1.0), repeat=3):
-            R = np.zeros((3, 3))
-            R[range(3), order] = signs
-            if np.linalg.det(R) > 0.0:
-                rotations.append(R)
-    turns = np.array(rotations)
-    turns.flags.writeable = False
-    return turns
+    ways = product(permutations(range(3)), product((1.0, -1.0), repeat=3))
+    signed = [np.eye(3)[list(order)] * np.array(signs)[:, None] + 0.0 for order, signs in ways]
+    return frozen([R for R in signed if np.linalg.det(R) > 0.0])
 
 
 @lru_cache(maxsize=256)
@@ -144,9 +136,8 @@ def symmetries(solid: Solid) -> Array:
     revolution, which has any number of them, those are here that turn its axis: none but the identity, or one more.
     """
     if solid.rounds or not all_boxes(solid.pieces):
-        kept = _of_any_pieces(solid)
-        kept.flags.writeable = False
-        return kept
+        about = revolution(solid)
+        return frozen(exact_turns(solid) if about is None else [np.eye(4), *[_over(about)] * about.reversible])
     c = solid.centroid
     centred = [(box.center - c, box.half) for box in solid.pieces]
     turned = [R for R in quarter_turns() if _same(centred, [(R @ at, np.abs(R) @ half) for at, half in centred])]
@@ -154,17 +145,12 @@ def symmetries(solid: Solid) -> Array:
     g = np.tile(np.eye(4), (len(turned), 1, 1))
     g[:, :3, :3] = turned
     g[:, :3, 3] = c - np.array(turned) @ c
-    kept = g[[_keeps_fit(solid, T) for T in g]]
-    kept.flags.writeable = False
-    return kept
+    return frozen(g[[_keeps_fit(solid, T) for T in g]])
 
 
-def _of_any_pieces(solid: Solid) -> Array:
-    about = revolution(solid)
-    if about is None:
-        return exact_turns(solid)
-    over = turn_about(about.point, across_axis(about.axis), np.pi)
-    return np.array([np.eye(4), over] if about.reversible else [np.eye(4)])
+def _over(about: Revolution) -> Array:
+    """The turn, (4, 4), that puts a part of revolution upside down."""
+    return turn_about(about.point, across_axis(about.axis), np.pi)
 
 
 def nearest_alike(solid: Solid, T: Array, expected: Array) -> Array:

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from apo_bench.geometry.arrays import Array
+from apo_bench.geometry.pose import hat
 
 _TERMS = 24
 _SHORT = 9
@@ -15,24 +16,15 @@ _SHORT = 9
 def _generators() -> Array:
     """The matrices of the six unit twists, (6, 4, 4)."""
     G = np.zeros((6, 4, 4))
-    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
-        G[i, i, 3] = 1.0
-        G[3 + i, j, k] = -1.0
-        G[3 + i, k, j] = 1.0
+    G[range(3), range(3), 3] = 1.0
+    G[3:, :3, :3] = hat(np.eye(3)) + 0.0
     return G
 
 
 def _adjoints() -> Array:
     """The adjoint matrices of the six unit twists, (6, 6, 6)."""
     G = np.zeros((6, 6, 6))
-    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
-        for block in (slice(0, 3), slice(3, 6)):
-            turn = G[3 + i, block, block]
-            turn[j, k] = -1.0
-            turn[k, j] = 1.0
-        shift = G[i, :3, 3:]
-        shift[j, k] = -1.0
-        shift[k, j] = 1.0
+    G[3:, :3, :3] = G[3:, 3:, 3:] = G[:3, :3, 3:] = hat(np.eye(3)) + 0.0
     return G
 
 

@@ -14,7 +14,7 @@ from typing import Any, NoReturn, final
 
 import numpy as np
 
-from apo_bench.errors import InputError, one_line
+from apo_bench.errors import InputError, one_line, require
 from apo_bench.geometry import Array
 from apo_bench.io.lossless_json import unique_members
 from apo_bench.io.plain_text import UNSHOWN
@@ -48,6 +48,11 @@ class JsonNode:
         """Raise the `InputError` that says what stands here and what is allowed instead."""
         raise InputError(f"{self.place}: {allowed}, {_short(self.value)} was given{f'; {remedy}' if remedy else ''}.")
 
+    def require(self, holds: object, allowed: str, remedy: str = "") -> None:
+        """Raise that error unless something holds."""
+        if not holds:
+            self.fail(allowed, remedy)
+
     def child(self, value: Any, key: str) -> JsonNode:
         name = one_line(key, 60)
         return JsonNode(value, self.file, f"{self.key}, {name}" if self.key else name)
@@ -56,16 +61,16 @@ class JsonNode:
         """The members of an object: every required key, no unknown one."""
         required = tuple(required)
         known = (*required, *optional)
-        if not isinstance(self.value, dict):
-            self.fail("an object with named keys is needed", f"its keys are {', '.join(known)}")
+        self.require(
+            isinstance(self.value, dict), "an object with named keys is needed", f"its keys are {', '.join(known)}"
+        )
         for key in self.value:
             if key not in known:
                 near = get_close_matches(key, known, n=1, cutoff=0.5)
                 hint = f"; did you mean '{near[0]}'? Allowed" if near else "; allowed"
                 raise InputError(f"{self.place}: unknown key '{one_line(key, 60)}'{hint}: {', '.join(known)}.")
         for key in required:
-            if key not in self.value:
-                raise InputError(f"{self.place}: the key '{key}' is missing; needed are {', '.join(required)}.")
+            require(key in self.value, f"{self.place}: the key '{key}' is missing; needed are {', '.join(required)}.")
         return {key: self.child(value, key) for key, value in self.value.items()}
 
     def fields_of(self, schema: str, required: Iterable[str], optional: Iterable[str] = ()) -> Mapping[str, JsonNode]:
@@ -76,51 +81,53 @@ class JsonNode:
 
     def items(self, name: str, count: int | None = None) -> Sequence[JsonNode]:
         """The entries of a list, called `name 1`, `name 2`, ...; `count` of them if that is given."""
-        if not isinstance(self.value, list):
-            self.fail("a list is needed")
-        if count is not None and len(self.value) != count:
-            raise InputError(f"{self.file}, {self.key}: {count} entries are needed, {len(self.value)} were given.")
+        self.require(isinstance(self.value, list), "a list is needed")
+        require(
+            count is None or len(self.value) == count,
+            f"{self.file}, {self.key}: {count} entries are needed, {len(self.value)} were given.",
+        )
         return [JsonNode(value, self.file, f"{name} {i}") for i, value in enumerate(self.value, start=1)]
 
     def numbers(self, *shape: int) -> Array:
         """Finite numbers in nested lists of this shape."""
-        size = " x ".join(map(str, shape))
         array = np.array(self.value if _fits(self.value, shape) else math.nan, dtype=np.float64)
-        if not np.isfinite(array).all():
-            self.fail(f"{size} finite numbers are needed")
+        self.require(np.isfinite(array).all(), f"{' x '.join(map(str, shape))} finite numbers are needed")
         return array
 
     def quaternion(self) -> Array:
         """Four numbers of length 1, w first."""
         q = self.numbers(4)
-        if abs(np.linalg.norm(q) - 1.0) > 1e-3:
-            self.fail("a quaternion of length 1 (within 0.001) is needed", "divide it by its length")
+        self.require(
+            abs(np.linalg.norm(q) - 1.0) <= 1e-3,
+            "a quaternion of length 1 (within 0.001) is needed",
+            "divide it by its length",
+        )
         return q
 
     def number(self, low: float, high: float = math.inf, *, above: bool = False) -> float:
         """A finite number that is at least `low`, or above it, and at most `high`."""
         most = f" to {high:g}" if math.isfinite(high) else ""
-        wanted = f"a finite number {'above' if above else 'from'} {low:g}{most} is needed"
         x = float(self.value) if _fits(self.value, ()) else math.nan
-        if not math.isfinite(x) or x > high or x < low or (above and x == low):
-            self.fail(wanted)
+        self.require(
+            math.isfinite(x) and (low < x if above else low <= x) and x <= high,
+            f"a finite number {'above' if above else 'from'} {low:g}{most} is needed",
+        )
         return x
 
     def integer(self) -> int:
-        if not isinstance(self.value, int) or isinstance(self.value, bool):
-            self.fail("a whole number is needed")
+        self.require(isinstance(self.value, int) and not isinstance(self.value, bool), "a whole number is needed")
         return self.value
 
     def text(self) -> str:
-        if not isinstance(self.value, str):
-            self.fail("a text in quotes is needed")
-        if UNSHOWN.search(self.value.replace("\n", " ").replace("\t", " ")):
-            self.fail("a text without control characters is needed")
+        self.require(isinstance(self.value, str), "a text in quotes is needed")
+        self.require(
+            not UNSHOWN.search(self.value.replace("\n", " ").replace("\t", " ")),
+            "a text without control characters is needed",
+        )
         return self.value
 
     def flag(self) -> bool:
-        if not isinstance(self.value, bool):
-            self.fail("true or false is needed")
+        self.require(isinstance(self.value, bool), "true or false is needed")
         return self.value
 
 
@@ -141,16 +148,15 @@ def parse_json(text: str, file: str) -> JsonNode:
 
     try:
         document = json.loads(text, object_pairs_hook=unique_members(file), parse_constant=refuse)
+    except InputError:
+        raise
     except json.JSONDecodeError as error:
         raise InputError(f"{file}, line {error.lineno}: this is not JSON ({error.msg}).") from error
     except (RecursionError, ValueError) as error:
-        if isinstance(error, InputError):
-            raise
         raise InputError(
             f"{file}: this is not a JSON document that can be read (nested too deep, or a huge number)."
         ) from error
-    _check_plain(document, file)
-    return JsonNode(document, file)
+    return _plain(JsonNode(document, file))
 
 
 def read_toml(path: str | Path, kind: str) -> JsonNode:
@@ -176,37 +182,33 @@ def parse_toml(raw: bytes, file: str) -> JsonNode:
     except (ValueError, RecursionError) as error:
         what = str(error) if isinstance(error, tomllib.TOMLDecodeError) else "nested too deep, or a huge number"
         raise InputError(f"{file}: this is not TOML: {what}; mend the file at that place.") from error
-    _check_plain(document, file)
-    return JsonNode(document, file)
+    return _plain(JsonNode(document, file))
 
 
-def _check_plain(document: Any, file: str) -> None:
-    """Raise an `InputError` if a document is nested too deep or holds a huge number, a date or a time."""
-
-    def place(key: str) -> str:
-        return f"{file}, {key}" if key else file
-
-    level: list[tuple[str, Any]] = [("", document)]
+def _plain(document: JsonNode) -> JsonNode:
+    """A document; raise an `InputError` if it is nested too deep or holds a huge number, a date or a time."""
+    level = [document]
     for _ in range(DEEPEST_NESTING):
-        below: list[tuple[str, Any]] = []
-        for key, value in level:
+        below: list[JsonNode] = []
+        for node in level:
+            value = node.value
             if isinstance(value, dict):
-                below += [
-                    (f"{key}, {one_line(name, 60)}" if key else one_line(name, 60), entry)
-                    for name, entry in value.items()
-                ]
+                below += [node.child(entry, name) for name, entry in value.items()]
             elif isinstance(value, list):
-                below += [(key, entry) for entry in value]
-            elif isinstance(value, int) and not -_LARGEST_INTEGER <= value <= _LARGEST_INTEGER:
-                raise InputError(f"{place(key)}: whole numbers go to 1e308, a larger one was given.")
-            elif not isinstance(value, str | int | float | bool | None):
+                below += [JsonNode(entry, node.file, node.key) for entry in value]
+            elif isinstance(value, int):
+                holds = -_LARGEST_INTEGER <= value <= _LARGEST_INTEGER
+                require(holds, f"{node.place}: whole numbers go to 1e308, a larger one was given.")
+            elif not isinstance(value, str | float | None):
                 raise InputError(
-                    f"{place(key)}: the date or time {value} was given, which no key takes; put it into quotes."
+                    f"{node.place}: the date or time {value} was given, which no key takes; put it into quotes."
                 )
         if not below:
-            return
+            return document
         level = below
-    raise InputError(f"{file}: the document is nested more than {DEEPEST_NESTING} levels deep; no file of ours is.")
+    raise InputError(
+        f"{document.file}: the document is nested more than {DEEPEST_NESTING} levels deep; no file of ours is."
+    )
 
 
 def _fits(value: Any, shape: tuple[int, ...]) -> bool:

@@ -9,7 +9,7 @@ from typing import Any, Never
 
 import msgspec
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.io.plain_text import clean
 
 HALF_LETTER = re.compile("[\ud800-\udfff]")
@@ -46,8 +46,7 @@ def read_whole(text: bytes, where: str, half: re.Pattern[str]) -> Any:
     hook = unique_members(where)
     document = json.loads(text.decode(), object_pairs_hook=hook, parse_constant=refuse, parse_float=finite)
     field = half_letter(document, half)
-    if field is not None:
-        raise InputError(f"{where}, field {field}: {WHOLE_LETTERS}; remove it, or the folder.")
+    require(field is None, f"{where}, field {field}: {WHOLE_LETTERS}; remove it, or the folder.")
     return document
 
 

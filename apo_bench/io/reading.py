@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 
 _LARGEST_BYTES = 1_000_000
 _LONGEST_LINE = 1 << 20
@@ -50,11 +50,12 @@ def read_bytes(path: str | Path, kind: str, limit: int = _LARGEST_BYTES, *, own:
         InputError: It is no ordinary file, cannot be opened, is larger than the limit, or belongs to another user.
     """
     with opened(path, kind) as file:
-        if own and hasattr(os, "geteuid") and os.fstat(file.fileno()).st_uid != os.geteuid():
-            raise InputError(f"{path}: the {kind} belongs to another user.")
+        require(
+            not (own and hasattr(os, "geteuid") and os.fstat(file.fileno()).st_uid != os.geteuid()),
+            f"{path}: the {kind} belongs to another user.",
+        )
         content = file.read(limit + 1)
-    if len(content) > limit:
-        raise InputError(f"{path}: the file is larger than {limit / 1e6:g} MB; give a {kind}.")
+    require(len(content) <= limit, f"{path}: the file is larger than {limit / 1e6:g} MB; give a {kind}.")
     return content
 
 

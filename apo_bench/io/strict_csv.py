@@ -9,7 +9,7 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import NoReturn, final
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.io.reading import read_text
 
 Columns = Mapping[str, tuple[str, float]]
@@ -30,6 +30,10 @@ class CsvRow:
         column, text, _ = self.cells[meaning]
         stands = f"'{text[:40]}' was given" if text else "nothing was given"
         raise InputError(f"{self.file}, line {self.line}, column {column}: {wanted}, {stands}.")
+
+    def require(self, holds: object, meaning: str, wanted: str) -> None:
+        if not holds:
+            self.fail(meaning, wanted)
 
     def text(self, meaning: str) -> str:
         return self.cells[meaning][1] if meaning in self.cells else ""
@@ -67,17 +71,16 @@ def read_csv(path: str | Path, columns: Columns, required: Sequence[str]) -> Ite
             if not names:
                 names = _header(f"{path}, line {reader.line_num}", texts, columns, required)
                 continue
-            if len(texts) != len(names):
-                raise InputError(
-                    f"{path}, line {reader.line_num}: {len(names)} cells are needed, one for each column, "
-                    f"{len(texts)} were given."
-                )
+            require(
+                len(texts) == len(names),
+                f"{path}, line {reader.line_num}: {len(names)} cells are needed, one for each column, "
+                f"{len(texts)} were given.",
+            )
             cells_of = {columns[c][0]: (c, text, columns[c][1]) for c, text in zip(names, texts, strict=True)}
             yield CsvRow(str(path), reader.line_num, cells_of)
     except csv.Error as error:
         raise InputError(f"{path}, line {reader.line_num}: this is not a CSV file ({error}).") from error
-    if not names:
-        raise InputError(f"{path}: the file is empty; its first line names the columns: {_shown(columns)}.")
+    require(names, f"{path}: the file is empty; its first line names the columns: {_shown(columns)}.")
 
 
 def _header(place: str, names: Sequence[str], columns: Columns, required: Sequence[str]) -> list[str]:
@@ -105,10 +108,10 @@ def _header(place: str, names: Sequence[str], columns: Columns, required: Sequen
 def check_separator(place: str, names: Sequence[str]) -> None:
     """Refuse what spreadsheets of some countries put in place of commas."""
     for separator, called in ((";", "';'"), ("\t", "tabs"), ("|", "'|'")):
-        if len(names) == 1 and separator in names[0]:
-            raise InputError(
-                f"{place}: columns are separated by commas; this file uses {called}, so save it with commas."
-            )
+        require(
+            len(names) != 1 or separator not in names[0],
+            f"{place}: columns are separated by commas; this file uses {called}, so save it with commas.",
+        )
 
 
 def _shown(columns: Columns, meanings: Sequence[str] = ()) -> str:

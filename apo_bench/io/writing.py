@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 
 _KINDS = (
     (stat.S_ISLNK, "a symbolic link"),
@@ -108,8 +108,7 @@ def check_folders(folders: Iterable[Path]) -> None:
         mode = _mode(folder)
         if mode is None:
             continue
-        if not stat.S_ISDIR(mode):
-            raise InputError(f"{folder} is {_kind(mode)}, where a folder is needed; remove it.")
+        require(stat.S_ISDIR(mode), f"{folder} is {_kind(mode)}, where a folder is needed; remove it.")
         for path in sorted(folder.iterdir()):
             inside = _mode(path)
             if inside is not None and not stat.S_ISDIR(inside):

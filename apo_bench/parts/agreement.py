@@ -3,10 +3,11 @@
 One file of more than 250 lines, since both kinds of faces are held against the same sides.
 """
 
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -19,11 +20,14 @@ from apo_bench.geometry import (
     Piece,
     RoundFace,
     Solid,
+    depth_inside,
     flat_area,
+    passage,
     physical_pieces,
     plane_across,
     rings_of,
 )
+from apo_bench.parts.stated import twice_area
 
 _IN_PLANE_M = 1e-6
 _PARALLEL = 1e-7
@@ -49,16 +53,6 @@ _NEAR = 0.05
 """So many radii to the free side of a wall nothing of the part is."""
 
 
-class _Sides(NamedTuple):
-    """The sides of pieces in one list."""
-
-    planes: Array
-    """(s, 4): n and d, n . x <= d inside."""
-    first: Any
-    """Where those of each piece begin."""
-    pieces: tuple[Piece, ...]
-
-
 def check_faces(solid: Solid, path: Path) -> float:
     """Raise an `InputError` unless every stated face lies on the pieces, with nothing of them before it.
 
@@ -71,14 +65,11 @@ def check_faces(solid: Solid, path: Path) -> float:
     return sum(_check_round(wall, solid.pieces, f"{path}, faces, {name}") for name, wall in solid.rounds.items())
 
 
-def _sides(pieces: tuple[Piece, ...]) -> _Sides:
-    planes = [piece.planes for piece in pieces]
-    return _Sides(np.concatenate([np.zeros((0, 4)), *planes]), np.cumsum([0, *map(len, planes[:-1])]), pieces)
-
-
-def _near(pieces: tuple[Piece, ...], low: Array, high: Array) -> _Sides:
-    """Those of the pieces that reach into a box."""
-    return _sides(tuple(p for p in pieces if (p.center - p.half <= high).all() and (p.center + p.half >= low).all()))
+def _near(pieces: tuple[Piece, ...], corners: Array, margin: float) -> list[Piece]:
+    """Those of the pieces that reach into the box around some points, (k, 3), or as near to it."""
+    low = corners.min(axis=0) - margin
+    high = corners.max(axis=0) + margin
+    return [p for p in pieces if (p.center - p.half <= high).all() and (p.center + p.half >= low).all()]
 
 
 def _check_flat(face: Face, pieces: tuple[Piece, ...], place: str) -> None:
@@ -87,10 +78,9 @@ def _check_flat(face: Face, pieces: tuple[Piece, ...], place: str) -> None:
 
     n = face.normal
     to_plane = plane_across(face.normal)
-    margin = np.full(3, _ABOVE_M)
-    sides = _near(pieces, face.outline.min(axis=0) - margin, face.outline.max(axis=0) + margin)
+    near = _near(pieces, face.outline, _ABOVE_M)
     stated = flat_area(face.outline, face.holes, to_plane)
-    below = _below(face, sides, to_plane)
+    below = _below(face, near, to_plane)
     bare = stated.difference(shapely.unary_union(below, grid_size=_SNAP_M).buffer(_BESIDE_M))
     if not bare.is_empty:
         at = bare.representative_point()
@@ -102,20 +92,21 @@ def _check_flat(face: Face, pieces: tuple[Piece, ...], place: str) -> None:
             continue
         at = common.representative_point()
         point = to_plane @ np.array([at.x, at.y]) + (n @ face.outline[0] + _ABOVE_M) * n
-        inside = np.maximum.reduceat(sides.planes[:, :3] @ point - sides.planes[:, 3], sides.first)
-        if inside.min() < -_ROUNDED_M:
-            piece = sides.pieces[int(inside.argmin())]
+        deepest = max(near, key=lambda piece: depth_inside(piece, point[None])[0])
+        if depth_inside(deepest, point[None])[0] > _ROUNDED_M:
             x, y, z = 1e3 * point
-            _fail(place, f"piece '{piece.name}' covers the face at ({x:.4g}, {y:.4g}, {z:.4g}) mm")
+            _fail(place, f"piece '{deepest.name}' covers the face at ({x:.4g}, {y:.4g}, {z:.4g}) mm")
 
 
-def _below(face: Face, sides: _Sides, to_plane: Array) -> list[Any]:
+def _below(face: Face, pieces: Iterable[Piece], to_plane: Array) -> list[Any]:
     """Sides of pieces in the plane of a face, as flat areas."""
-    on = (sides.planes[:, :3] @ face.normal > 1.0 - _PARALLEL) & (
-        np.abs(sides.planes[:, 3] - face.normal @ face.outline[0]) < 2.0 * _IN_PLANE_M
-    )
-    owner = np.searchsorted(sides.first, np.flatnonzero(on), side="right") - 1
-    return [_shadow(sides.pieces[k], side, to_plane) for k, side in zip(owner, sides.planes[on], strict=True)]
+    height = face.normal @ face.outline[0]
+    return [
+        _shadow(piece, side, to_plane)
+        for piece in pieces
+        for side in piece.planes[np.abs(piece.planes[:, 3] - height) < 2.0 * _IN_PLANE_M]
+        if side[:3] @ face.normal > 1.0 - _PARALLEL
+    ]
 
 
 def supported(face: Face, pieces: tuple[Piece, ...]) -> tuple[Face, float] | None:
@@ -124,7 +115,7 @@ def supported(face: Face, pieces: tuple[Piece, ...]) -> tuple[Face, float] | Non
 
     to_plane = plane_across(face.normal)
     stated = shapely.make_valid(flat_area(face.outline, face.holes, to_plane))
-    lying = stated.intersection(shapely.unary_union(_below(face, _sides(pieces), to_plane), grid_size=_SNAP_M))
+    lying = stated.intersection(shapely.unary_union(_below(face, pieces, to_plane), grid_size=_SNAP_M))
     for by in (-_BESIDE_M, 1.5 * _BESIDE_M, -0.5 * _BESIDE_M):
         lying = lying.buffer(by, join_style="mitre")
     lying = shapely.set_precision(lying.simplify(_ROUNDED_M), _WRITTEN_M)
@@ -132,12 +123,10 @@ def supported(face: Face, pieces: tuple[Piece, ...]) -> tuple[Face, float] | Non
         return None
     off = (face.normal @ face.outline[0]) * face.normal
     rings = [ring @ to_plane.T + off for ring in rings_of(lying)]
-    oriented = [ring if (_winding(ring, face.normal) > 0.0) == (k == 0) else ring[::-1] for k, ring in enumerate(rings)]
+    oriented = [
+        ring if (twice_area(ring) @ face.normal > 0.0) == (k == 0) else ring[::-1] for k, ring in enumerate(rings)
+    ]
     return Face(face.name, oriented[0], tuple(oriented[1:])), float(lying.area / stated.area)
-
-
-def _winding(ring: Array, n: Array) -> float:
-    return float(np.cross(ring - ring[0], np.roll(ring, -1, axis=0) - ring[0]).sum(axis=0) @ n)
 
 
 def _shadow(piece: Piece, side: Array, to_plane: Array) -> Any:
@@ -185,18 +174,14 @@ def _check_round(wall: RoundFace, pieces: tuple[Piece, ...], place: str) -> floa
     heights, radii = _samples(wall)
     middle = wall.toward is None
     angle = wall.extent_rad * ((np.arange(_RAYS) + 0.5) / _RAYS - (0.0 if middle else 0.5))
-    x = wall.frame[:3, 0]
-    y = wall.frame[:3, 1]
-    out = np.outer(np.cos(angle), x) + np.outer(np.sin(angle), y)
-    reach = max(wall.radii) * (1.0 + _COARSE) + _ABOVE_M
-    sides = _near(pieces, wall.ends.min(axis=0) - reach, wall.ends.max(axis=0) + reach)
-    if not sides.pieces:
+    near = _near(pieces, wall.ends, max(wall.radii) * (1.0 + _COARSE) + _ABOVE_M)
+    if not near:
         _fail(place, "no piece is near the face")
     near_wall = 0
     off = 0.0
     allowed = max(_COARSE * max(wall.radii), _BESIDE_M) if wall.name.startswith("auto_") else _BESIDE_M
     for height, radius in zip(heights, radii, strict=True):
-        enter, leave = _crossed(sides, wall.point + height * wall.axis, out)
+        enter, leave = _crossed(near, wall.point + height * wall.axis, wall.around(angle))
         sign = 1.0 if wall.hole else -1.0
         free = sorted((radius - sign * _BESIDE_M, radius - sign * max(_NEAR * radius, 2.0 * _BESIDE_M)))
         into = (np.minimum(leave, free[1]) - np.maximum(enter, free[0]) > _ROUNDED_M).any(axis=0)
@@ -246,24 +231,11 @@ def _samples(wall: RoundFace) -> tuple[Array, Array]:
     return heights, wall.radii[0] + wall.slope * (heights - wall.span[0])
 
 
-def _crossed(sides: _Sides, origin: Array, out: Array) -> tuple[Array, Array]:
+def _crossed(pieces: list[Piece], origin: Array, out: Array) -> tuple[Array, Array]:
     """How far rays (r, 3) go until they enter and leave each piece, (pieces, r); inf and -inf if they do not."""
-    # A ray o + t u crosses the plane n . x = d at t = (d - n . o) / (n . u), inwards where n . u is negative. It is in
-    # the piece from the last crossing inwards to the first one outwards; along a plane it stays on one side.
-    rate = sides.planes[:, :3] @ out.T
-    room = (sides.planes[:, 3] - sides.planes[:, :3] @ origin)[:, None]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        at = room / rate
-    flat = np.abs(rate) < 1e-12
-    outside = flat & (room < 0.0)
-    enter = np.where(rate < 0.0, at, -np.inf)
-    leave = np.where(rate > 0.0, at, np.inf)
-    enter = np.where(flat, np.where(outside, np.inf, 0.0), enter)
-    leave = np.where(flat, np.where(outside, -np.inf, np.inf), leave)
-    enter = np.maximum(np.maximum.reduceat(enter, sides.first), 0.0)
-    leave = np.minimum.reduceat(leave, sides.first)
-    gone = enter >= leave
-    return np.where(gone, np.inf, enter), np.where(gone, -np.inf, leave)
+    enter, leave = np.array([passage(piece.planes, origin, out) for piece in pieces]).swapaxes(0, 1)
+    behind = leave <= 0.0
+    return np.where(behind, np.inf, np.maximum(enter, 0.0)), np.where(behind, -np.inf, leave)
 
 
 def _fail(place: str, what: str) -> NoReturn:

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Box, Piece, Solid, face_area, separating_axes, shadow
 
 _TOUCHING_M = 2e-5
@@ -25,23 +25,25 @@ def check_solid(solid: Solid, file: str) -> None:
     Both packages are slow to import and are so only here.
     """
     mesh = _mesh(solid)
-    if not mesh.is_watertight:
-        raise InputError(
-            f"{file}: the boxes make no closed solid; move apart, or into each other, what nearly touches."
-        )
+    require(
+        mesh.is_watertight,
+        f"{file}: the boxes make no closed solid; move apart, or into each other, what nearly touches.",
+    )
     room = _APART_M * float(mesh.area)
     reach = float(np.linalg.norm(np.diff(solid.bounds, axis=0)))
     # Divergence theorem: the volume inside of flat faces is a third of the sum of area times height over the origin.
     enclosed = sum(face_area(face) * float(face.normal @ face.outline[0]) for face in solid.faces.values()) / 3.0
     for name, volume in (("of its cells", solid.volume), ("that its faces enclose", enclosed)):
-        if abs(volume - mesh.volume) > room:
-            raise InputError(
-                f"{file}: the volume {name} is {1e9 * volume:.6g} mm^3, that of a mesh of the same boxes "
-                f"{1e9 * mesh.volume:.6g}; move apart, or into each other, what nearly touches."
-            )
+        require(
+            abs(volume - mesh.volume) <= room,
+            f"{file}: the volume {name} is {1e9 * volume:.6g} mm^3, that of a mesh of the same boxes "
+            f"{1e9 * mesh.volume:.6g}; move apart, or into each other, what nearly touches.",
+        )
     off = float(np.linalg.norm(mesh.center_mass - solid.centroid))
-    if off * solid.volume > room * reach:
-        raise InputError(f"{file}: the centroid is {1e3 * off:.3g} mm from that of a mesh of the same boxes.")
+    require(
+        off * solid.volume <= room * reach,
+        f"{file}: the centroid is {1e3 * off:.3g} mm from that of a mesh of the same boxes.",
+    )
 
 
 def check_matter(solid: Solid, file: str, rounded: float) -> None:
@@ -54,11 +56,11 @@ def check_matter(solid: Solid, file: str, rounded: float) -> None:
     mesh = _mesh(solid)
     room = _SHARE * solid.volume + rounded
     reach = float(np.linalg.norm(np.diff(solid.bounds, axis=0)))
-    if abs(solid.volume - mesh.volume) > room:
-        raise InputError(
-            f"{file}, volume_mm3: {1e9 * solid.volume:.6g} is stated, the pieces have {1e9 * mesh.volume:.6g}; only "
-            "0.1 % and what round walls explain are allowed; state that of the exact solid, or mend the pieces."
-        )
+    require(
+        abs(solid.volume - mesh.volume) <= room,
+        f"{file}, volume_mm3: {1e9 * solid.volume:.6g} is stated, the pieces have {1e9 * mesh.volume:.6g}; only "
+        "0.1 % and what round walls explain are allowed; state that of the exact solid, or mend the pieces.",
+    )
     off = np.abs(mesh.center_mass - solid.centroid).max()
     if off * solid.volume > room * reach:
         at = ", ".join(f"{1e3 * x:.5g}" for x in mesh.center_mass)
@@ -97,13 +99,13 @@ def check_one_piece(pieces: Sequence[Piece], path: Path) -> None:
             if a == b:
                 continue
             tests += 1
-            if tests > _MOST_TESTS:
-                raise InputError(f"{path}: whether the pieces touch takes too long to find out; use fewer pieces.")
+            require(
+                tests <= _MOST_TESTS, f"{path}: whether the pieces touch takes too long to find out; use fewer pieces."
+            )
             if _gap(pieces[i], pieces[int(k)]) < _TOUCHING_M:
                 owner[a] = b
     count = len({_root(owner, i) for i in range(len(pieces))})
-    if count > 1:
-        raise InputError(f"{path}: the pieces make {count} separate solids; a part is one rigid piece.")
+    require(count <= 1, f"{path}: the pieces make {count} separate solids; a part is one rigid piece.")
 
 
 def _root(owner: list[int], i: int) -> int:

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import InputError, require, unknown
 from apo_bench.geometry import Box, Face, Solid
 from apo_bench.parts.agreement import check_faces, check_receding
 from apo_bench.parts.allowed import HEAVIEST_KG, LIGHTEST_KG, MOST_FACES
@@ -53,11 +53,11 @@ def load_part(given: str | Path) -> Solid:
     file = read_part(part_path(given))
     solid = _stated(file, file.stated) if file.stated else _united(file)
     mass = file.density * solid.volume
-    if not LIGHTEST_KG <= mass <= HEAVIEST_KG:
-        raise InputError(
-            f"{file.path}: the part weighs {mass:.3g} kg; from {LIGHTEST_KG:g} to {HEAVIEST_KG:g} kg are allowed, "
-            "so change its size or its density."
-        )
+    require(
+        LIGHTEST_KG <= mass <= HEAVIEST_KG,
+        f"{file.path}: the part weighs {mass:.3g} kg; from {LIGHTEST_KG:g} to {HEAVIEST_KG:g} kg are allowed, "
+        "so change its size or its density.",
+    )
     if file.path.parent != folder("assets") / "parts":
         check_part(file, solid)
     return solid
@@ -91,10 +91,13 @@ def _united(file: PartFile) -> Solid:
     """The union of boxes, with the faces that sites mark."""
     boxes = tuple(piece for piece in file.pieces if isinstance(piece, Box))
     union = unite(boxes, MOST_FACES + 1)
-    if union.pieces != 1:
-        raise InputError(f"{file.path}: the boxes make {union.pieces} separate solids; a part is one rigid piece.")
-    if len(union.surfaces) > MOST_FACES:
-        raise InputError(f"{file.path}: the boxes make more than {MOST_FACES} faces, the most that a part may have.")
+    require(
+        union.pieces == 1, f"{file.path}: the boxes make {union.pieces} separate solids; a part is one rigid piece."
+    )
+    require(
+        len(union.surfaces) <= MOST_FACES,
+        f"{file.path}: the boxes make more than {MOST_FACES} faces, the most that a part may have.",
+    )
     marks = _matched(file, union.surfaces)
     faces = [_face(surface, marks.get(k), _number(union.surfaces, k)) for k, surface in enumerate(union.surfaces)]
     faces.sort(key=lambda face: face.name.startswith("auto_"))
@@ -124,10 +127,10 @@ def _under(file: PartFile, mark: Mark, surfaces: tuple[Surface, ...]) -> int:
         point = Point(surface.flat(mark.point[None])[0])
         if surface.shape.distance(point) > _ON_FACE_M:
             continue
-        if surface.shape.boundary.distance(point) <= _ON_FACE_M:
-            raise InputError(
-                f"{file.path}: site '{mark.name}' at ({where}) mm lies on an edge between faces; move it into one face."
-            )
+        require(
+            surface.shape.boundary.distance(point) > _ON_FACE_M,
+            f"{file.path}: site '{mark.name}' at ({where}) mm lies on an edge between faces; move it into one face.",
+        )
         return k
     raise InputError(f"{file.path}: site '{mark.name}' at ({where}) mm lies on no face; move it onto the surface.")
 

@@ -6,7 +6,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, Hull
 from apo_bench.io.reading import read_bytes
 
@@ -36,22 +36,22 @@ def checked_hull(path: Path, name: str, corners: Array) -> Hull:
         below = hull.planes[:, 3] - corners @ hull.planes[:, :3].T
     except QhullError:
         below = np.zeros((1, 1))
-    if below.max(axis=0).min() < _THINNEST_M:
-        raise InputError(
-            f"{path}: piece '{name}' is flat: a piece is thicker than {1e3 * _THINNEST_M:g} mm across each side; "
-            "give it other corners, or remove it."
-        )
-    if len(hull.planes) > _MOST_SIDES or len(hull.edges) > _MOST_DIRECTIONS:
-        raise InputError(
-            f"{path}: piece '{name}' has {len(hull.planes)} sides, and {len(hull.edges)} directions of edges; "
-            f"{_MOST_SIDES} and {_MOST_DIRECTIONS} are the most; give it fewer corners, or cut it."
-        )
+    require(
+        below.max(axis=0).min() >= _THINNEST_M,
+        f"{path}: piece '{name}' is flat: a piece is thicker than {1e3 * _THINNEST_M:g} mm across each side; "
+        "give it other corners, or remove it.",
+    )
+    require(
+        len(hull.planes) <= _MOST_SIDES and len(hull.edges) <= _MOST_DIRECTIONS,
+        f"{path}: piece '{name}' has {len(hull.planes)} sides, and {len(hull.edges)} directions of edges; "
+        f"{_MOST_SIDES} and {_MOST_DIRECTIONS} are the most; give it fewer corners, or cut it.",
+    )
     inside = below.min(axis=1)
-    if inside.max() > _SAME_M:
-        raise InputError(
-            f"{path}: piece '{name}' is not convex: its corner {int(inside.argmax()) + 1} lies "
-            f"{1e3 * inside.max():.3g} mm inside of the others; cut it into convex pieces."
-        )
+    require(
+        inside.max() <= _SAME_M,
+        f"{path}: piece '{name}' is not convex: its corner {int(inside.argmax()) + 1} lies "
+        f"{1e3 * inside.max():.3g} mm inside of the others; cut it into convex pieces.",
+    )
     return hull
 
 
@@ -102,12 +102,18 @@ def _read_stl(file: Path) -> Array:
     """The triangles, (t, 3, 3), [m]."""
     raw = read_bytes(file, "binary STL file", _HEADER + _TRIANGLE * MOST_TRIANGLES)
     count = int.from_bytes(raw[80:_HEADER], "little")
-    if len(raw) < _HEADER + _TRIANGLE or len(raw) != _HEADER + _TRIANGLE * count:
-        raise InputError(f"{file}: this is no binary STL file; save the mesh as one, in metres.")
+    require(
+        len(raw) >= _HEADER + _TRIANGLE and len(raw) == _HEADER + _TRIANGLE * count,
+        f"{file}: this is no binary STL file; save the mesh as one, in metres.",
+    )
     row = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
     corners = np.frombuffer(raw, dtype=row, offset=_HEADER)["corners"].astype(np.float64)
-    if not (np.abs(corners) <= _LARGEST_M).all():
-        raise InputError(f"{file}: corners within {_LARGEST_M:g} m are needed; save the mesh in metres.")
-    if np.ptp(corners.reshape(-1, 3), axis=0).min() <= 0.0:
-        raise InputError(f"{file}: all triangles lie in a plane; give a mesh of the part, or no picture.")
+    require(
+        (np.abs(corners) <= _LARGEST_M).all(),
+        f"{file}: corners within {_LARGEST_M:g} m are needed; save the mesh in metres.",
+    )
+    require(
+        np.ptp(corners.reshape(-1, 3), axis=0).min() > 0.0,
+        f"{file}: all triangles lie in a plane; give a mesh of the part, or no picture.",
+    )
     return np.asarray(corners)

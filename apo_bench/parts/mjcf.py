@@ -9,7 +9,7 @@ from xml.etree.ElementTree import Element, tostring
 
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, Box, Cylinder, Piece, all_boxes, cylinder_hull
 from apo_bench.parts.allowed import MOST_BOXES, MOST_CORNERS_IN_ALL, WIDEST_M
 from apo_bench.parts.meshes import checked_hull, dress_picture, is_picture
@@ -70,15 +70,16 @@ def read_part(path: Path) -> PartFile:
     geoms = [(_piece(path, e, a, meshes), a) for e, a in elements if e.tag == "geom" and not is_picture(a)]
     marks = tuple(_mark(path, e, a) for e, a in elements if e.tag == "site")
     _check_names(path, "geom", [e.attrib["name"] for e, _ in elements if e.tag == "geom"])
-    if not geoms:
-        raise InputError(f"{path}: body '{body.get('name', '')}' has no geom; give it at least one named box.")
+    require(geoms, f"{path}: body '{body.get('name', '')}' has no geom; give it at least one named box.")
     if meshes:
         raise InputError(f"{path}: no geom has the mesh '{min(meshes)}'; give it one, or remove the mesh.")
     pieces = tuple(piece for piece, _ in geoms)
     _check_names(path, "site", [mark.name for mark in marks])
     if all_boxes(pieces):
-        if len(pieces) > MOST_BOXES:
-            raise InputError(f"{path}: the part has {len(pieces)} boxes; {MOST_BOXES} are the most that it may have.")
+        require(
+            len(pieces) <= MOST_BOXES,
+            f"{path}: the part has {len(pieces)} boxes; {MOST_BOXES} are the most that it may have.",
+        )
         density = _density(path, [attributes for _, attributes in geoms])
         return PartFile(path, pieces, marks, None, density, tostring(root, encoding="unicode"))
     if marks:
@@ -93,10 +94,10 @@ def read_part(path: Path) -> PartFile:
 
 def _density(path: Path, geoms: list[Mapping[str, str]]) -> float:
     densities = sorted({float(each.get("density", USUAL_DENSITY)) for each in geoms})
-    if len(densities) > 1:
-        raise InputError(
-            f"{path}: the geoms have densities from {densities[0]:g} to {densities[-1]:g} kg/m^3; a part has one."
-        )
+    require(
+        len(densities) <= 1,
+        f"{path}: the geoms have densities from {densities[0]:g} to {densities[-1]:g} kg/m^3; a part has one.",
+    )
     return densities[0]
 
 
@@ -104,11 +105,11 @@ def _state_matter(path: Path, root: Element, body: Element, stated: StatedPart) 
     """Write density and friction of the file beside it into the geoms, which may not say them."""
     for geom in root.iter("geom"):
         for key in ("density", "friction"):
-            if key in geom.attrib:
-                raise InputError(
-                    f"{path}: {_called(geom)} has {key}=; where pieces are not boxes alone, it stands in "
-                    f"{path.with_suffix('.toml').name}, so remove it here."
-                )
+            require(
+                key not in geom.attrib,
+                f"{path}: {_called(geom)} has {key}=; where pieces are not boxes alone, it stands in "
+                f"{path.with_suffix('.toml').name}, so remove it here.",
+            )
     for geom in body.iter("geom"):
         if "mass" in geom.attrib:
             continue
@@ -119,8 +120,7 @@ def _state_matter(path: Path, root: Element, body: Element, stated: StatedPart) 
 
 def _check_names(path: Path, kind: str, names: list[str]) -> None:
     name, count = max(Counter(names).items(), key=lambda item: item[1], default=("", 0))
-    if count > 1:
-        raise InputError(f"{path}: two {kind}s are called '{name}'; give each its own name.")
+    require(count <= 1, f"{path}: two {kind}s are called '{name}'; give each its own name.")
 
 
 _Defaults = Mapping[str, Mapping[str, Mapping[str, str]]]
@@ -130,8 +130,7 @@ _Defaults = Mapping[str, Mapping[str, Mapping[str, str]]]
 def _defaults(path: Path, root: Element) -> _Defaults:
     classes: dict[str, Mapping[str, Mapping[str, str]]] = {}
     for name, values in _classes(path, root.find("default"), "main", {}):
-        if name in classes:
-            raise InputError(f"{path}: two <default> have class '{name}'; give each its own name.")
+        require(name not in classes, f"{path}: two <default> have class '{name}'; give each its own name.")
         classes[name] = values
     return classes
 
@@ -147,16 +146,16 @@ def _classes(
     yield name, values
     for child in inside:
         if child.tag == "default":
-            if "class" not in child.attrib:
-                raise InputError(f"{path}: a nested <default> has no class=; give it one.")
+            require("class" in child.attrib, f"{path}: a nested <default> has no class=; give it one.")
             yield from _classes(path, child, child.attrib["class"], values)
 
 
 def _resolved(path: Path, element: Element, defaults: _Defaults) -> Mapping[str, str]:
     """The attributes of an element with those of its default class."""
     name = element.get("class", "main")
-    if name not in defaults:
-        raise InputError(f"{path}: {_called(element)} has class '{name}', which no <default> declares; declare it.")
+    require(
+        name in defaults, f"{path}: {_called(element)} has class '{name}', which no <default> declares; declare it."
+    )
     return {**defaults[name].get(element.tag, {}), **element.attrib}
 
 
@@ -166,17 +165,17 @@ def _meshes(path: Path, root: Element) -> dict[str, Array]:
     _check_names(path, "mesh", [mesh.attrib["name"] for mesh in every])
     meshes = [mesh for mesh in every if "face" not in mesh.attrib]
     for mesh in meshes:
-        if "file" in mesh.attrib:
-            raise InputError(f"{path}: {_called(mesh)} has file=, which only a picture has; give its corners.")
-        if "vertex" not in mesh.attrib:
-            raise InputError(f"{path}: {_called(mesh)} has no vertex=; give its corners.")
+        require(
+            "file" not in mesh.attrib, f"{path}: {_called(mesh)} has file=, which only a picture has; give its corners."
+        )
+        require("vertex" in mesh.attrib, f"{path}: {_called(mesh)} has no vertex=; give its corners.")
     corners = {mesh.attrib["name"]: _numbers(mesh.attrib["vertex"]).reshape(-1, 3) for mesh in meshes}
     count = sum(map(len, corners.values()))
-    if count > MOST_CORNERS_IN_ALL:
-        raise InputError(
-            f"{path}: the meshes have {count} corners; {MOST_CORNERS_IN_ALL} are the most that a part may have, so cut "
-            "round walls that no contact uses into fewer sides."
-        )
+    require(
+        count <= MOST_CORNERS_IN_ALL,
+        f"{path}: the meshes have {count} corners; {MOST_CORNERS_IN_ALL} are the most that a part may have, so cut "
+        "round walls that no contact uses into fewer sides.",
+    )
     return corners
 
 
@@ -202,37 +201,43 @@ def _piece(path: Path, element: Element, attributes: Mapping[str, str], meshes: 
             f'{path}: {_called(element)} has no type=, which MuJoCo takes for a sphere; say type="box", or another one.'
         )
     for key, words in _NEEDED[kind].items():
-        if key not in attributes:
-            raise InputError(f"{path}: {_called(element)} has no {key}=; {words}.")
+        require(key in attributes, f"{path}: {_called(element)} has no {key}=; {words}.")
     for key in ("pos", "size", "zaxis", "mesh"):
-        if key in attributes and key not in _OF_TYPE[kind]:
-            raise InputError(f"{path}: {_called(element)} has {key}=, which a {kind} has not; remove it.")
+        require(
+            key not in attributes or key in _OF_TYPE[kind],
+            f"{path}: {_called(element)} has {key}=, which a {kind} has not; remove it.",
+        )
     at = _numbers(attributes.get("pos", "0 0 0"))
     size = _numbers(attributes.get("size", ""))
     if kind == "mesh":
-        if attributes["mesh"] not in meshes:
-            raise InputError(
-                f"{path}: {_called(element)} has the mesh '{attributes['mesh']}', which <asset> has not, or another "
-                "geom has; give each geom its own."
-            )
+        require(
+            attributes["mesh"] in meshes,
+            f"{path}: {_called(element)} has the mesh '{attributes['mesh']}', which <asset> has not, or another "
+            "geom has; give each geom its own.",
+        )
         return checked_hull(path, name, meshes.pop(attributes["mesh"]))
-    if len(size) != (3 if kind == "box" else 2):
-        raise InputError(f"{path}: {_called(element)} has {len(size)} numbers in size=; {_NEEDED[kind]['size']}.")
+    require(
+        len(size) == (3 if kind == "box" else 2),
+        f"{path}: {_called(element)} has {len(size)} numbers in size=; {_NEEDED[kind]['size']}.",
+    )
     if kind == "box":
         return Box(name, at, size)
-    if size[0] > WIDEST_M:
-        raise InputError(f"{path}: {_called(element)} has a radius of {size[0]:g} m; {WIDEST_M:g} is the most allowed.")
+    require(
+        size[0] <= WIDEST_M,
+        f"{path}: {_called(element)} has a radius of {size[0]:g} m; {WIDEST_M:g} is the most allowed.",
+    )
     axis = _numbers(attributes.get("zaxis", "0 0 1"))
     length = float(np.linalg.norm(axis))
-    if length < _SHORTEST_AXIS:
-        raise InputError(f"{path}: {_called(element)} has a zaxis= of no length; give a direction.")
+    require(length >= _SHORTEST_AXIS, f"{path}: {_called(element)} has a zaxis= of no length; give a direction.")
     return cylinder_hull(name, Cylinder(at, axis / length, float(size[0]), float(size[1])))
 
 
 def _mark(path: Path, element: Element, attributes: Mapping[str, str]) -> Mark:
     name = element.attrib["name"]
-    if name.startswith("auto_"):
-        raise InputError(f"{path}: site '{name}' begins with auto_, which is kept for faces without a name; rename it.")
+    require(
+        not name.startswith("auto_"),
+        f"{path}: site '{name}' begins with auto_, which is kept for faces without a name; rename it.",
+    )
     return Mark(name, _numbers(attributes.get("pos", "0 0 0")), element.get("class") == _FIT_CLASS)
 
 

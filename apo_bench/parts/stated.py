@@ -7,7 +7,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import WHOLE_TURN, Array, Face, RoundFace, flat_area, plane_across
 from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.parts.allowed import FACE_OR_PART_NAME, FRICTION, LONGEST_FACE_NAME, MOST_FACES
@@ -70,15 +70,20 @@ def read_stated_part(path: Path) -> StatedPart:
 
 def _named(node: JsonNode) -> list[tuple[str, JsonNode]]:
     """The tables of faces, each with its name."""
-    if not isinstance(node.value, dict) or not node.value:
-        node.fail("tables of faces are needed", 'such as [faces.top] with kind = "plane"')
-    if len(node.value) > MOST_FACES:
-        raise InputError(f"{node.file}: {len(node.value)} faces are stated; {MOST_FACES} are the most that a part has.")
+    node.require(
+        isinstance(node.value, dict) and node.value,
+        "tables of faces are needed",
+        'such as [faces.top] with kind = "plane"',
+    )
+    require(
+        len(node.value) <= MOST_FACES,
+        f"{node.file}: {len(node.value)} faces are stated; {MOST_FACES} are the most that a part has.",
+    )
     for name in node.value:
-        if len(name) > LONGEST_FACE_NAME or not FACE_OR_PART_NAME.fullmatch(name):
-            node.child(name, "a name").fail(
-                f"letters, digits and underscores after a letter, {LONGEST_FACE_NAME} in all at most, are needed"
-            )
+        node.child(name, "a name").require(
+            len(name) <= LONGEST_FACE_NAME and FACE_OR_PART_NAME.fullmatch(name),
+            f"letters, digits and underscores after a letter, {LONGEST_FACE_NAME} in all at most, are needed",
+        )
     return [(name, node.child(value, name)) for name, value in node.value.items()]
 
 
@@ -96,27 +101,25 @@ def _plane(name: str, node: JsonNode) -> Face:
     keys = node.fields(("kind", "outline_mm"), ("holes_mm", "fit"))
     outline = _ring(keys["outline_mm"])
     holes = tuple(_ring(each) for each in keys["holes_mm"].items("hole")) if "holes_mm" in keys else ()
-    across = _across(outline)
-    if np.linalg.norm(across) < 2.0 * _SMALLEST_MM2:
-        keys["outline_mm"].fail("corners around an area are needed")
+    across = twice_area(outline)
+    keys["outline_mm"].require(np.linalg.norm(across) >= 2.0 * _SMALLEST_MM2, "corners around an area are needed")
     n = across / np.linalg.norm(across)
     for ring in (outline, *holes):
-        if np.abs((ring - outline[0]) @ n).max() > _FLAT_MM:
-            node.fail(f"corners within {_FLAT_MM:g} mm of one plane are needed")
-    _check_rings(node, n, outline, holes)
-    return Face(name, 1e-3 * outline, tuple(1e-3 * hole for hole in holes), _flag(keys, "fit"))
-
-
-def _check_rings(node: JsonNode, n: Array, outline: Array, holes: tuple[Array, ...]) -> None:
-    """Refuse rings that cross themselves or each other, and holes that are not clockwise seen from outside."""
-    if not flat_area(outline, holes, plane_across(n)).is_valid:
-        node.fail("an outline and holes inside it that do not cross are needed")
+        node.require(
+            np.abs((ring - outline[0]) @ n).max() <= _FLAT_MM, f"corners within {_FLAT_MM:g} mm of one plane are needed"
+        )
+    node.require(
+        flat_area(outline, holes, plane_across(n)).is_valid,
+        "an outline and holes inside it that do not cross are needed",
+    )
     for i, hole in enumerate(holes, start=1):
-        if _across(hole) @ n >= 0.0:
-            node.child(hole.tolist(), f"hole {i}").fail("corners clockwise as seen from outside are needed")
+        node.child(hole.tolist(), f"hole {i}").require(
+            twice_area(hole) @ n < 0.0, "corners clockwise as seen from outside are needed"
+        )
+    return Face(name, 1e-3 * outline, tuple(1e-3 * hole for hole in holes), "fit" in keys and keys["fit"].flag())
 
 
-def _across(ring: Array) -> Array:
+def twice_area(ring: Array) -> Array:
     """Twice the area of a ring as a vector along its normal, (3,)."""
     corners = ring - ring[0]
     return np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
@@ -124,8 +127,7 @@ def _across(ring: Array) -> Array:
 
 def _ring(node: JsonNode) -> Array:
     corners = node.items("corner")
-    if len(corners) < 3:
-        node.fail("three corners or more are needed")
+    node.require(len(corners) >= 3, "three corners or more are needed")
     return np.array([_within(corner, 3) for corner in corners])
 
 
@@ -137,15 +139,18 @@ def _round(name: str, node: JsonNode, kind: str) -> RoundFace:
         radii = [keys["radius_mm"].number(_THINNEST_RADIUS_MM, _LARGEST_MM)] * 2
     else:
         radii = [each.number(0.0, _LARGEST_MM) for each in keys["radii_mm"].items("radius", 2)]
-        if abs(radii[1] - radii[0]) < 1e-3:
-            keys["radii_mm"].fail('two radii that differ are needed, else kind = "cylinder"')
+        keys["radii_mm"].require(
+            abs(radii[1] - radii[0]) >= 1e-3, 'two radii that differ are needed, else kind = "cylinder"'
+        )
     span = _within(keys["span_mm"], 2) if "span_mm" in keys else np.zeros(2)
     if kind != "rim" and span[1] - span[0] < 1e-3:
         keys["span_mm"].fail("a start and an end that is greater are needed")
     axis = _unit(keys["axis"])
     extent = np.radians(keys["extent_deg"].number(0.0, 360.0, above=True)) if "extent_deg" in keys else WHOLE_TURN
-    if (extent < WHOLE_TURN - 1e-9) != ("toward" in keys):
-        node.fail("extent_deg below 360 and toward are needed together, or none of them")
+    node.require(
+        (extent < WHOLE_TURN - 1e-9) == ("toward" in keys),
+        "extent_deg below 360 and toward are needed together, or none of them",
+    )
     return RoundFace(
         name=name,
         point=1e-3 * _within(keys["at_mm"], 3),
@@ -153,7 +158,7 @@ def _round(name: str, node: JsonNode, kind: str) -> RoundFace:
         span=(1e-3 * float(span[0]), 1e-3 * float(span[1])),
         radii=(1e-3 * radii[0], 1e-3 * radii[1]),
         hole=keys["hole"].flag(),
-        fit=_flag(keys, "fit"),
+        fit="fit" in keys and keys["fit"].flag(),
         extent_rad=float(extent),
         toward=_beside(keys["toward"], axis) if "toward" in keys else None,
     )
@@ -162,24 +167,23 @@ def _round(name: str, node: JsonNode, kind: str) -> RoundFace:
 def _unit(node: JsonNode) -> Array:
     v = node.numbers(3)
     length = float(np.linalg.norm(v))
-    if not _UNIT < length < 1.0 / _UNIT:
-        node.fail("a direction, three numbers that are not all 0, is needed")
+    node.require(_UNIT < length < 1.0 / _UNIT, "a direction, three numbers that are not all 0, is needed")
     return np.asarray(v / length)
 
 
 def _beside(node: JsonNode, axis: Array) -> Array:
     """A unit vector across the axis."""
     v = _unit(node)
-    if abs(v @ axis) > 1e-3:
-        node.fail("a direction across the axis is needed")
+    node.require(abs(v @ axis) <= 1e-3, "a direction across the axis is needed")
     v = v - (v @ axis) * axis
     return np.asarray(v / np.linalg.norm(v))
 
 
 def _within(node: JsonNode, count: int) -> Array:
     lengths = node.numbers(count)
-    if np.abs(lengths).max() > _LARGEST_MM:
-        node.fail(f"{count} numbers of {-_LARGEST_MM:g} to {_LARGEST_MM:g} are needed")
+    node.require(
+        np.abs(lengths).max() <= _LARGEST_MM, f"{count} numbers of {-_LARGEST_MM:g} to {_LARGEST_MM:g} are needed"
+    )
     return lengths
 
 
@@ -187,8 +191,9 @@ def _inertia(node: JsonNode) -> Array:
     """xx, yy, zz, xy, xz, yz as a matrix."""
     xx, yy, zz, xy, xz, yz = node.numbers(6)
     J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    if not np.abs(J).max() < 1e30 or np.linalg.eigvalsh(J)[0] <= 0.0:
-        node.fail("xx, yy, zz, xy, xz, yz of a solid are needed")
+    node.require(
+        np.abs(J).max() < 1e30 and np.linalg.eigvalsh(J)[0] > 0.0, "xx, yy, zz, xy, xz, yz of a solid are needed"
+    )
     return J
 
 
@@ -198,7 +203,3 @@ def _friction(node: JsonNode) -> tuple[float, ...]:
     if numbers is None or not all(low <= x <= high for x, (low, high) in zip(numbers, FRICTION.spans, strict=False)):
         node.fail(f"{FRICTION.words} are needed")
     return tuple(float(x) for x in numbers)
-
-
-def _flag(keys: Mapping[str, JsonNode], key: str) -> bool:
-    return keys[key].flag() if key in keys else False

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple, final
 
 from apo_bench.assembly import Assembly, Contact, Facing, Observation, Poses, face_gap
-from apo_bench.errors import InputError, kind
+from apo_bench.errors import kind, require
 from apo_bench.recognition.thresholds import PairThresholds, Rules
 
 
@@ -55,11 +55,11 @@ def without_contacts(observation: Observation, rules: Rules, verb: str) -> Obser
         InputError: Something else was given to the verb.
     """
     for argument, wanted in ((observation, Observation), (rules, Rules)):
-        if not isinstance(argument, wanted):
-            raise InputError(
-                f"{kind(argument)} was given to {verb}; an Observation is allowed (read_observation reads one from a "
-                "file), and as rules RULES_BY_NOISE, FIXED_RULES or Rules(...) of apo_bench.recognition.thresholds."
-            )
+        require(
+            isinstance(argument, wanted),
+            f"{kind(argument)} was given to {verb}; an Observation is allowed (read_observation reads one from a "
+            "file), and as rules RULES_BY_NOISE, FIXED_RULES or Rules(...) of apo_bench.recognition.thresholds.",
+        )
     return replace(observation, assembly=replace(with_contacts(observation.assembly, ()), gaps={}))
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly import Facing
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array
 
 CONTACT_SOFT_M = 0.1e-3
@@ -35,10 +35,10 @@ class Rules:
     def __post_init__(self) -> None:
         for name, high in (("miss", 1.0), ("gap_m", 1.0), ("angle_rad", math.pi / 2), ("share", 1.0)):
             value = getattr(self, name)
-            if not (isinstance(value, int | float) and 0.0 < value < high):
-                raise InputError(
-                    f"{name}={value!r} was given as a rule of recognition; above 0 and below {high:g} is allowed."
-                )
+            require(
+                isinstance(value, int | float) and 0.0 < value < high,
+                f"{name}={value!r} was given as a rule of recognition; above 0 and below {high:g} is allowed.",
+            )
 
     def most_of(self, count: int) -> float:
         """Largest squared Mahalanobis length of so many residuals that the noise explains: a chi-square quantile."""

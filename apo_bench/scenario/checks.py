@@ -1,6 +1,6 @@
 """Whether the numbers of a scenario fit its topology: contacts closed, parts apart, wherever the truth may vary to."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from itertools import combinations, product
 from typing import NamedTuple
 
@@ -14,13 +14,14 @@ from apo_bench.assembly import (
     Poses,
     contact_kind,
     geometric_play,
+    height,
     placements,
     play_mm,
 )
 from apo_bench.errors import InputError
-from apo_bench.geometry import Array, Face, pose
+from apo_bench.geometry import Face, pose
 from apo_bench.geometry.intrusion import intrusion
-from apo_bench.geometry.mate import mate
+from apo_bench.geometry.mate import angle_between, mate
 from apo_bench.geometry.overlap import overlap
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.order import check_order
@@ -38,6 +39,11 @@ _INTRUSION_M = 1e-6
 """Parts that only touch are less deep in each other."""
 
 
+_APART: Mapping[ContactKind | None, str] = {
+    "shaft on plane": "the wall of the shaft is {:.4g} mm from the plane",
+    "shaft in hole": "the axes are {:.4g} mm apart",
+}
+"""How faces fail to meet."""
 _Pair = tuple[str, str, bytes]
 """Two parts, and where the second one is to the first."""
 
@@ -113,7 +119,7 @@ def _check_turns(scenario: Scenario, file: str, case: _Case, stages: tuple[Poses
     for k, operation in enumerate(scenario.assembly.operations):
         before = stages[k][operation.main]
         after = stages[k + 1][operation.main]
-        tilt = _angle_deg(before[:3, :3].T[:, 2], after[:3, :3].T[:, 2])
+        tilt = float(np.degrees(angle_between(before[2, :3], after[2, :3])))
         if tilt > _ANGLE_DEG:
             raise _refuse(
                 file,
@@ -140,13 +146,12 @@ def _check_contact(scenario: Scenario, file: str, case: _Case, key: str, contact
     T_a, T_b = (poses[of.part] for of in contact)
     kind = contact_kind(a, b)
     if isinstance(a, Face) and isinstance(b, Face):
-        n = T_b[:3, :3] @ b.normal
-        angle = _angle_deg(T_a[:3, :3] @ a.normal, -n)
-        height = float(n @ (pose.apply(T_a, a.outline).mean(axis=0) - pose.apply(T_b, b.outline[:1])[0]))
-        apart = abs(height)
+        angle = float(np.degrees(angle_between(T_a[:3, :3] @ a.normal, -T_b[:3, :3] @ b.normal)))
+        above = height(a, T_a, b, T_b)
+        apart = abs(above)
         tilted = f"the faces look {180 - angle:.4g} degrees apart"
         straighten = "180 are needed: turn the part, or name faces that look at each other"
-        off = f"the faces are {1e3 * apart:.4g} mm {'apart' if height > 0 else 'too deep'}"
+        off = f"the faces are {1e3 * apart:.4g} mm {'apart' if above > 0 else 'too deep'}"
         meet = "move a goal until they meet exactly"
         beside = "the faces lie in one plane but do not overlap"
         common = overlap(a, T_a, b, T_b)
@@ -157,7 +162,7 @@ def _check_contact(scenario: Scenario, file: str, case: _Case, key: str, contact
         what = "the axis is tilted against the plane" if kind == "shaft on plane" else "the axes are turned"
         tilted = f"{what} by {angle:.4g} degrees"
         straighten = "0 are needed: turn the part"
-        off = _apart(kind, 1e3 * apart)
+        off = _APART.get(kind, "the cone is {:.4g} mm off its seat").format(1e3 * apart)
         meet = "move a goal until they meet"
         beside = "the faces have no length in common"
         common = touch.common
@@ -207,14 +212,6 @@ def _check_play(scenario: Scenario, file: str) -> None:
         )
 
 
-def _apart(kind: ContactKind | None, gap_mm: float) -> str:
-    if kind == "shaft on plane":
-        return f"the wall of the shaft is {gap_mm:.4g} mm from the plane"
-    if kind == "shaft in hole":
-        return f"the axes are {gap_mm:.4g} mm apart"
-    return f"the cone is {gap_mm:.4g} mm off its seat"
-
-
 def _check_intrusions(scenario: Scenario, file: str, case: _Case, stages: tuple[Poses, ...], apart: set[_Pair]) -> None:
     for a, b in combinations(scenario.assembly.solids, 2):
         _check_pair(scenario, file, case, f"parts, {b}, start", "at the start", (a, b), stages[0], apart)
@@ -245,8 +242,3 @@ def _check_pair(
         sentence = f"'{a}' and '{b}' are {1e3 * depth:.4g} mm inside each other {place}"
         raise _refuse(file, case, key, sentence, "move one of them away")
     apart.add(known)
-
-
-def _angle_deg(a: Array, b: Array) -> float:
-    """The angle between two unit vectors, also where the cosine is flat."""
-    return float(np.degrees(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))

@@ -16,7 +16,7 @@ import numpy as np
 from apo_bench.assembly import CONTACT_KINDS, Contact, Gap, GapKind, PartFace, contact_kind, geometric_play
 from apo_bench.geometry import Face, RoundFace, Solid
 from apo_bench.io.documents import JsonNode
-from apo_bench.scenario.keys import LARGEST_LENGTH_MM, read_span, refuse, refuse_name
+from apo_bench.scenario.keys import LARGEST_LENGTH_MM, read_span, refuse_name, refuse_unless
 
 ContactGaps = Mapping[Contact, Gap]
 """What is asked of each contact, in the order of the file."""
@@ -39,8 +39,7 @@ def read_contacts(
     for node in nodes:
         contact, gap = _contact(node, main, solids)
         _check(contact, node, (main, *carries), there)
-        if contact in contacts:
-            refuse(node, f"'{contact}' stands here twice; keep one")
+        refuse_unless(contact not in contacts, node, f"'{contact}' stands here twice; keep one")
         contacts[contact] = gap
     return contacts
 
@@ -50,23 +49,28 @@ def check_kinds(node: JsonNode, gaps: Sequence[ContactGaps]) -> None:
     for contact, gap in gaps[-1].items():
         for k, earlier in enumerate(gaps[:-1], start=1):
             wanted = earlier.get(contact, gap)
-            if wanted != gap:
-                refuse(
-                    node,
-                    f"'{contact}' is asked to be {gap} here and {wanted} in operation {k}; ask for the same in both",
-                )
+            refuse_unless(
+                wanted == gap,
+                node,
+                f"'{contact}' is asked to be {gap} here and {wanted} in operation {k}; ask for the same in both",
+            )
 
 
 def _contact(node: JsonNode, main: str, solids: Mapping[str, Solid]) -> tuple[Contact, Gap]:
     keys = node.fields(("faces",), ("kind", "gap_mm")) if isinstance(node.value, dict) else {"faces": node}
     pair = keys["faces"]
-    if not isinstance(pair.value, list) or len(pair.value) != 2:
-        pair.fail(f"a pair is needed, such as {_EXAMPLE}, or a table, such as {_TABLE}")
+    pair.require(
+        isinstance(pair.value, list) and len(pair.value) == 2,
+        f"a pair is needed, such as {_EXAMPLE}, or a table, such as {_TABLE}",
+    )
     above, below = (pair.child(value, name) for value, name in zip(pair.value, ("first", "second"), strict=True))
     contact = Contact(_face(above, main, solids), _face(below, None, solids))
     a, b = (solids[of.part].face(of.face) for of in contact)
-    if contact_kind(a, b) is None:
-        refuse(node, f"'{contact}': {_described(a)} and {_described(b)} make no contact; {_POSSIBLE}")
+    refuse_unless(
+        contact_kind(a, b) is not None,
+        node,
+        f"'{contact}': {_described(a)} and {_described(b)} make no contact; {_POSSIBLE}",
+    )
     return contact, _gap(keys, node, contact, a.fit or b.fit or geometric_play(a, b) > 0.0)
 
 
@@ -87,16 +91,21 @@ def _gap(keys: Mapping[str, JsonNode], node: JsonNode, contact: Contact, fits: b
     if kind not in _KINDS:
         keys["kind"].fail(f"{', '.join(_KINDS[:-1])} or {_KINDS[-1]} is needed")
     if "gap_mm" not in keys:
-        if kind == "clearance" and not fits:
-            refuse(node, f"'{contact}': faces without play have no clearance; say gap_mm = [lowest, highest]")
-        return Gap(kind)
-    if kind != "clearance":
-        refuse(keys["gap_mm"], f'"{kind}" has no interval; say kind = "clearance", or take gap_mm out')
-    low, high = read_span(keys["gap_mm"], -LARGEST_LENGTH_MM, LARGEST_LENGTH_MM)
-    if not (low <= 0.0 <= high and low < high):
-        keys["gap_mm"].fail(
-            "a lowest number up to 0 and a higher one from 0 are needed", "the faces of the goals coincide"
+        refuse_unless(
+            kind != "clearance" or fits,
+            node,
+            f"'{contact}': faces without play have no clearance; say gap_mm = [lowest, highest]",
         )
+        return Gap(kind)
+    refuse_unless(
+        kind == "clearance", keys["gap_mm"], f'"{kind}" has no interval; say kind = "clearance", or take gap_mm out'
+    )
+    low, high = read_span(keys["gap_mm"], -LARGEST_LENGTH_MM, LARGEST_LENGTH_MM)
+    keys["gap_mm"].require(
+        low <= 0.0 <= high and low < high,
+        "a lowest number up to 0 and a higher one from 0 are needed",
+        "the faces of the goals coincide",
+    )
     return Gap(kind, 1e-3 * low, 1e-3 * high)
 
 
@@ -106,20 +115,16 @@ def _check(contact: Contact, node: JsonNode, moves: tuple[str, ...], there: set[
     below = node.child(None, "second")
     a = contact.manipulated.part
     b = contact.environment.part
-    if a not in moves:
-        refuse(above, f"'{a}' does not move here; name a face of '{moves[0]}' or a carried part")
-    if b in moves:
-        refuse(below, f"'{b}' moves in this operation; name a face of a part that rests")
-    if b not in there:
-        refuse(below, f"'{b}' is not there yet; name a fixed part or one that was moved before")
+    refuse_unless(a in moves, above, f"'{a}' does not move here; name a face of '{moves[0]}' or a carried part")
+    refuse_unless(b not in moves, below, f"'{b}' moves in this operation; name a face of a part that rests")
+    refuse_unless(b in there, below, f"'{b}' is not there yet; name a fixed part or one that was moved before")
 
 
 def _face(node: JsonNode, main: str | None, solids: Mapping[str, Solid]) -> PartFace:
     """`part.face`, or a face of the main part."""
     text = node.text()
     name, dot, face = text.rpartition(".")
-    if not dot and main is None:
-        node.fail("a face as 'part.face' is needed")
+    node.require(dot or main is not None, "a face as 'part.face' is needed")
     part = name if dot or main is None else main
     if part not in solids:
         refuse_name(node, "part", part, solids)

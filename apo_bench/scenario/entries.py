@@ -24,6 +24,7 @@ from apo_bench.scenario.keys import (
     read_unit_axis,
     refuse,
     refuse_name,
+    refuse_unless,
 )
 from apo_bench.scenario.scenario import Grasp, Shift, Turn
 
@@ -64,26 +65,31 @@ class OperationEntry(NamedTuple):
 
 def read_parts(node: JsonNode, folder: Path) -> Mapping[str, PartEntry]:
     """Every part; a file that several parts share is loaded once. Paths are relative to `folder`."""
-    if not isinstance(node.value, dict) or not node.value:
-        node.fail("at least one table [parts.NAME] is needed")
-    if len(node.value) > _MOST_PARTS:
-        refuse(node, f"at most {_MOST_PARTS} parts are allowed, {len(node.value)} were given")
+    node.require(isinstance(node.value, dict) and node.value, "at least one table [parts.NAME] is needed")
+    refuse_unless(
+        len(node.value) <= _MOST_PARTS, node, f"at most {_MOST_PARTS} parts are allowed, {len(node.value)} were given"
+    )
     solids: dict[Path, Solid] = {}
     return {name: _part(node.child(value, name), name, folder, solids) for name, value in node.value.items()}
 
 
 def _part(node: JsonNode, name: str, folder: Path, solids: dict[Path, Solid]) -> PartEntry:
-    if not FACE_OR_PART_NAME.fullmatch(name):
-        refuse(node, f"a part cannot be called '{name}'; use a letter, then letters, digits and underscores")
-    if name == _ARM:
-        refuse(node, f"a part cannot be called '{_ARM}', as the robot is; give it another name")
+    refuse_unless(
+        FACE_OR_PART_NAME.fullmatch(name),
+        node,
+        f"a part cannot be called '{name}'; use a letter, then letters, digits and underscores",
+    )
+    refuse_unless(name != _ARM, node, f"a part cannot be called '{_ARM}', as the robot is; give it another name")
     keys = node.fields(("file",), ("fixed", "follows_site", "start", "color"))
     fixed = "fixed" in keys and keys["fixed"].flag()
     follows = "follows_site" in keys and keys["follows_site"].flag()
     if follows and not fixed:
         refuse(keys["follows_site"], "only a fixed part can follow the site; say fixed = true, or leave this key out")
-    if not fixed and "start" not in keys:
-        refuse(node, "the key 'start' is missing; say where the part stands, such as start = { at_mm = [0, 260, 0] }")
+    refuse_unless(
+        fixed or "start" in keys,
+        node,
+        "the key 'start' is missing; say where the part stands, such as start = { at_mm = [0, 260, 0] }",
+    )
     path, solid = _solid(keys["file"], folder, solids)
     start = read_pose(keys["start"]) if "start" in keys else np.eye(4)
     return PartEntry(path, solid, fixed, follows, start, _color(keys["color"]) if "color" in keys else None)
@@ -104,18 +110,19 @@ def _solid(node: JsonNode, folder: Path, solids: dict[Path, Solid]) -> tuple[Pat
 
 def _color(node: JsonNode) -> tuple[float, float, float]:
     r, g, b = node.numbers(3)
-    if not (min(r, g, b) >= 0 and max(r, g, b) <= 1):
-        node.fail("red, green and blue from 0 to 1 are needed")
+    node.require(min(r, g, b) >= 0 and max(r, g, b) <= 1, "red, green and blue from 0 to 1 are needed")
     return float(r), float(g), float(b)
 
 
 def read_operations(node: JsonNode, parts: Mapping[str, PartEntry]) -> tuple[OperationEntry, ...]:
     """Every operation in order, with defaults filled in."""
     nodes = node.items("operation")
-    if not nodes:
-        refuse(node, "the list is empty; give at least one [[operations]]")
-    if len(nodes) > _MOST_OPERATIONS:
-        refuse(node, f"at most {_MOST_OPERATIONS} operations are allowed, {len(nodes)} were given")
+    refuse_unless(nodes, node, "the list is empty; give at least one [[operations]]")
+    refuse_unless(
+        len(nodes) <= _MOST_OPERATIONS,
+        node,
+        f"at most {_MOST_OPERATIONS} operations are allowed, {len(nodes)} were given",
+    )
     poses = {name: part.start for name, part in parts.items()}
     there = {name for name, part in parts.items() if part.fixed}
     entries = []
@@ -126,8 +133,11 @@ def read_operations(node: JsonNode, parts: Mapping[str, PartEntry]) -> tuple[Ope
         T = entry.goal @ pose.inverse(poses[entry.operation.main])
         poses |= {name: T @ poses[name] for name in entry.operation.carries} | {entry.operation.main: entry.goal}
         there |= set(entry.operation.moves)
-    if sum(len(entry.varies) for entry in entries) > _MOST_SHIFTS:
-        refuse(node, f"at most {_MOST_SHIFTS} 'vary' are allowed in all; each is checked at both ends")
+    refuse_unless(
+        sum(len(entry.varies) for entry in entries) <= _MOST_SHIFTS,
+        node,
+        f"at most {_MOST_SHIFTS} 'vary' are allowed in all; each is checked at both ends",
+    )
     return tuple(entries)
 
 
@@ -138,20 +148,27 @@ def _entry(
     main = _movable(keys["move"], parts)
     carries = tuple(_movable(n, parts) for n in _items(keys["carries"], "entry")) if "carries" in keys else ()
     for name in carries:
-        if name == main:
-            refuse(keys["carries"], f"'{name}' would carry itself, it is the moved part; leave it out of this list")
-        if carries.count(name) > 1:
-            refuse(keys["carries"], f"'{name}' stands here twice; name it once")
-        if name not in there:
-            refuse(keys["carries"], f"'{name}' is carried before any operation has moved it; move it first")
+        refuse_unless(
+            name != main,
+            keys["carries"],
+            f"'{name}' would carry itself, it is the moved part; leave it out of this list",
+        )
+        refuse_unless(carries.count(name) <= 1, keys["carries"], f"'{name}' stands here twice; name it once")
+        refuse_unless(
+            name in there, keys["carries"], f"'{name}' is carried before any operation has moved it; move it first"
+        )
     goal = read_pose(keys["goal"])
     solids = {name: part.solid for name, part in parts.items()}
     contacts = _items(keys["contacts"], "contact")
-    if len(contacts) > _MOST_CONTACTS:
-        refuse(keys["contacts"], f"at most {_MOST_CONTACTS} contacts are allowed, {len(contacts)} were given")
+    refuse_unless(
+        len(contacts) <= _MOST_CONTACTS,
+        keys["contacts"],
+        f"at most {_MOST_CONTACTS} contacts are allowed, {len(contacts)} were given",
+    )
     gaps = read_contacts(contacts, main, carries, solids, there)
-    if not gaps:
-        refuse(keys["contacts"], 'no contact was given; say what the part touches, such as [["bottom", "table.top"]]')
+    refuse_unless(
+        gaps, keys["contacts"], 'no contact was given; say what the part touches, such as [["bottom", "table.top"]]'
+    )
     return OperationEntry(
         Operation(main, tuple(gaps), carries),
         gaps,
@@ -171,8 +188,11 @@ def _movable(node: JsonNode, parts: Mapping[str, PartEntry]) -> str:
     name = node.text()
     if name not in parts:
         refuse_name(node, "part", name, parts)
-    if parts[name].fixed:
-        refuse(node, f"'{name}' is fixed and cannot be moved; move another part, or take fixed = true away")
+    refuse_unless(
+        not parts[name].fixed,
+        node,
+        f"'{name}' is fixed and cannot be moved; move another part, or take fixed = true away",
+    )
     return name
 
 

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.assembly import Assembly, Gap
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import InputError, require, unknown
 from apo_bench.insertion.line import Preference
 from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.io.plain_text import UNSHOWN
@@ -19,7 +19,7 @@ from apo_bench.records import MEANINGS, Meaning, Thresholds
 from apo_bench.resources import folder
 from apo_bench.scenario.checks import check_scenario
 from apo_bench.scenario.entries import OperationEntry, read_operations, read_parts
-from apo_bench.scenario.keys import LARGEST_LENGTH_MM, read_span, read_unit_axis, refuse
+from apo_bench.scenario.keys import LARGEST_LENGTH_MM, read_span, read_unit_axis, refuse_unless
 from apo_bench.scenario.nominal import with_attach_lines
 from apo_bench.scenario.scenario import Carelessness, Scenario, Shift, Site, Turn
 
@@ -62,18 +62,20 @@ def _kept(path: Path, stamps: tuple[tuple[str, int, int], ...]) -> Scenario:
 
 def _read(path: Path) -> Scenario:
     document = read_toml(path, "scenario file")
-    if UNSHOWN.search(path.stem):
-        raise InputError(
-            f"{path}: the file's name, which the scenario gets, holds control characters; rename the file."
-        )
+    require(
+        not UNSHOWN.search(path.stem),
+        f"{path}: the file's name, which the scenario gets, holds control characters; rename the file.",
+    )
     scenario, stated = _scenario(document, path)
     check_scenario(scenario, str(path))
     return with_attach_lines(scenario, stated, str(path))
 
 
 def _path(given: str | Path) -> Path:
-    if not isinstance(given, str | Path):
-        raise InputError(f"a scenario is a short name, a path or a Scenario, a {type(given).__name__} was given.")
+    require(
+        isinstance(given, str | Path),
+        f"a scenario is a short name, a path or a Scenario, a {type(given).__name__} was given.",
+    )
     if isinstance(given, Path) or given.endswith(".toml") or "/" in given or "\\" in given:
         return Path(given)
     if given not in scenario_names():
@@ -84,8 +86,11 @@ def _path(given: str | Path) -> Path:
 def _scenario(root: JsonNode, path: Path) -> tuple[Scenario, tuple[Preference, ...]]:
     """The scenario without lines of attach, and what the file states of them."""
     schema = root.value.get("schema", _SCHEMA)
-    if isinstance(schema, bool) or schema != _SCHEMA:
-        root.child(schema, "schema").fail(f"schema = {_SCHEMA} is needed", "no other format is known to this version")
+    root.child(schema, "schema").require(
+        schema == _SCHEMA and not isinstance(schema, bool),
+        f"schema = {_SCHEMA} is needed",
+        "no other format is known to this version",
+    )
     top = root.fields(
         ("schema", "title", "parts", "operations"),
         ("paper", "human", "success", "clearance_mm", "gap_mm", "site", "careless", "judge"),
@@ -99,8 +104,11 @@ def _scenario(root: JsonNode, path: Path) -> tuple[Scenario, tuple[Preference, .
         {contact: gap for entry in entries for contact, gap in entry.gaps.items() if gap != Gap()},
     )
     for name in parts:
-        if name not in assembly.fixed and not any(name in operation.moves for operation in assembly.operations):
-            refuse(top["parts"], f"no operation moves '{name}'; give it one, or say fixed = true")
+        refuse_unless(
+            name in assembly.fixed or any(name in operation.moves for operation in assembly.operations),
+            top["parts"],
+            f"no operation moves '{name}'; give it one, or say fixed = true",
+        )
     thresholds, means = _judge(top["judge"]) if "judge" in top else (Thresholds(), MEANINGS[0])
     scenario = Scenario(
         name=path.stem,
@@ -139,19 +147,23 @@ def _site(node: JsonNode) -> Site:
 
 def _pair(node: JsonNode, low: float) -> tuple[float, float]:
     x, y = node.numbers(2)
-    if not (low <= min(x, y) and max(x, y) <= LARGEST_LENGTH_MM):
-        node.fail(f"two lengths from {low:g} to {LARGEST_LENGTH_MM:g} mm are needed")
+    node.require(
+        low <= min(x, y) and max(x, y) <= LARGEST_LENGTH_MM,
+        f"two lengths from {low:g} to {LARGEST_LENGTH_MM:g} mm are needed",
+    )
     return float(x), float(y)
 
 
 def _careless(node: JsonNode, entries: tuple[OperationEntry, ...]) -> Carelessness:
     keys = node.fields(("operation", "along", "size_mm"))
     number = keys["operation"].integer()
-    if not 1 <= number <= len(entries):
-        keys["operation"].fail(f"an operation from 1 to {len(entries)} is needed")
+    keys["operation"].require(1 <= number <= len(entries), f"an operation from 1 to {len(entries)} is needed")
     axis = read_unit_axis(keys["along"])
-    if abs((entries[number - 1].goal[:3, :3] @ axis)[2]) > 1e-6:
-        keys["along"].fail("a direction that is level at the goal is needed", "what lies below decides the height")
+    keys["along"].require(
+        abs((entries[number - 1].goal[:3, :3] @ axis)[2]) <= 1e-6,
+        "a direction that is level at the goal is needed",
+        "what lies below decides the height",
+    )
     low, high = read_span(keys["size_mm"], 0.0, 100.0)
     return Carelessness(number - 1, axis, 1e-3 * low, 1e-3 * high)
 
@@ -168,6 +180,5 @@ def _judge(node: JsonNode) -> tuple[Thresholds, Meaning]:
 
 def _number(node: JsonNode, high: float, *, above: bool = False) -> float:
     x = node.number(0.0, above=above)
-    if x > high:
-        node.fail(f"a number of at most {high:g} is needed")
+    node.require(x <= high, f"a number of at most {high:g} is needed")
     return x

@@ -40,10 +40,11 @@ def read_grasp(node: JsonNode | None, entry: JsonNode, solid: Solid, before: Arr
             keys["at_mm"].fail(needed, "pads reach so far below the point")
     if "across" in keys:
         across = read_unit_axis(keys["across"])
-        if abs((before[:3, :3] @ across)[2]) > _LEVEL:
-            keys["across"].fail(
-                "an axis that is level where the part is picked is needed", "the gripper comes from above"
-            )
+        keys["across"].require(
+            abs((before[:3, :3] @ across)[2]) <= _LEVEL,
+            "an axis that is level where the part is picked is needed",
+            "the gripper comes from above",
+        )
     elif len(level) >= 2:
         across = np.eye(3)[min(level, key=lambda axis: (high - low)[axis])]
     stated = Grasp(point, across) if across is not None else None

@@ -20,6 +20,12 @@ def refuse(node: JsonNode, sentence: str) -> NoReturn:
     raise InputError(f"{node.place}: {sentence}.")
 
 
+def refuse_unless(holds: object, node: JsonNode, sentence: str) -> None:
+    """Raise the error of a key unless something holds."""
+    if not holds:
+        refuse(node, sentence)
+
+
 def refuse_name(node: JsonNode, kind: str, given: str, allowed: Iterable[str]) -> NoReturn:
     raise InputError(f"{node.file}, {node.key}: {unknown(kind, given, allowed)}")
 
@@ -37,8 +43,10 @@ def read_pose(node: JsonNode) -> Array:
 def read_point(node: JsonNode) -> Array:
     """`[x, y, z]` in mm, (3,), [m]."""
     at_mm = node.numbers(3)
-    if np.abs(at_mm).max() > LARGEST_LENGTH_MM:
-        node.fail(f"three lengths from -{LARGEST_LENGTH_MM:g} to {LARGEST_LENGTH_MM:g} mm are needed")
+    node.require(
+        np.abs(at_mm).max() <= LARGEST_LENGTH_MM,
+        f"three lengths from -{LARGEST_LENGTH_MM:g} to {LARGEST_LENGTH_MM:g} mm are needed",
+    )
     return 1e-3 * at_mm
 
 
@@ -46,13 +54,11 @@ def read_any_pose(node: JsonNode) -> Array:
     """`at_mm` with `turn_deg`, `quaternion_wxyz` or `quaternion_xyzw`, as (4, 4), [m]."""
     keys = node.fields(("at_mm",), ("turn_deg", "quaternion_wxyz", "quaternion_xyzw"))
     stated = [key for key in keys if key != "at_mm"]
-    if len(stated) > 1:
-        refuse(node, f"{' and '.join(stated)} state the same; keep one")
+    refuse_unless(len(stated) <= 1, node, f"{' and '.join(stated)} state the same; keep one")
     if stated in ([], ["turn_deg"]):
         return read_pose(node)
     at = keys["at_mm"].numbers(3)
-    if np.abs(at).max() > _FARTHEST_MM:
-        keys["at_mm"].fail(f"lengths of at most {_FARTHEST_MM:g} mm are needed")
+    keys["at_mm"].require(np.abs(at).max() <= _FARTHEST_MM, f"lengths of at most {_FARTHEST_MM:g} mm are needed")
     q = keys[stated[0]].quaternion()
     return pose.unpack(np.concatenate([at * 1e-3, q if stated[0].endswith("wxyz") else np.roll(q, 1)]))
 
@@ -60,19 +66,18 @@ def read_any_pose(node: JsonNode) -> Array:
 def read_unit_axis(node: JsonNode) -> Array:
     """`"x"`, `"+x"`, `"-x"` ... or three numbers, as a unit vector (3,)."""
     if isinstance(node.value, str):
-        if node.value not in _AXES:
-            node.fail("an axis is needed: x, y, z with or without a sign, or three numbers")
+        node.require(node.value in _AXES, "an axis is needed: x, y, z with or without a sign, or three numbers")
         return _AXES[node.value] * np.eye(3)["xyz".index(node.value[-1])]
     vector = node.numbers(3)
     length = float(np.linalg.norm(vector / max(1.0, np.abs(vector).max())))
-    if length < 1e-9:
-        node.fail("an axis is needed: x, y, z with or without a sign, or three numbers that are not all zero")
+    node.require(
+        length >= 1e-9, "an axis is needed: x, y, z with or without a sign, or three numbers that are not all zero"
+    )
     return vector / np.linalg.norm(vector)
 
 
 def read_span(node: JsonNode, low: float, high: float) -> tuple[float, float]:
     """`[lowest, highest]` within bounds."""
     a, b = node.numbers(2)
-    if not low <= a <= b <= high:
-        node.fail(f"a lowest and a highest number between {low:g} and {high:g} are needed")
+    node.require(low <= a <= b <= high, f"a lowest and a highest number between {low:g} and {high:g} are needed")
     return float(a), float(b)

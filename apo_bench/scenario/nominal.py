@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from apo_bench.assembly import Poses
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import pose
 from apo_bench.insertion.arrival import Arrival
 from apo_bench.insertion.line import Preference
@@ -64,8 +64,8 @@ def _check(after: Arrival, stated: Preference, key: str, main: str) -> None:
     if stated.travel_m is not None and after.chain.way is not None:
         least = after.chain.way.length_m
         level = abs(after.chain.way.direction[2]) < 0.5
-        if level and stated.travel_m < least - 1e-6:
-            raise InputError(
-                f"{key}, travel_mm: {1e3 * stated.travel_m:g} mm before its goal '{main}' would still be inside of "
-                f"what it is put into; give at least {np.ceil(1e3 * least - 1e-6):g}, or leave 'travel_mm' out."
-            )
+        require(
+            not level or stated.travel_m >= least - 1e-6,
+            f"{key}, travel_mm: {1e3 * stated.travel_m:g} mm before its goal '{main}' would still be inside of "
+            f"what it is put into; give at least {np.ceil(1e3 * least - 1e-6):g}, or leave 'travel_mm' out.",
+        )

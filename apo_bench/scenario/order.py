@@ -3,7 +3,7 @@
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Operation, Poses
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 
 _SAME = 1e-9
 """Poses that differ by less, [m] and unitless, are one and the same."""
@@ -20,17 +20,17 @@ def check_order(assembly: Assembly, stages: tuple[Poses, ...], file: str) -> Non
     """
     for k, operation in enumerate(assembly.operations):
         loose = _loose(assembly, k)
-        if loose is not None:
-            raise InputError(
-                f"{file}, operation {k + 1}, carries: '{loose}' is carried, but no contact that stands at that time "
-                f"connects it with '{operation.main}', not even through another carried part; leave it out, or let an "
-                "earlier operation make that contact."
-            )
-        if np.abs(stages[k + 1][operation.main] - stages[k][operation.main]).max() < _SAME:
-            raise InputError(
-                f"{file}, operation {k + 1}, goal: '{operation.main}' stands there already; give another goal, or take "
-                "this operation out."
-            )
+        require(
+            loose is None,
+            f"{file}, operation {k + 1}, carries: '{loose}' is carried, but no contact that stands at that time "
+            f"connects it with '{operation.main}', not even through another carried part; leave it out, or let an "
+            "earlier operation make that contact.",
+        )
+        require(
+            np.abs(stages[k + 1][operation.main] - stages[k][operation.main]).max() >= _SAME,
+            f"{file}, operation {k + 1}, goal: '{operation.main}' stands there already; give another goal, or take "
+            "this operation out.",
+        )
         earlier = _put_aside_before(assembly, k)
         if earlier is not None:
             raise InputError(
@@ -38,11 +38,11 @@ def check_order(assembly: Assembly, stages: tuple[Poses, ...], file: str) -> Non
                 "and nothing is put against it after that; take one of the two operations out."
             )
         left = _left_in_the_air(assembly, k)
-        if left is not None:
-            raise InputError(
-                f"{file}, operation {k + 1}, carries: after it '{left}' rests on nothing that a contact names; "
-                "carry it along, or move it first."
-            )
+        require(
+            left is None,
+            f"{file}, operation {k + 1}, carries: after it '{left}' rests on nothing that a contact names; "
+            "carry it along, or move it first.",
+        )
 
 
 def _left_in_the_air(assembly: Assembly, k: int) -> str | None:

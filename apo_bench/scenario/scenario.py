@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from types import MappingProxyType
 from typing import final
 
 import numpy as np
@@ -147,6 +146,4 @@ class Scenario:
     """Fixed parts whose start is in the frame of the assembly, so that the site moves them too."""
 
     def __post_init__(self) -> None:
-        freeze(self, goals=(len(self.assembly), 4, 4), start=(4, 4))
-        object.__setattr__(self, "part_files", MappingProxyType(dict(self.part_files)))
-        object.__setattr__(self, "colors", MappingProxyType(dict(self.colors)))
+        freeze(self, goals=(len(self.assembly), 4, 4), start=(4, 4), part_files=None, colors=None)
