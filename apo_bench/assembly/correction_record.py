@@ -100,8 +100,7 @@ class Hypothesis:
     """What is believed in place of what was stated, in words; empty if all is believed as stated."""
 
     def __post_init__(self) -> None:
-        n = len(self.goals)
-        freeze(self, goals=(None, 4, 4), covariance=(n, 6, 6))
+        freeze(self, goals=(None, 4, 4), covariance=(len(self.goals), 6, 6))
 
 
 @final
@@ -147,8 +146,7 @@ class Correction:
     """All that were kept, the likeliest first; empty of correctors that believe one explanation only."""
 
     def __post_init__(self) -> None:
-        n = len(self.goals)
-        freeze(self, goals=(None, 4, 4), covariance=(n, 6, 6), targets=(len(self.schedule), 4, 4))
+        freeze(self, goals=(None, 4, 4), covariance=(len(self.goals), 6, 6), targets=(len(self.schedule), 4, 4))
 
     @property
     def ok(self) -> bool:

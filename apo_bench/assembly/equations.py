@@ -12,10 +12,9 @@ A part that was never moved rests where it started. That pose is one more motion
 the operations are preceded by one operation per part that puts it at its start.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import final
 
 import numpy as np
@@ -60,7 +59,7 @@ class Equations:
         wanted = np.array(sorted(free), dtype=np.intp) + len(self.start)
         return np.asarray(np.isin(self.letters, wanted).any(axis=1))
 
-    def among(self, contacts: NDArray[np.bool_]) -> Equations:
+    def among(self, contacts: NDArray[np.bool_]) -> "Equations":
         """The equations of these contacts, (c,), alone."""
         rows = contacts[self.contact]
         number = np.cumsum(contacts) - 1
@@ -118,17 +117,13 @@ class Equations:
 
     def _points(self, F: Array) -> list[Array]:
         """F_j+1 .. F_w v for every j: the vertices on their way to the frame of the plane, [(m, 4)]."""
-        points = [self.vertex]
-        for j in reversed(range(F.shape[1])):
-            points.append(np.einsum("mij,mj->mi", F[:, j], points[-1]))
-        return points[::-1]
+        letters = reversed(F.swapaxes(0, 1))
+        return list(accumulate(letters, lambda v, T: np.einsum("mij,mj->mi", T, v), initial=self.vertex))[::-1]
 
     def _forms(self, F: Array) -> list[Array]:
         """n F_1 .. F_j for every j: the planes on their way to the frame of the vertices, [(m, 4)]."""
-        forms = [self.plane]
-        for j in range(F.shape[1]):
-            forms.append(np.einsum("mi,mij->mj", forms[-1], F[:, j]))
-        return forms
+        letters = F.swapaxes(0, 1)
+        return list(accumulate(letters, lambda n, T: np.einsum("mi,mij->mj", n, T), initial=self.plane))
 
 
 def equations(assembly: Assembly, start: Poses, goals: Array) -> Equations:

@@ -4,8 +4,6 @@ Goals are one pose per operation, shape (n, 4, 4), world frame, [m]. Parts that 
 `start` pose; for a fixed part that is where it stays. From both follows where every part stands after each operation.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -107,7 +105,7 @@ class Observation:
         seen.flags.writeable = False
         object.__setattr__(self, "seen", seen)
 
-    def plan(self) -> Plan:
+    def plan(self) -> "Plan":
         """What was seen, as it is: the plan of the method `none`.
 
         Raises:
@@ -190,16 +188,15 @@ def schedule_fault(schedule: Sequence[Step], operations: int) -> str:
     """
     done = 0
     for k, undo in schedule:
-        if not 0 <= k < operations:
-            return f"names operation {k + 1}, where {operations} are known"
-        if undo and k >= done:
-            return f"undoes operation {k + 1}, which is not done"
-        if undo and k < done - 1:
-            return f"undoes operation {k + 1} before operation {done}, which came after it"
-        if not undo and k < done:
-            return f"does operation {k + 1} again, which is done"
-        if not undo and k > done:
-            return f"does operation {k + 1} before operation {done + 1}"
+        faults = {
+            f"names operation {k + 1}, where {operations} are known": not 0 <= k < operations,
+            f"undoes operation {k + 1}, which is not done": undo and k >= done,
+            f"undoes operation {k + 1} before operation {done}, which came after it": undo and k < done - 1,
+            f"does operation {k + 1} again, which is done": not undo and k < done,
+            f"does operation {k + 1} before operation {done + 1}": not undo and k > done,
+        }
+        if any(faults.values()):
+            return next(fault for fault, is_one in faults.items() if is_one)
         done += -1 if undo else 1
     return f"leaves operation {done + 1} undone" if done < operations else ""
 

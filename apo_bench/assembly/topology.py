@@ -3,12 +3,11 @@
 One file of more than 250 lines: `Assembly` is what is known for certain, and each of its questions is a few lines.
 """
 
-from __future__ import annotations
-
 import math
 from bisect import bisect
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import reduce
 from types import MappingProxyType
 from typing import Literal, NamedTuple, final
 
@@ -62,11 +61,8 @@ class Gap(NamedTuple):
 
     def interval(self, play_m: float) -> tuple[float, float]:
         """Least and greatest distance along the normal, [m], of parts with this play per side."""
-        if self.kind == "centred":
-            return 0.0, 0.0
-        if self.kind == "contact":
-            return -play_m, -play_m
-        return -play_m if self.low_m is None else self.low_m, play_m if self.high_m is None else self.high_m
+        asked = -play_m if self.low_m is None else self.low_m, play_m if self.high_m is None else self.high_m
+        return {"centred": (0.0, 0.0), "contact": (-play_m, -play_m), "clearance": asked}[self.kind]
 
 
 @final
@@ -187,7 +183,7 @@ class Assembly:
         every.flags.writeable = False
         return every
 
-    def first(self, n: int) -> Assembly:
+    def first(self, n: int) -> "Assembly":
         """What is known after n operations: the same parts, no later operation."""
         return replace(self, operations=self.operations[:n])
 
@@ -278,7 +274,4 @@ def spelled(odl: Iterable[Term]) -> str:
 
 def product(odl: Iterable[Term], goals: Array) -> Array:
     """The pose an ODL stands for, given the motion parameters `goals` (n, 4, 4) -> (4, 4)."""
-    T = np.eye(4)
-    for k, inverse in odl:
-        T = T @ (pose.inverse(goals[k]) if inverse else goals[k])
-    return T
+    return reduce(np.matmul, (pose.inverse(goals[k]) if inverse else goals[k] for k, inverse in odl), np.eye(4))

@@ -31,8 +31,7 @@ def convex_of(hull: Hull) -> Convex:
     corners = hull.corners - hull.center
     on = np.abs(corners @ planes[:, :3].T - planes[:, 3]) < 100 * _ON_M
     shared = on.astype(np.int64) @ on.T.astype(np.int64)
-    pairs = np.argwhere(np.triu(shared >= 2, k=1))
-    return Convex(planes, corners[pairs], None)
+    return Convex(planes, corners[np.argwhere(np.triu(shared >= 2, k=1))], None)
 
 
 def alike(a: Convex | None, b: Convex | None) -> bool:

@@ -1,9 +1,7 @@
 """Put a shape where measured points are: where a fit may begin, and the least robust distance of the points from it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
-from typing import NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,16 +40,13 @@ class Points:
     def __len__(self) -> int:
         return len(self.at)
 
-    def only(self, kept: NDArray[np.bool_]) -> Points:
+    def only(self, kept: NDArray[Any]) -> "Points":
         """Some of them."""
         return Points(self.at[kept], self.ray[kept], self.view[kept])
 
-    def thinned(self, n: int) -> Points:
+    def thinned(self, n: int) -> "Points":
         """About n of them, evenly out of their order."""
-        if len(self) <= n:
-            return self
-        kept = np.linspace(0, len(self) - 1, n).round().astype(int)
-        return Points(self.at[kept], self.ray[kept], self.view[kept])
+        return self if len(self) <= n else self.only(np.linspace(0, len(self) - 1, n).round().astype(int))
 
 
 class ShapeFits(NamedTuple):
@@ -77,7 +72,7 @@ def starts(shape: Shape, points: Array, same: Array) -> Array:
     c = np.cos(turn)
     s = np.sin(turn)
     Z = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    low, high = _extent(points @ Z)
+    low, high = np.quantile(points @ Z, (_EDGE, 1.0 - _EDGE), axis=0)
     turns = distinct(quarter_turns(), same)
     T = np.tile(np.eye(4), (len(turns), 1, 1))
     for start, R in zip(T, turns, strict=True):
@@ -101,11 +96,6 @@ def turned_bounds(shape: Shape, R: Array) -> tuple[Array, Array]:
     centers = shape.center @ R.T
     reach = np.einsum("kij,kj->ki", np.abs(R @ shape.turn), shape.half)
     return (centers - reach).min(axis=0), (centers + reach).max(axis=0)
-
-
-def _extent(points: Array) -> tuple[Array, Array]:
-    low, high = np.quantile(points, (_EDGE, 1.0 - _EDGE), axis=0)
-    return low, high
 
 
 def _sides(flat: Array) -> float:
@@ -166,8 +156,7 @@ def covariance(shape: Shape, points: Points, T: Array, width_m: float, noise_m: 
     loose = float(weight.mean()) * (max(noise_m, _LEAST_NOISE_M) / PRIOR) ** 2
     inverse = np.linalg.inv(J.T @ WJ + np.diag(loose))
     # An error along a ray moves a point off the surface by the cosine between ray and normal.
-    gradient = -J[:, :3]
-    slope = np.einsum("ni,ni->n", gradient @ T[:3, :3].T, points.ray)
+    slope = np.einsum("ni,ni->n", -J[:, :3] @ T[:3, :3].T, points.ray)
     variance = (noise_m * slope) ** 2 + _LEAST_NOISE_M**2
     middle = WJ.T @ (variance[:, None] * WJ)
     for v in np.unique(points.view):

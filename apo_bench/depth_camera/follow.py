@@ -89,12 +89,10 @@ def follow_demonstration(
             operation = assembly.operations[which]
             solid = assembly.solids[operation.main]
             turn = frame @ expected.turns[which]
-            T = nearest_symmetric_pose(located.T, symmetries(solid), turn)
-            T = turned_alike(solid, T, turn)
-            C = _turned(located, T)
+            T = turned_alike(solid, nearest_symmetric_pose(located.T, symmetries(solid), turn), turn)
             if not any(event.found for event in events):
                 frame = T[:3, :3] @ expected.turns[which].T
-            located = LocatedModel(T, C, located.explained)
+            located = LocatedModel(T, _turned(located, T), located.explained)
             step = T @ pose.inverse(believed[operation.main])
             believed |= {part: step @ believed[part] for part in operation.moves}
         k = k + 1 if which is None else which + 1

@@ -61,16 +61,12 @@ class Appearance:
         """The measured points; the outermost pixels of the regions are left out."""
         from scipy.ndimage import binary_erosion
 
-        at = []
-        rays = []
-        numbers = []
+        points: list[Points] = []
         for v, (view, image, mask) in enumerate(zip(self.views, self.images, self.masks, strict=True)):
             pixels = np.flatnonzero(binary_erosion(mask) & np.isfinite(image))
             ray = view.rays[pixels]
-            at.append(view.origin + image.ravel()[pixels, None] * ray)
-            rays.append(ray)
-            numbers.append(np.full(len(pixels), v))
-        return Points(*map(np.concatenate, (at, rays, numbers)))
+            points.append(Points(view.origin + image.ravel()[pixels, None] * ray, ray, np.full(len(pixels), v)))
+        return Points(*(np.concatenate([getattr(each, name) for each in points]) for name in ("at", "ray", "view")))
 
     @cached_property
     def smooth(self) -> Array:

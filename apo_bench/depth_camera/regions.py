@@ -102,8 +102,7 @@ def share_explained(
         pixels = pixels[np.isfinite(measured)]
         measured = measured[np.isfinite(measured)]
         origin = pose.apply(to, view.origin[None])[0]
-        rays = view.rays[pixels] @ T[:3, :3]
-        expected, _ = strike_distances(shape, origin, rays)
+        expected, _ = strike_distances(shape, origin, view.rays[pixels] @ T[:3, :3])
         new = mask.ravel()[pixels]
         # Against the model: what appeared and is not its surface, and what stayed though it would hide that.
         agrees = np.abs(expected - measured) < close

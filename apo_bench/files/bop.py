@@ -62,26 +62,18 @@ def read_results(path: str | Path) -> PoseRows:
     Raises:
         InputError: Anything that is not as described, with the line where it stands.
     """
-    ids = array("q")
     numbers = array("d")
-    scores = array("d")
-    lines = array("q")
-    for line, text in _lines(path):
+    for row, (line, text) in enumerate(_lines(path)):
         place = f"{path}, line {line}"
-        if len(lines) == MOST_ROWS:
+        if row == MOST_ROWS:
             raise InputError(f"{place}: a file of at most {MOST_ROWS} rows is needed; split it by scenes.")
-        scene, image, part, score, pose = _row(text, place)
-        ids.extend((scene, image, part))
-        numbers.extend(pose)
-        scores.append(score)
-        lines.append(line)
-    require(lines, f"{path}: no pose stands in the file; below its first line, one row per pose is needed.")
-    cells = np.frombuffer(numbers, dtype=np.float64).reshape(-1, 12)
-    where = np.frombuffer(ids, dtype=np.int64).reshape(-1, 3)
-    R = cells[:, :9].reshape(-1, 3, 3)
-    t = cells[:, 9:]
-    stated = np.frombuffer(scores, dtype=np.float64)
-    return check_rows(PoseRows(str(path), where, R, t, np.frombuffer(lines, dtype=np.int64), stated))
+        numbers.extend((line, *_row(text, place)))
+    require(numbers, f"{path}: no pose stands in the file; below its first line, one row per pose is needed.")
+    # Line, scene, image, object, score, R row by row, t: whole numbers of so many digits are exact.
+    cells = np.frombuffer(numbers, dtype=np.float64).reshape(-1, 17)
+    whole = cells[:, :4].astype(np.int64)
+    R = cells[:, 5:14].reshape(-1, 3, 3)
+    return check_rows(PoseRows(str(path), whole[:, 1:], R, cells[:, 14:], whole[:, 0], cells[:, 4]))
 
 
 def check_rows(rows: PoseRows) -> PoseRows:
@@ -148,7 +140,7 @@ def _check_header(text: str, place: str) -> None:
     raise InputError(f"{place}: the columns are {text[:80]}; {_WANTED}.")
 
 
-def _row(text: str, place: str) -> tuple[int, int, int, float, list[float]]:
+def _row(text: str, place: str) -> tuple[float, ...]:
     """Scene, image, object, score and the twelve numbers of R and t."""
     cells = text.split(",")
     if len(cells) != len(_COLUMNS):
@@ -157,7 +149,7 @@ def _row(text: str, place: str) -> tuple[int, int, int, float, list[float]]:
     (score,) = _numbers(cells[3], 1, f"{place}, score")
     pose = _numbers(cells[4], 9, f"{place}, R") + _numbers(cells[5], 3, f"{place}, t")
     _numbers(cells[6], 1, f"{place}, time")
-    return scene, image, part, score, pose
+    return scene, image, part, score, *pose
 
 
 def _id(text: str, place: str, name: str) -> int:

@@ -33,8 +33,7 @@ def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) 
         truth = _read_scene(path, scene)
     else:
         truth = read_results(path)
-    estimated = np.unique(estimates.where[:, :2], axis=0)
-    estimated_rows = _among(truth.where[:, :2], estimated)
+    estimated_rows = _among(truth.where[:, :2], estimates.where[:, :2])
     if scene is not None:
         estimated_rows &= truth.where[:, 0] == scene
     if not estimated_rows.any():

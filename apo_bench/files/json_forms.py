@@ -40,7 +40,7 @@ def observation_form(observation: Observation, scenario: str) -> Form:
         "gap_mm": observation.gap_m * 1e3,
         "play_mm": observation.play_m * 1e3,
         "operations": _operations_form(observation.assembly, observation.goals, extra),
-        **_outliers_form(observation.outliers),
+        **({} if observation.outliers is None else {"outliers": _outliers_form(observation.outliers)}),
         "shared": [_shared_form(error) for error in observation.shared],
         **({} if observation.tails is None else {"tails": _tails_form(observation.tails)}),
     }
@@ -69,7 +69,7 @@ def write_form(form: Form, path: str | Path) -> None:
 
 
 def _head(schema: str, scenario: str, start: Poses) -> Form:
-    return {"schema": schema, "scenario": scenario, "start": _poses_form(start)}
+    return {"schema": schema, "scenario": scenario, "start": {part: pose_form(T) for part, T in start.items()}}
 
 
 def pose_form(T: Array) -> Form:
@@ -78,19 +78,13 @@ def pose_form(T: Array) -> Form:
     return {"position_mm": (packed[:3] * 1e3).tolist(), "quaternion_wxyz": packed[3:].tolist()}
 
 
-def _poses_form(poses: Poses) -> Form:
-    return {part: pose_form(T) for part, T in poses.items()}
-
-
 def covariance_form(C: Array) -> list[list[float]]:
     """A covariance (6, 6), [m, rad], in mm and degrees."""
     return (C * np.outer(TO_MM_DEG, TO_MM_DEG)).tolist()
 
 
-def _outliers_form(outliers: OutlierModel | None) -> Form:
-    if outliers is None:
-        return {}
-    return {"outliers": {key: getattr(outliers, name) for key, name in OUTLIER_KEYS.items()}}
+def _outliers_form(outliers: OutlierModel) -> Form:
+    return {key: getattr(outliers, name) for key, name in OUTLIER_KEYS.items()}
 
 
 def _shared_form(error: SharedError) -> Form:

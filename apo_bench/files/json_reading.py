@@ -195,8 +195,7 @@ def _operations(
 
 def _pose(fields: Mapping[str, JsonNode]) -> Array:
     position = fields["position_mm"].numbers(3)
-    q = fields["quaternion_wxyz"].quaternion()
-    return pose.unpack(np.concatenate([position * 1e-3, q]))
+    return pose.unpack(np.concatenate([position * 1e-3, fields["quaternion_wxyz"].quaternion()]))
 
 
 def _poses(node: JsonNode, scenario: Scenario) -> Poses:

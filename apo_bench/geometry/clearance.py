@@ -109,11 +109,8 @@ def _thinner(solid: Solid, hull: Hull, clearance_m: float) -> Hull:
     center, axis, radius, half = hull.cylinder
     if any(face.fit and _same_wall(face, hull) for face in solid.rounds.values()):
         radius -= clearance_m
-    ends = []
-    for sign in (-1.0, 1.0):
-        n = sign * axis
-        fit = _on_fit(solid, hull, np.append(n, n @ center + half))
-        ends.append(sign * (half - clearance_m * fit))
+    sides = {sign: np.append(sign * axis, sign * axis @ center + half) for sign in (-1.0, 1.0)}
+    ends = [sign * (half - clearance_m * _on_fit(solid, hull, side)) for sign, side in sides.items()]
     if radius < _THINNEST_M or ends[1] - ends[0] < 2.0 * _THINNEST_M:
         raise _swallowed(solid, hull, clearance_m)
     middle = center + (ends[0] + ends[1]) / 2 * axis
@@ -156,8 +153,7 @@ def _on_round(face: RoundFace, hull: Hull, side: Array) -> bool:
     w = 1.0 / np.sqrt(1.0 + face.slope**2)
     r = face.radii[0] - face.slope * face.span[0]
     n = side[:3]
-    d = side[3]
-    if abs(n @ face.axis - face.slope * w) > _PARALLEL or abs(n @ face.point - d - r * w) > _ON_M:
+    if abs(n @ face.axis - face.slope * w) > _PARALLEL or abs(n @ face.point - side[3] - r * w) > _ON_M:
         return False
     at = (_corners_on(hull, side) - face.point) @ face.axis
     return bool(at.max() > face.span[0] + _ON_M and at.min() < face.span[1] - _ON_M)
@@ -168,8 +164,7 @@ def _on_flat(face: Face, piece: Piece, side: Array) -> bool:
     from shapely import MultiPoint
 
     n = side[:3]
-    d = side[3]
-    if n @ face.normal < 1.0 - _PARALLEL or abs(n @ face.outline[0] - d) > _ON_M:
+    if n @ face.normal < 1.0 - _PARALLEL or abs(n @ face.outline[0] - side[3]) > _ON_M:
         return False
     to_plane = plane_across(n)
     own = MultiPoint(_corners_on(piece, side) @ to_plane).convex_hull

@@ -97,6 +97,13 @@ def boxes_around(pieces: tuple[Piece, ...]) -> tuple[Array, Array]:
     return frozen([piece.center for piece in pieces], None, 3), frozen([piece.half for piece in pieces], None, 3)
 
 
+def boxes_reach(a: tuple[Piece, ...], R_a: Array, b: tuple[Piece, ...], R_b: Array, axes: Array) -> Array:
+    """Half lengths of the shadows on axes, (k, 3), of each box of a solid and each of another together, (a, b, k)."""
+    # The shadow of a box of half sizes h on a unit vector u of its frame is |u| . h long to each side.
+    halves = [boxes_around(of)[1] @ np.abs(axes @ R).T for of, R in ((a, R_a), (b, R_b))]
+    return np.asarray(halves[0][:, None] + halves[1][None])
+
+
 @lru_cache(maxsize=4096)
 def ball_around(pieces: tuple[Piece, ...]) -> tuple[Array, float]:
     """Middle, (3,), of the box around all pieces, in the frame of their solid, and half its diagonal, [m]."""

@@ -54,7 +54,7 @@ def approximate_symmetries(solid: Solid, least_share: float = LEAST_SHARE) -> Fl
         turns = np.array([turn_about(solid.centroid, axis, angle) for axis in axes for angle in _TURNS_RAD])
     else:
         turns = turn_about(body.point, across_axis(body.axis), np.pi)[None]
-    exact = np.array([_is_exact(solid, F) for F in turns])
+    exact = np.abs(turns[:, None] - symmetries(solid)).max(axis=(2, 3)).min(axis=1) < _SAME
     shares = np.ones(len(turns))
     turned = np.concatenate([np.zeros((0, 3)), *(pose.apply(F, points) for F in turns[~exact])])
     # Share = volume of the points that lie in the part after the turn, over the volume of all points.
@@ -101,8 +101,3 @@ def _inside(piece: Piece, points: Array) -> NDArray[np.bool_]:
     inside = np.zeros(len(points), dtype=np.bool_)
     inside[near] = depth_inside(piece, points[near]) >= -_SAME
     return inside
-
-
-def _is_exact(solid: Solid, F: Array) -> bool:
-    """Whether a turn is a symmetry."""
-    return bool((np.abs(symmetries(solid) - F).max(axis=(1, 2)) < _SAME).any())

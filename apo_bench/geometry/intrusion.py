@@ -15,6 +15,7 @@ from apo_bench.geometry.convex import (
     balls_apart,
     box_axes,
     boxes_around,
+    boxes_reach,
     separating_axes,
     shadow,
 )
@@ -56,15 +57,13 @@ def intrusion_depths(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece
     Returns:
         (k,), [m].
     """
-    if not (_all_boxes(a) and _all_boxes(b)):
+    if not (all_boxes(a) and all_boxes(b)):
         return _piece_by_piece(a, R_a, at, b, T_b)
-    centers_a, halves_a = boxes_around(a)
-    centers_b, halves_b = boxes_around(b)
     axes = box_axes(R_a, T_b[:3, :3])
-    # The shadow of a box of half sizes h on a unit vector u of its frame is |u| . h long to each side. Two boxes are as
-    # deep in each other as their shadows on the axis on which that is least; pieces as their deepest pair.
-    reach = (halves_a @ np.abs(axes @ R_a).T)[:, None] + (halves_b @ np.abs(axes @ T_b[:3, :3]).T)[None]
-    between = (centers_a @ R_a.T)[:, None] - (centers_b @ T_b[:3, :3].T + T_b[:3, 3])[None]
+    # Two boxes are as deep in each other as their shadows on the axis on which that is least; pieces as their deepest
+    # pair.
+    reach = boxes_reach(a, R_a, b, T_b[:3, :3], axes)
+    between = (boxes_around(a)[0] @ R_a.T)[:, None] - (boxes_around(b)[0] @ T_b[:3, :3].T + T_b[:3, 3])[None]
     apart = np.abs((between @ axes.T)[None] + (at @ axes.T)[:, None, None])
     return np.asarray((reach[None] - apart).min(axis=-1).max(axis=(1, 2)))
 
@@ -73,14 +72,11 @@ def ways_out(a: Solid, T_a: Array, b: Solid, T_b: Array, deep_m: float) -> Itera
     """Of each pair of pieces of two posed solids that are deeper in each other, how they may be taken apart."""
     R_a = T_a[:3, :3]
     R_b = T_b[:3, :3]
-    if _all_boxes(a.pieces) and _all_boxes(b.pieces):
+    if all_boxes(a.pieces) and all_boxes(b.pieces):
         axes = box_axes(R_a, R_b)
-        centers_a, halves_a = boxes_around(a.pieces)
-        centers_b, halves_b = boxes_around(b.pieces)
-        reach = (halves_a @ np.abs(axes @ R_a).T)[:, None] + (halves_b @ np.abs(axes @ R_b).T)[None]
-        between = pose.apply(T_a, centers_a)[:, None] - pose.apply(T_b, centers_b)[None]
-        along = between @ axes.T
-        depths = reach - np.abs(along)
+        centers_a, centers_b = (pose.apply(T, boxes_around(of.pieces)[0]) for T, of in ((T_a, a), (T_b, b)))
+        along = (centers_a[:, None] - centers_b[None]) @ axes.T
+        depths = boxes_reach(a.pieces, R_a, b.pieces, R_b, axes) - np.abs(along)
         for i, j in np.argwhere(depths.min(axis=-1) > deep_m):
             yield _ways(a.pieces[i], T_a, b.pieces[j], T_b, axes, along[i, j], depths[i, j])
         return
@@ -174,11 +170,6 @@ def _depths(a: Piece, R_a: Array, at: Array, b: Piece, T_b: Array, axes: Array) 
 
 
 @lru_cache(maxsize=1024)
-def _all_boxes(pieces: tuple[Piece, ...]) -> bool:
-    return all_boxes(pieces)
-
-
-@lru_cache(maxsize=1024)
 def _balls(pieces: tuple[Piece, ...]) -> tuple[Array, Array]:
     """Middles, (k, 3), and radii, (k,), of balls around pieces, in the frame of their solid."""
     corners = [piece.corners for piece in pieces]
@@ -193,7 +184,7 @@ def upright_bounds(pieces: tuple[Piece, ...], R: Array, at: Array) -> tuple[Arra
         R: (3, 3), their orientation.
         at: (3,), the place of their frame, [m].
     """
-    if not _all_boxes(pieces):
+    if not all_boxes(pieces):
         corners = all_corners(pieces)[0] @ R.T + at
         return corners.min(axis=0), corners.max(axis=0)
     centers, halves = boxes_around(pieces)

@@ -161,8 +161,7 @@ def _reaches(shaft: RoundFace, T: Array, n: Array) -> bool:
     if shaft.toward is None or shaft.extent_rad >= WHOLE_TURN:
         return True
     down = _across(-n, T[:3, :3] @ shaft.axis)
-    toward = T[:3, :3] @ shaft.toward
-    return angle_between(down, toward) <= shaft.extent_rad / 2 + _EDGE_ON
+    return angle_between(down, T[:3, :3] @ shaft.toward) <= shaft.extent_rad / 2 + _EDGE_ON
 
 
 def _lines(ends: Array, flat: Face) -> list[tuple[float, float]]:

@@ -74,8 +74,7 @@ def overlap_area(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
 
 def beside(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
     """How far `face`, projected onto the plane of `on`, lies beside it, [m]; 0 if one covers some of the other."""
-    upper = face_shape(face, _into_plane(on) @ pose.inverse(T_on) @ T_face)
-    return float(upper.distance(own_shape(on)))
+    return float(face_shape(face, _into_plane(on) @ pose.inverse(T_on) @ T_face).distance(own_shape(on)))
 
 
 def face_area(face: Face) -> float:
@@ -89,8 +88,7 @@ def _common(face: Face, T_face: Array, on: Face, T_on: Array) -> tuple[Any, list
     T_on_face = pose.inverse(T_on) @ T_face
     if abs(on.normal @ T_on_face[:3, :3] @ face.normal) < _EDGE_ON:
         return None, []
-    upper = face_shape(face, _into_plane(on) @ T_on_face)
-    common = upper.intersection(own_shape(on))
+    common = face_shape(face, _into_plane(on) @ T_on_face).intersection(own_shape(on))
     return common, [piece for piece in polygons_of(common) if piece.area > SLIVER_M2]
 
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import final
 
 import numpy as np
@@ -93,7 +93,8 @@ Piece = Box | Hull
 box that it is or that is around it."""
 
 
-def all_boxes(pieces: Iterable[Piece]) -> bool:
+@lru_cache(maxsize=4096)
+def all_boxes(pieces: tuple[Piece, ...]) -> bool:
     """Whether there is nothing but boxes."""
     return all(isinstance(piece, Box) for piece in pieces)
 

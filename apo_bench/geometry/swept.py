@@ -13,7 +13,15 @@ from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.convex import across_edges, across_sides, ball_around, box_axes, boxes_around, shadow
+from apo_bench.geometry.convex import (
+    across_edges,
+    across_sides,
+    ball_around,
+    box_axes,
+    boxes_around,
+    boxes_reach,
+    shadow,
+)
 from apo_bench.geometry.solid import Piece, all_boxes
 
 _SLACK_M = 5e-5
@@ -49,14 +57,10 @@ def overlap_intervals(
 
 def _boxed(moving: Posed, way: Array, resting: Posed, slack_m: float) -> tuple[NDArray[np.intp], Array]:
     """Which pairs of pieces, by number, the boxes around them meet on a line, (k,), and from and until, (k, 2)."""
-    centers_a, half_a = boxes_around(moving.pieces)
-    centers_b, half_b = boxes_around(resting.pieces)
-    a = pose.apply(moving.T, centers_a)
-    b = pose.apply(resting.T, centers_b)
-    axes = box_axes(moving.T[:3, :3], resting.T[:3, :3])
-    reach_a = half_a @ np.abs(axes @ moving.T[:3, :3]).T
-    reach_b = half_b @ np.abs(axes @ resting.T[:3, :3]).T
-    reach = (reach_a[:, None] + reach_b[None]).reshape(-1, len(axes)) - slack_m
+    a, b = (pose.apply(of.T, boxes_around(of.pieces)[0]) for of in (moving, resting))
+    R_a, R_b = (of.T[:3, :3] for of in (moving, resting))
+    axes = box_axes(R_a, R_b)
+    reach = boxes_reach(moving.pieces, R_a, resting.pieces, R_b, axes).reshape(-1, len(axes)) - slack_m
     at = ((a @ axes.T)[:, None] - (b @ axes.T)[None]).reshape(-1, len(axes))
     return _intervals(at, axes @ way, reach)
 
@@ -109,8 +113,7 @@ def exit_distance(moving: Sequence[Posed], way: Array, resting: Sequence[Posed])
         owners += [(m, r, int(k)) for k in pairs]
     # Follow the intervals that overlap from 0 on: each one that begins before the end so far moves that end outwards.
     at = 0.0
-    last = np.array([span[1] for span in spans])
-    order = np.argsort(-last, kind="stable")
+    order = np.argsort([-span[1] for span in spans], kind="stable")
     while (i := next((i for i in order if spans[i][0] <= at < spans[i][1]), None)) is not None:
         if not exact[i]:
             m, r, k = owners[i]

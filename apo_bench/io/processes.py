@@ -31,13 +31,10 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
 
 def descendants(pid: int) -> list[int]:
     """Children, their children and so on, those that have ended and are not waited for too; empty without /proc."""
-    below_all = []
-    todo = [pid]
-    while todo:
-        below = _children(todo.pop())
-        below_all += below
-        todo += below
-    return below_all
+    known = [pid]
+    for process in known:  # which grows meanwhile
+        known += _children(process)
+    return known[1:]
 
 
 def end_descendants(pid: int, spared: Collection[int] = ()) -> None:

@@ -172,8 +172,7 @@ def _same_wall(a: RoundFace, b: RoundFace) -> bool:
 def _check_round(wall: RoundFace, pieces: tuple[Piece, ...], place: str) -> float:
     """A wall is as far from its axis as it says; returns what of the volume lies between it and the sides, [m^3]."""
     heights, radii = _samples(wall)
-    middle = wall.toward is None
-    angle = wall.extent_rad * ((np.arange(_RAYS) + 0.5) / _RAYS - (0.0 if middle else 0.5))
+    angle = wall.extent_rad * ((np.arange(_RAYS) + 0.5) / _RAYS - (0.0 if wall.toward is None else 0.5))
     near = _near(pieces, wall.ends, max(wall.radii) * (1.0 + _COARSE) + _ABOVE_M)
     if not near:
         _fail(place, "no piece is near the face")

@@ -88,31 +88,26 @@ def _mesh(solid: Solid) -> Any:
 
 def check_one_piece(pieces: Sequence[Piece], path: Path) -> None:
     """Raise an `InputError` unless every piece touches the others, over some of them."""
-    owner = list(range(len(pieces)))
+    from scipy.cluster.hierarchy import DisjointSet
+
+    solids = DisjointSet(range(len(pieces)))
     tests = 0
     low = np.array([piece.center - piece.half for piece in pieces]) - _TOUCHING_M
     high = np.array([piece.center + piece.half for piece in pieces]) + _TOUCHING_M
     for i in range(len(pieces)):
         for k in np.flatnonzero((low[:i] <= high[i]).all(axis=1) & (high[:i] >= low[i]).all(axis=1)):
-            a = _root(owner, i)
-            b = _root(owner, int(k))
-            if a == b:
+            if solids.connected(i, int(k)):
                 continue
             tests += 1
             require(
                 tests <= _MOST_TESTS, f"{path}: whether the pieces touch takes too long to find out; use fewer pieces."
             )
             if _gap(pieces[i], pieces[int(k)]) < _TOUCHING_M:
-                owner[a] = b
-    count = len({_root(owner, i) for i in range(len(pieces))})
-    require(count <= 1, f"{path}: the pieces make {count} separate solids; a part is one rigid piece.")
-
-
-def _root(owner: list[int], i: int) -> int:
-    while owner[i] != i:
-        owner[i] = owner[owner[i]]
-        i = owner[i]
-    return i
+                solids.merge(i, int(k))
+    require(
+        solids.n_subsets <= 1,
+        f"{path}: the pieces make {solids.n_subsets} separate solids; a part is one rigid piece.",
+    )
 
 
 def _gap(a: Piece, b: Piece) -> float:

@@ -47,8 +47,7 @@ class Surface(NamedTuple):
 
     def _lifted(self, ring: Array) -> Array:
         flat = straightened(ring)
-        first = np.lexsort(flat.T[::-1])[0]
-        flat = np.roll(flat, -first, axis=0)
+        flat = np.roll(flat, -np.lexsort(flat.T[::-1])[0], axis=0)
         out = np.empty((len(flat), 3))
         out[:, self.axis] = self.height
         out[:, (self.axis + 1) % 3], out[:, (self.axis + 2) % 3] = flat.T
@@ -118,24 +117,11 @@ def _full_cells(boxes: Sequence[Box], grid: Sequence[Array]) -> NDArray[np.bool_
     return full
 
 
-def _rectangles(bare: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Few rectangles that make up the cells (i, j) of a mask: (4, n), lowest and beyond-highest i, then j.
-
-    Cells in a row are one run, and runs from row to row that are the same are one rectangle.
-    """
-    # Runs of cells along j begin where the padded row steps up and end where it steps down.
+def _runs(bare: NDArray[np.bool_]) -> tuple[NDArray[np.intp], ...]:
+    """The runs of cells (i, j) of a mask along j: i, the lowest j, and the one beyond the highest, (n,) each."""
+    # They begin where the padded row steps up and end where it steps down.
     ends = np.diff(np.pad(bare, ((0, 0), (1, 1))).astype(np.int8), axis=1)
-    row, low = np.nonzero(ends == 1)
-    high = np.nonzero(ends == -1)[1]
-    order = np.lexsort((row, high, low))
-    row = row[order]
-    low = low[order]
-    high = high[order]
-    # Runs of one extent in rows that follow each other make one rectangle.
-    same = (np.diff(row) == 1) & (np.diff(low) == 0) & (np.diff(high) == 0)
-    first = np.flatnonzero(np.concatenate([[True], ~same])[: len(row)])
-    last = np.append(first[1:], len(row))[: len(first)] - 1
-    return np.array([row[first], row[last] + 1, low[first], high[first]], dtype=np.int64)
+    return *np.nonzero(ends == 1), np.nonzero(ends == -1)[1]
 
 
 def _surfaces(full: NDArray[np.bool_], grid: Sequence[Array]) -> Iterator[Surface]:
@@ -151,7 +137,7 @@ def _surfaces(full: NDArray[np.bool_], grid: Sequence[Array]) -> Iterator[Surfac
         for k, layer in enumerate(layers):
             beyond = k + 1 if forward else k - 1
             bare = layer & ~layers[beyond] if 0 <= beyond < len(layers) else layer
-            low_u, high_u, low_v, high_v = _rectangles(bare)
-            joined = shapely.unary_union(shapely.box(u[low_u], v[low_v], u[high_u], v[high_v]))
+            row, begin, end = _runs(bare)
+            joined = shapely.unary_union(shapely.box(u[row], v[begin], u[row + 1], v[end]))
             for piece in polygons_of(joined):
                 yield Surface(side, float(grid[axis][k + forward]), piece)

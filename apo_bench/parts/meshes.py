@@ -86,8 +86,7 @@ def dress_picture(path: Path, root: Element, body: Element, geom: Element, attri
         raise InputError(
             f"{path}: {called} is a picture if it has {wanted} and a mesh with file=; give it these, or none of them."
         )
-    file = path.parent / mesh.attrib.pop("file")
-    triangles = _read_stl(file)
+    triangles = _read_stl(path.parent / mesh.attrib.pop("file"))
     corners, index = np.unique(triangles.reshape(-1, 3), axis=0, return_inverse=True)
     mesh.set("vertex", " ".join(f"{x:.9g}" for x in corners.ravel()))
     mesh.set("face", " ".join(map(str, index.ravel())))

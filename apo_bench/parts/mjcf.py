@@ -110,12 +110,11 @@ def _state_matter(path: Path, root: Element, body: Element, stated: StatedPart) 
                 f"{path}: {_called(geom)} has {key}=; where pieces are not boxes alone, it stands in "
                 f"{path.with_suffix('.toml').name}, so remove it here.",
             )
+    matter = {"density": repr(stated.density)}
+    if stated.friction:
+        matter["friction"] = " ".join(map(repr, stated.friction))
     for geom in body.iter("geom"):
-        if "mass" in geom.attrib:
-            continue
-        geom.set("density", repr(stated.density))
-        if stated.friction:
-            geom.set("friction", " ".join(map(repr, stated.friction)))
+        geom.attrib.update({} if "mass" in geom.attrib else matter)
 
 
 def _check_names(path: Path, kind: str, names: list[str]) -> None:

@@ -4,8 +4,6 @@ A linear filter: contacts are measurements without noise but for play, taken one
 which contacts go together; the correction itself is not its business.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import NamedTuple, final
@@ -56,7 +54,7 @@ class Belief:
             reach[operation.main] = own
         return PartBeliefs(poses, reach)
 
-    def conditioned(self, e: Array, J: Array, noise: Array) -> Belief:
+    def conditioned(self, e: Array, J: Array, noise: Array) -> "Belief":
         """The belief after learning that some quantities, now e (r,) with derivative J (r, 6 n), are zero up to noise.
 
         Args:

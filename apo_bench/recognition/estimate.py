@@ -82,8 +82,7 @@ def estimate(seen: Observation, assembly: Assembly, begin: Array) -> GoalEstimat
             break
     # |A| and |B| are what contacts leave with the noise and in the room: see the head of this file.
     B = J @ room @ J.T + S
-    gain = np.linalg.slogdet(B)[1] - np.linalg.slogdet(A)[1]
-    badness = float(r @ np.linalg.solve(A, r) - gain)
+    badness = float(r @ np.linalg.solve(A, r) - (np.linalg.slogdet(B)[1] - np.linalg.slogdet(A)[1]))
     return GoalEstimate(assembly, goals, _left(C, J, A, Jr), _left(room, J, B, Jr), badness)
 
 

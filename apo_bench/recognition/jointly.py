@@ -6,8 +6,6 @@ takes for granted: relations beyond the first, and what physics forbids. The bes
 which may turn the order round: a stick that fits through two castles says how these were stacked.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -79,7 +77,7 @@ class _History:
         """What makes it another one."""
         return tuple(frozenset(c.contact for c in some) for some in self.taken)
 
-    def followed(self, partial: _Partial) -> _History:
+    def followed(self, partial: "_Partial") -> "_History":
         """With one operation more."""
         return _History((*self.taken, partial.taken), partial.at.estimate.goals, partial.surprise, partial.badness)
 

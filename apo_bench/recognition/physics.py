@@ -44,8 +44,7 @@ def physical_surprise(at: Situation, rules: Rules, taken: Collection[Candidate],
         return IMPOSSIBLE
     apart = 0.0
     for pair in at.pairs():
-        walls = [refusal(c, near) for c in near if c.parts == pair]
-        apart += max([*walls, inside(at, rules, taken, *pair)])
+        apart += max([inside(at, rules, taken, *pair), *(refusal(c, near) for c in near if c.parts == pair)])
     return min(apart + _hanging(at, taken), IMPOSSIBLE)
 
 

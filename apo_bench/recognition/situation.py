@@ -10,7 +10,7 @@ import numpy as np
 
 from apo_bench.assembly import Contact, Facing, Observation, PartFace
 from apo_bench.assembly.facing import facing
-from apo_bench.geometry import Array, Solid, pose
+from apo_bench.geometry import Array, pose
 from apo_bench.recognition.belief import Belief, PartBeliefs
 from apo_bench.recognition.estimate import GoalEstimate
 from apo_bench.recognition.thresholds import PairThresholds, Rules, pair_thresholds, reality, slack
@@ -136,8 +136,10 @@ class Situation:
         shifted = np.concatenate([reach[:3] + np.cross(reach[3:].T, at).T, reach[3:]])
         C = shifted @ self.estimate.covariance @ shifted.T
         shift, turn = (max(float(np.linalg.eigvalsh(block)[-1]), 0.0) for block in (C[:3, :3], C[3:, 3:]))
-        sizes = [_radius(self.seen.assembly.solids[part]) for part in (a, b)]
-        worst = np.diag([shift + turn * min(sizes) ** 2, turn, turn])
+        boxes = [self.seen.assembly.solids[part].bounds for part in (a, b)]
+        worst = np.diag(
+            [shift + turn * min(float(np.linalg.norm(np.ptp(box, axis=0))) / 2 for box in boxes) ** 2, turn, turn]
+        )
         play_m = self.seen.play_m
         loose = PairThresholds(_LOOSE.gap_m + play_m, _LOOSE.angle_rad + 2.0 * hypot(play_m, play_m) / _NARROW_M)
         return pair_thresholds(rules, worst, loose)
@@ -145,8 +147,3 @@ class Situation:
     def _reach(self, a: str, b: str) -> Array:
         """(6, 6 n): the world twist of part a beside part b that body twists of the goals make."""
         return self.now.reach[a] - self.now.reach[b]
-
-
-def _radius(solid: Solid) -> float:
-    """Half the diagonal of the box around a solid, [m]."""
-    return float(np.linalg.norm(np.ptp(solid.bounds, axis=0))) / 2

@@ -118,8 +118,7 @@ def _check_turns(scenario: Scenario, file: str, case: _Case, stages: tuple[Poses
     """A part turns about the vertical only: the robot does not turn parts over."""
     for k, operation in enumerate(scenario.assembly.operations):
         before = stages[k][operation.main]
-        after = stages[k + 1][operation.main]
-        tilt = float(np.degrees(angle_between(before[2, :3], after[2, :3])))
+        tilt = float(np.degrees(angle_between(before[2, :3], stages[k + 1][operation.main][2, :3])))
         if tilt > _ANGLE_DEG:
             raise _refuse(
                 file,

@@ -122,8 +122,7 @@ def _check(contact: Contact, node: JsonNode, moves: tuple[str, ...], there: set[
 
 def _face(node: JsonNode, main: str | None, solids: Mapping[str, Solid]) -> PartFace:
     """`part.face`, or a face of the main part."""
-    text = node.text()
-    name, dot, face = text.rpartition(".")
+    name, dot, face = node.text().rpartition(".")
     node.require(dot or main is not None, "a face as 'part.face' is needed")
     part = name if dot or main is None else main
     if part not in solids:

@@ -57,8 +57,7 @@ def read_grasp(node: JsonNode | None, entry: JsonNode, solid: Solid, before: Arr
 
 def _holds_box(solid: Solid, grasp: Grasp, T: Array) -> bool:
     """Whether this is a grasp of a part of boxes, with the part between the pads."""
-    up = T[2, :3]
-    return all_boxes(solid.pieces) and holds_whole(solid.pieces, grasp.point, grasp.across, np.round(up, 9))
+    return all_boxes(solid.pieces) and holds_whole(solid.pieces, grasp.point, grasp.across, np.round(T[2, :3], 9))
 
 
 def _by_shape(keys: Mapping[str, JsonNode], entry: JsonNode, solid: Solid, T: Array, point: Array) -> Grasp:

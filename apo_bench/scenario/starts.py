@@ -12,30 +12,13 @@ AIR_M = 1e-4
 
 def in_the_air(assembly: Assembly, start: Poses, most_m: float = AIR_M) -> tuple[str, str] | None:
     """The first movable part that starts more than so much above what is below it, and where it is, in words."""
-    for part in assembly.solids:
-        if part not in assembly.fixed and not _supported(assembly, start, part, most_m):
-            return part, _height(assembly, start, part)
+    for part, solid in assembly.solids.items():
+        others = {name: other for name, other in assembly.solids.items() if name != part}
+        way = np.array([most_m])
+        deep = (drop_depths(solid, start[part], way, other, start[name])[0] for name, other in others.items())
+        if part not in assembly.fixed and not any(depth > TOUCH_M for depth in deep):
+            falls = {name: drop(solid, start[part], other, start[name]) for name, other in others.items()}
+            below = min(falls, key=lambda name: falls[name])
+            height = f"{round(1e3 * falls[below], 2):g} mm above '{below}'"
+            return part, f"'{part}' starts in the air, {'with nothing below it' if np.isinf(falls[below]) else height}"
     return None
-
-
-def _supported(assembly: Assembly, start: Poses, part: str, most_m: float) -> bool:
-    solid = assembly.solids[part]
-    T = start[part]
-    way = np.array([most_m])
-    return any(
-        drop_depths(solid, T, way, other, start[name])[0] > TOUCH_M
-        for name, other in assembly.solids.items()
-        if name != part
-    )
-
-
-def _height(assembly: Assembly, start: Poses, part: str) -> str:
-    falls = {
-        name: drop(assembly.solids[part], start[part], other, start[name])
-        for name, other in assembly.solids.items()
-        if name != part
-    }
-    below = min(falls, key=lambda name: falls[name])
-    if np.isinf(falls[below]):
-        return f"'{part}' starts in the air, with nothing below it"
-    return f"'{part}' starts in the air, {round(1e3 * falls[below], 2):g} mm above '{below}'"

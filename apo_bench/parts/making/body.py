@@ -11,7 +11,7 @@ import shapely
 from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import WHOLE_TURN, Array, Face, Hull, RoundFace, flat_area, polygons_of, rings_of, straightened
-from apo_bench.parts.making.moments import Moments
+from apo_bench.parts.making.moments import Moments, total
 
 _SAME_M = 1e-9
 _PARALLEL = 1e-12
@@ -78,16 +78,13 @@ class Body:
 
 def join(*bodies: Body) -> Body:
     """Bodies that touch and do not overlap, as one: faces end where others lie on them, and go on beside them."""
-    moments = bodies[0].moments
-    for body in bodies[1:]:
-        moments = moments.plus(body.moments)
     flats = [face for body in bodies for face in body.flats]
     rounds = [face for body in bodies for face in body.rounds]
     return Body(
         tuple(piece for body in bodies for piece in body.pieces),
         tuple(_joined_flats(flats)),
         tuple(_joined_rounds(rounds)),
-        moments,
+        total(bodies[0].moments, (body.moments for body in bodies[1:])),
     )
 
 

@@ -24,11 +24,7 @@ def convex_cells(area: Any) -> list[Array]:
     Triangles are joined across their common sides while what they make stays convex (Hertel and Mehlhorn), so that
     there are at most four times as many as need be.
     """
-    cells: list[Array] = []
-    for polygon in polygons_of(area):
-        if polygon.area > _SLIVER_MM2:
-            cells += _cut(polygon)
-    return cells
+    return [cell for polygon in polygons_of(area) if polygon.area > _SLIVER_MM2 for cell in _cut(polygon)]
 
 
 def _cut(polygon: Any) -> list[Array]:
@@ -141,20 +137,14 @@ def bands(area: Any, rings: list[tuple[Array, NDArray[np.bool_]]]) -> list[Array
         area: All of the material.
         rings: Corners (k, 2), the material to their left, and whether the side that begins there recedes, (k,).
     """
-    areas: list[Array] = []
-    for corners, fit in rings:
-        if fit.any():
-            areas += _band(area, corners, fit)
-    return areas
+    return [quad for corners, fit in rings if fit.any() for quad in _band(area, corners, fit)]
 
 
 def _band(area: Any, corners: Array, fit: NDArray[np.bool_]) -> list[Array]:
     for width in _WIDTHS_MM:
         inner = [_inner(corners, fit, i, width) for i in range(len(corners))]
-        quads = []
-        for i in np.flatnonzero(fit):
-            k = (int(i) + 1) % len(corners)
-            quads.append(np.array([corners[i], corners[k], inner[k][0], inner[int(i)][1]]))
+        sides = [(int(i), (int(i) + 1) % len(corners)) for i in np.flatnonzero(fit)]
+        quads = [np.array([corners[i], corners[k], inner[k][0], inner[i][1]]) for i, k in sides]
         shapes = [Polygon(quad) for quad in quads]
         whole = unary_union(shapes)
         fits = all(is_convex(quad) and shape.is_valid for quad, shape in zip(quads, shapes, strict=True))

@@ -12,7 +12,7 @@ from apo_bench.geometry import WHOLE_TURN, Array, Face, Hull, RoundFace, straigh
 from apo_bench.parts.making.body import Body
 from apo_bench.parts.making.cells import bands, bore_cell, clipped, convex_cells, wedges
 from apo_bench.parts.making.frustums import Frustum, at_height, chamfered, heights_of, prism, raised, tangent, without
-from apo_bench.parts.making.moments import extruded
+from apo_bench.parts.making.moments import extruded, total
 from apo_bench.parts.making.outline import Outline, arc_of, circle, goes_on, outline_moments, receding, ring
 
 _NARROW_MM = 6e-3
@@ -93,10 +93,7 @@ def extrude(
     for cell in cells:
         rest = rest.difference(Polygon(cell))
     prisms = [prism(cell, low, high) for cell in (*beside, *convex_cells(rest))]
-    flat = outline_moments(outline)
-    for hole in holes:
-        flat = flat.plus(outline_moments(hole), -1.0)
-    moments = extruded(flat, low, high)
+    moments = extruded(total(outline_moments(outline), map(outline_moments, holes), -1.0), low, high)
     for each in bores:
         moments = without(moments, each.steps, each.at)
     pieces = [*prisms, *(piece for b, cell in zip(bores, cells, strict=True) for piece in _bored(b, cell, low, high))]
@@ -241,6 +238,5 @@ def _ledges(each: Bore, low: float, high: float) -> Iterator[Face]:
 def flat_face(name: str, outline: Array, holes: Sequence[Array], z: float, up: bool, fit: bool = False) -> Face:
     """A level face from rings in mm, all counter-clockwise, that looks up or down."""
     turned = [1e-3 * raised(straightened(each), z) for each in (outline, *holes)]
-    if up:
-        return Face(name, turned[0], tuple(hole[::-1] for hole in turned[1:]), fit)
-    return Face(name, turned[0][::-1], tuple(turned[1:]), fit)
+    outside, *inside = turned if up else [each[::-1] for each in turned]
+    return Face(name, outside, tuple(hole[::-1] for hole in inside), fit)

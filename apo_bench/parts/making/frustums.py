@@ -6,9 +6,9 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.geometry import Array, RoundFace, sides_of
-from apo_bench.parts.making.moments import Moments, frustum_moments
-from apo_bench.parts.making.outline import COARSE_SIDES
+from apo_bench.geometry import Array, RoundFace
+from apo_bench.parts.making.moments import Moments, frustum_moments, total
+from apo_bench.parts.making.outline import needed_sides
 
 _SAME_MM = 1e-6
 
@@ -38,9 +38,7 @@ class Frustum:
     @property
     def count(self) -> int:
         """Into how many sides its wall is cut."""
-        if self.sides is not None:
-            return self.sides
-        return sides_of(1e-3 * max(self.radii)) if self.name else COARSE_SIDES
+        return needed_sides(self.sides, self.name, max(self.radii))
 
     def at(self, height: float) -> float:
         """Its radius at a height."""
@@ -88,9 +86,8 @@ def chamfered(wall: Frustum, at_low: float, at_high: float, sign: float) -> list
 
 def without(moments: Moments, steps: Sequence[Frustum], at: tuple[float, float] = (0.0, 0.0)) -> Moments:
     """What is left of moments without those of some lengths about an axis along z."""
-    for step in steps:
-        moments = moments.plus(step.moments().moved(np.eye(3), np.array([*at, 0.0])), -1.0)
-    return moments
+    there = np.array([*at, 0.0])
+    return total(moments, (step.moments().moved(np.eye(3), there) for step in steps), -1.0)
 
 
 def raised(flat: Array, z: float) -> Array:
@@ -106,10 +103,9 @@ def prism(flat: Array, low: float, high: float) -> Array:
 def at_height(steps: Sequence[Frustum], height: float, above: bool) -> tuple[float, int]:
     """Radius and sides just above or just below a height; (0, 0) where no step is."""
     for step in steps:
-        inside = step.low - _SAME_MM <= height < step.high - _SAME_MM
-        if not above:
-            inside = step.low + _SAME_MM < height <= step.high + _SAME_MM
-        if inside:
+        up = step.low - _SAME_MM <= height < step.high - _SAME_MM
+        down = step.low + _SAME_MM < height <= step.high + _SAME_MM
+        if (down, up)[above]:
             return step.at(height), step.count
     return 0.0, 0
 

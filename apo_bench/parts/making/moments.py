@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
@@ -41,6 +43,11 @@ class Moments(NamedTuple):
         """Of density 1 about the centroid, (3, 3)."""
         S = self.second - self.size * np.outer(self.centroid, self.centroid)
         return np.asarray(np.trace(S) * np.eye(3) - S)
+
+
+def total(first: Moments, others: Iterable[Moments], sign: float = 1.0) -> Moments:
+    """Those of one shape and of others, or less others, one after the other."""
+    return reduce(lambda moments, other: moments.plus(other, sign), others, first)
 
 
 def polygon_moments(ring: Array) -> Moments:

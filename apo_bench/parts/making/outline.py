@@ -164,7 +164,7 @@ def _corners(outline: Outline, i: int, hole: bool) -> Iterator[Array]:
         yield start
         return
     share = abs(arc.turn) / (2.0 * np.pi)
-    n = max(2, int(np.ceil(share * sides_of_arc(edge, arc.radius) - 1e-9)))
+    n = max(2, int(np.ceil(share * needed_sides(edge.sides, edge.name, arc.radius) - 1e-9)))
     if hole != edge.clockwise:
         step = arc.turn / n
         if not goes_on(arc_of(outline, i - 1), arc):
@@ -185,11 +185,9 @@ def goes_on(before: OutlineArc | None, arc: OutlineArc) -> bool:
     )
 
 
-def sides_of_arc(edge: Edge, radius_mm: float) -> int:
-    """Into how many sides a whole turn of a round wall is cut."""
-    if edge.sides is not None:
-        return edge.sides
-    return sides_of(1e-3 * radius_mm) if edge.name else COARSE_SIDES
+def needed_sides(stated: int | None, name: str, radius_mm: float) -> int:
+    """Into how many sides a whole turn of a wall is cut: as stated, as a contact needs if it has a name, or few."""
+    return stated or (sides_of(1e-3 * radius_mm) if name else COARSE_SIDES)
 
 
 def outline_moments(outline: Outline) -> Moments:

@@ -20,6 +20,7 @@ from apo_bench.parts.making.frustums import (
     tangent,
     without,
 )
+from apo_bench.parts.making.moments import total
 
 _SAME_MM = 1e-6
 _NARROW_MM = 6e-3
@@ -44,9 +45,7 @@ def turned(
         fit: Which flat faces, by name, recede by the clearance.
     """
     heights = heights_of((*outer, *inner))
-    moments = outer[0].moments()
-    for step in outer[1:]:
-        moments = moments.plus(step.moments())
+    moments = total(outer[0].moments(), (step.moments() for step in outer[1:]))
     pieces = [p for a, b in pairwise(heights) for p in _length(outer, inner, a, b)]
     rounds = [step.wall((0.0, 0.0), hole) for steps, hole in ((outer, False), (inner, True)) for step in steps]
     return Body(

@@ -1,6 +1,6 @@
 """Bodies that were built become solids, and part files that are read as these solids again."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, TypeVar
@@ -179,23 +179,21 @@ def stated_text(solid: Solid, density: float, friction: Sequence[float], source:
     return "\n".join(lines) + "\n"
 
 
-def _round_lines(wall: RoundFace) -> Iterator[str]:
-    yield f"[faces.{wall.name}]"
-    yield f'kind = "{wall.kind}"'
-    yield f"at_mm = {_list(1e3 * wall.point)}"
-    yield f"axis = {_list(wall.axis, 12)}"
-    if wall.kind == "cone":
-        yield f"radii_mm = {_list(1e3 * np.array(wall.radii))}"
-    else:
-        yield f"radius_mm = {_number(1e3 * wall.radius, 9)}"
-    if wall.kind != "rim":
-        yield f"span_mm = {_list(1e3 * np.array(wall.span))}"
-    yield f"hole = {str(wall.hole).lower()}"
-    if wall.fit:
-        yield "fit = true"
-    if wall.toward is not None and wall.extent_rad < WHOLE_TURN:
-        yield f"extent_deg = {_number(np.degrees(wall.extent_rad), 9)}"
-        yield f"toward = {_list(wall.toward, 12)}"
+def _round_lines(wall: RoundFace) -> list[str]:
+    part = wall.toward is not None and wall.extent_rad < WHOLE_TURN
+    radii = ("radii_mm", _list(1e3 * np.array(wall.radii)))
+    said = {
+        "kind": f'"{wall.kind}"',
+        "at_mm": _list(1e3 * wall.point),
+        "axis": _list(wall.axis, 12),
+        **dict([radii if wall.kind == "cone" else ("radius_mm", _number(1e3 * wall.radius, 9))]),
+        "span_mm": _list(1e3 * np.array(wall.span)) if wall.kind != "rim" else "",
+        "hole": str(wall.hole).lower(),
+        "fit": "true" if wall.fit else "",
+        "extent_deg": _number(np.degrees(wall.extent_rad), 9) if part else "",
+        "toward": _list(wall.toward, 12) if part and wall.toward is not None else "",
+    }
+    return [f"[faces.{wall.name}]", *(f"{key} = {value}" for key, value in said.items() if value)]
 
 
 def _rows(points: Array) -> str:
