@@ -18,10 +18,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import extent
 from apo_bench.io.reading import read_bytes
 from apo_bench.records import TrialSettings
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.layout import layout_at
-from apo_bench.scenario.nominal import nominal_operations
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario, layout_at, load_scenario, nominal_operations
 from apo_bench.simulation.execution.prepare import key_angles, moves
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.trial import run_trial

@@ -26,8 +26,7 @@ from apo_bench.records import (
     level_pair,
     refuse_noise,
 )
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.fitting import fitting_plan

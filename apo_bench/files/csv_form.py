@@ -21,8 +21,7 @@ from apo_bench.errors import require
 from apo_bench.files.deviations import DEVIATION_DEG, DEVIATION_MM, SHIFT_M, TURN_RAD, is_within
 from apo_bench.geometry import FARTHEST_M, Array, pose
 from apo_bench.io.strict_csv import Columns, CsvRow, read_csv
-from apo_bench.scenario.layout import layout_at
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario, layout_at
 
 _POSITION = ("x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")

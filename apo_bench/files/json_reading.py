@@ -22,8 +22,7 @@ from apo_bench.files.deviations import ALLOWED_DEVIATIONS, SHIFT_M, TURN_RAD, is
 from apo_bench.files.json_forms import OBSERVATION_SCHEMA, OUTLIER_KEYS, PLAN_SCHEMA, TO_MM_DEG
 from apo_bench.geometry import Array, pose
 from apo_bench.io.documents import JsonNode, read_json
-from apo_bench.scenario.layout import layout_at
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario, layout_at
 
 _LEAST_FREEDOM = 0.4
 _DEVIATIONS = ("deviation_mm", "deviation_deg")

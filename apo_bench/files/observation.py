@@ -11,8 +11,7 @@ from apo_bench.errors import require
 from apo_bench.files.csv_form import read_table
 from apo_bench.files.deviations import DEVIATION_DEG, DEVIATION_MM, check_deviations
 from apo_bench.geometry import FARTHEST_M
-from apo_bench.scenario.layout import layout_at
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario, layout_at
 
 
 class ObservationFile(NamedTuple):

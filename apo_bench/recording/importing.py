@@ -22,8 +22,7 @@ from apo_bench.recording.operations import SeenOperation, seen_operation
 from apo_bench.recording.ordering import NoOrder, Stated
 from apo_bench.recording.rests import RestSpan, least_rest_s
 from apo_bench.recording.stays import Stay, Stays, all_stays
-from apo_bench.scenario.layout import layout_at
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario, layout_at
 
 _SLOW_S = 0.5
 """Rests that have to be longer are said: hands pause for less."""

@@ -16,8 +16,7 @@ from apo_bench.recording.log import PoseTrack
 from apo_bench.recording.ordering import quiet, taken
 from apo_bench.recording.rests import RestSpan
 from apo_bench.recording.stays import Stay, Stays, poses_at
-from apo_bench.scenario.nominal import nominal_operations
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario, nominal_operations
 
 _STRAIGHT = 4.0
 """Frames may be so many standard deviations of their noise beside the line."""

@@ -11,8 +11,7 @@ from apo_bench.geometry import Array
 from apo_bench.insertion.states import classify
 from apo_bench.io.words import listed_words
 from apo_bench.judging.rules import fixtures
-from apo_bench.scenario.human_error import NOTHING_M, spread_error
-from apo_bench.scenario.scenario import Carelessness, Scenario, Turn
+from apo_bench.scenario import NOTHING_M, Carelessness, Scenario, Turn, spread_error
 from apo_bench.show.axes import holds_axis
 
 _NOTHING: Mapping[str, str] = MappingProxyType({})

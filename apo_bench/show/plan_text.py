@@ -16,8 +16,7 @@ from apo_bench.insertion.arrival import Arrival, turning_state
 from apo_bench.insertion.macros import Macro
 from apo_bench.insertion.operations import OperationMacros
 from apo_bench.io.words import columns, direction
-from apo_bench.scenario.nominal import nominal_operations, nominal_start
-from apo_bench.scenario.scenario import Grasp, Scenario
+from apo_bench.scenario import Grasp, Scenario, nominal_operations, nominal_start
 
 _MACROS = "apo-bench/macros/1"
 _HEADS = ("", "operation", "state", "macros", "from", "guarded", "position", "walls", "grasp", "until")

@@ -23,8 +23,7 @@ from apo_bench.records import (
     may_look,
     refuse_noise,
 )
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.sweeps.work.messages import Unit
 
 LARGEST_TRIALS = 1_000_000

@@ -9,8 +9,7 @@ from apo_bench.errors import InputError, unknown
 from apo_bench.records import CORRECTOR, CORRECTOR_LIMIT_S, Limits, Row, level_pair, salt_of_sweep, trial_key
 from apo_bench.records.run.run_file import run_record
 from apo_bench.records.run.run_folder import RunFolder
-from apo_bench.scenario.file import scenario_names
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario, scenario_names
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.physics import physics

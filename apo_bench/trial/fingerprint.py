@@ -26,8 +26,7 @@ from apo_bench.observation.presets import noise_path
 from apo_bench.records import ROW, TrialSettings
 from apo_bench.records.run.own_code import DATA_PREFIXES, is_own_code
 from apo_bench.resources import folder
-from apo_bench.scenario.file import scenario_names
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario, scenario_names
 
 _SCHEMAS = (ROW, OBSERVATION_SCHEMA, PLAN_SCHEMA)
 ROOMS_WITHOUT_TRIALS = ("cli", "drafting", "envs", "report", "show", "statistics", "sweeps/local", "sweeps/ray")

@@ -11,8 +11,7 @@ from apo_bench.correction.own_code.own import correct_named
 from apo_bench.geometry import Array
 from apo_bench.prediction.failure import predict
 from apo_bench.records import with_simulated
-from apo_bench.scenario.layout import layout_at
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario, layout_at
 from apo_bench.simulation.arm_checks.plan_check import arm_moves
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.by_heart import goals_by_heart

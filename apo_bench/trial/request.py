@@ -23,9 +23,7 @@ from apo_bench.records import (
     parsed,
     read_salt,
 )
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.scenario import Scenario
-from apo_bench.scenario.starts import in_the_air
+from apo_bench.scenario import Scenario, in_the_air, load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.film.film import write_film
 from apo_bench.simulation.film.still import FilmTrack

@@ -11,8 +11,7 @@ from typing import cast
 from apo_bench.assembly import Outcome
 from apo_bench.io.plain_text import clean
 from apo_bench.records import ENV_ID, LONGEST_SENTENCE, ROW, ROW_FIELDS, Row, TrialSettings, sentence, setting_columns
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.trial.fingerprint import spec_hash
 
 _OUTCOME_COLUMNS = tuple(dropwhile(lambda column: column != "success", ROW_FIELDS))

@@ -19,9 +19,7 @@ from apo_bench.observation.noise import Noise
 from apo_bench.observation.observing import observe
 from apo_bench.prediction.failure import ARM_CODES, predict
 from apo_bench.records import NO_ROBOT_ERROR, RANGE, SETTINGS, Predicted, Salt, TrialSettings, robot_sigmas, sentence
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.layout import draw_layout
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario, draw_layout, load_scenario
 from apo_bench.simulation.arm_checks.plan_check import arm_moves
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.execution.replay_cache import ReplayCache

@@ -8,8 +8,7 @@ import numpy as np
 from apo_bench.assembly import Plan
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
-from apo_bench.scenario.layout import draw_layout
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario, draw_layout
 from apo_bench.simulation.arm_checks.tip_error import HIGH_M, SPEEDS, STAND_S, WAY_M, TipError, error_on
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.home import tip_down

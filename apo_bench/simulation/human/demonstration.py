@@ -9,8 +9,7 @@ from apo_bench.assembly import Demonstration, Layout, Reached, Snapshot, placeme
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import judge
 from apo_bench.records import sentence
-from apo_bench.scenario.human_error import careless_covariance, spread_error
-from apo_bench.scenario.scenario import Carelessness
+from apo_bench.scenario import Carelessness, careless_covariance, spread_error
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.human.perform import STAND_STILL_S, act, perform

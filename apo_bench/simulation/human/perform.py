@@ -13,8 +13,7 @@ from apo_bench.geometry import Array, pose
 from apo_bench.insertion.arrival import Arrival
 from apo_bench.insertion.macros import UP
 from apo_bench.insertion.surroundings import OVER_M, ends_of, slide_directions
-from apo_bench.scenario.nominal import nominal_operations
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario, nominal_operations
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.robot.paths import Trajectory, minimum_jerk, shifted, smooth, with_height
 

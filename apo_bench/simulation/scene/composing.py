@@ -13,8 +13,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import Array, all_boxes
 from apo_bench.parts import PartFile, read_part
 from apo_bench.resources import folder
-from apo_bench.scenario.layout import layout_at
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario, layout_at
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.physics import Physics, set_contact, set_options
 from apo_bench.simulation.scene.geoms import dress

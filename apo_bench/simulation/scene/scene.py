@@ -8,8 +8,7 @@ import mujoco
 
 from apo_bench.geometry import Piece, physical_pieces
 from apo_bench.records import Criteria, check
-from apo_bench.scenario.checks import check_clearance
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario, check_clearance
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.arms.kinematics import Kinematics

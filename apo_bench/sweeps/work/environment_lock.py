@@ -13,8 +13,7 @@ from apo_bench.errors import InputError
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.relations import make_relations
 from apo_bench.records import CORRECTOR_LIMIT_S, RECOGNISED, parsed, with_simulated
-from apo_bench.scenario.file import load_scenario
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.trial.fingerprint import content_hash, noise_content, own_content
 
