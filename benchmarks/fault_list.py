@@ -28,13 +28,13 @@ FAULTS = (
     Fault("geometry/pose.py", "- K / 2 + D * K @ K", "- K / 2 + K @ K", "the logarithm loses a factor"),
     Fault(
         "geometry/clearance.py",
-        "box.center + (recede[:, 0] - recede[:, 1]) / 2",
-        "box.center - (recede[:, 0] - recede[:, 1]) / 2",
+        "box.center + (low - high) / 2",
+        "box.center - (low - high) / 2",
         "a box with one fit side recedes to the wrong side",
     ),
-    Fault("geometry/overlap.py", "area / of.area)", "area / self.area)", "a share of the wrong overlap"),
+    Fault("geometry/covering.py", "area / of.area)", "area / self.area)", "a share of the wrong overlap"),
     Fault("geometry/convex.py", "- u[..., k] * v", "+ u[..., k] * v", "a cross product of edges is none"),
-    Fault("geometry/drop.py", " and low_b[2] < high_a[2]", "", "what lies above is met on the way down"),
+    Fault("geometry/penetration.py", " and low_b[2] < high_a[2]", "", "what lies above is met on the way down"),
     Fault("geometry/swept.py", "return max(0.0, at - _SLACK_M)", "return max(0.0, at)", "the slack is kept"),
     Fault("geometry/symmetry.py", '"nij,mji->nm"', '"nij,mij->nm"', "a turn instead of its inverse"),
     Fault(
@@ -149,7 +149,12 @@ FAULTS = (
         "return Gap(kind, low, high)",
         "mm taken for m",
     ),
-    Fault("scenario/contacts.py", "    if b not in there:", "    if False:", "a contact with what is not there yet"),
+    Fault(
+        "scenario/contacts.py",
+        "refuse_unless(b in there, below",
+        "refuse_unless(True, below",
+        "a contact with what is not there yet",
+    ),
     Fault(
         "scenario/nominal.py", "(low + high) / 2]", "(high - low) / 2]", "half the width of an interval for its middle"
     ),
@@ -169,8 +174,8 @@ FAULTS = (
     ),
     Fault(
         "scenario/starts.py",
-        "return any(\n        drop_depths",
-        "return all(\n        drop_depths",
+        "not any(depth > TOUCH_M for depth in deep)",
+        "not all(depth > TOUCH_M for depth in deep)",
         "a part must stand on all others",
     ),
 )

@@ -20,7 +20,7 @@ import numpy as np
 
 from apo_bench.assembly import Contact, Layout, joint_play_mm, placements
 from apo_bench.geometry import Array, nearest_alike, pose
-from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry.covering import overlap
 from apo_bench.judging.rules import fixtures
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_folder import read_rows

@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly.facing_round import Facing, measure_round, round_pairs
-from apo_bench.geometry import Array, Face, RoundFace, Solid, across_axis, balls_apart, face_area, pose
-from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry import Array, Face, RoundFace, Solid, across_axis, balls_apart, face_area, overlap, pose
 
 
 def opposed(a: Face, T_a: Array, b: Face, T_b: Array, angle_rad: float) -> bool:

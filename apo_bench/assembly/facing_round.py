@@ -14,8 +14,7 @@ from typing import final
 import numpy as np
 
 from apo_bench.assembly.kinds import contact_kind, geometric_play
-from apo_bench.geometry import Array, Face, RoundFace, Solid, pose
-from apo_bench.geometry.mate import angle_between, mate
+from apo_bench.geometry import Array, Face, RoundFace, Solid, angle_between, mate, pose
 
 _TIGHTEST_M = -0.1e-3
 _LOOSEST_M = 0.6e-3

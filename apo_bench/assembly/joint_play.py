@@ -14,9 +14,7 @@ import numpy as np
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.kinds import contact_kind, play_mm
 from apo_bench.assembly.topology import Assembly, Contact
-from apo_bench.geometry import Array, Face, RoundFace, across_axis, pose
-from apo_bench.geometry.mate import mate
-from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry import Array, Face, RoundFace, across_axis, mate, overlap, pose
 
 _WALLS = 16
 """Directions in which a shaft is stopped by its hole: the walls of a polygon whose corners lie on the disc of play."""

@@ -13,8 +13,7 @@ import numpy as np
 from apo_bench.assembly.goals import Poses
 from apo_bench.assembly.kinds import contact_kind
 from apo_bench.assembly.topology import Assembly, Contact, PartFace
-from apo_bench.geometry import WHOLE_TURN, Array, Face, RoundFace, across_axis, pose
-from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry import WHOLE_TURN, Array, Face, RoundFace, across_axis, overlap, pose
 
 _QUARTER = np.pi / 2
 _RING = 2 * np.pi * np.arange(16) / 16

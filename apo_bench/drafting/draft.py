@@ -12,8 +12,7 @@ from apo_bench.drafting.posed import TABLE, PosedPart
 from apo_bench.drafting.touching import clashes, closed, found_contacts, walls_without_play
 from apo_bench.drafting.waiting import Stance, laid_out, reach_of, site_of, stance
 from apo_bench.errors import InputError, unknown
-from apo_bench.geometry import Array, Box, PadPlace, Solid, extent, intrusion_depths, pose
-from apo_bench.geometry.holds import holds
+from apo_bench.geometry import Array, Box, PadPlace, Solid, extent, holds, intrusion_depths, pose
 from apo_bench.parts import load_part
 from apo_bench.scenario.scenario import Site
 

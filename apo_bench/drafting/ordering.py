@@ -16,8 +16,7 @@ from apo_bench.assembly import Assembly, Contact, Operation, Poses
 from apo_bench.drafting.posed import TABLE
 from apo_bench.drafting.touching import found_contacts
 from apo_bench.drafting.waiting import stance
-from apo_bench.geometry import Array, Solid, extent, pose
-from apo_bench.geometry.drop import drop
+from apo_bench.geometry import Array, Solid, drop, extent, pose
 from apo_bench.insertion.arrival import arrive
 from apo_bench.prediction.stability import BALANCED, imbalance
 

@@ -13,9 +13,7 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Facing, PartFace, Poses, contact_kind, geometric_play, play_mm
 from apo_bench.assembly.facing import facing
-from apo_bench.geometry import Array, Solid, pose
-from apo_bench.geometry.intrusion import intrusion
-from apo_bench.geometry.mate import mate
+from apo_bench.geometry import Array, Solid, intrusion, mate, pose
 
 _NEAR_M = 5e-5
 _NEAR_RAD = 2e-3

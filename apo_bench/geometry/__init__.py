@@ -3,14 +3,21 @@
 from apo_bench.geometry.arrays import Array, Ints, NotReal, copyable, freeze, frozen, real, remembered
 from apo_bench.geometry.clearance import physical_pieces
 from apo_bench.geometry.convex import ball_around, balls_apart, passage, separating_axes, shadow
-from apo_bench.geometry.drop import TOUCH_M, drop_depths
+from apo_bench.geometry.covering import Overlap, beside, face_area, overlap, overlap_area
 from apo_bench.geometry.exact_turns import depth_inside
 from apo_bench.geometry.flips import Flips, approximate_symmetries
-from apo_bench.geometry.holds import FINGER_ROOM_M, PAD_M, PadPlace, held_span, held_width, holds_whole
 from apo_bench.geometry.hull import SAGITTA_M, Cylinder, Hull, cylinder_hull, first_of_each, sides_of
-from apo_bench.geometry.intrusion import intrusion_depths, upright_bounds, ways_out
-from apo_bench.geometry.mate import Mate
-from apo_bench.geometry.overlap import Overlap, beside, face_area, overlap_area
+from apo_bench.geometry.mating import Mate, angle_between, mate
+from apo_bench.geometry.pads import FINGER_ROOM_M, PAD_M, PadPlace, held_span, held_width, holds, holds_whole
+from apo_bench.geometry.penetration import (
+    TOUCH_M,
+    drop,
+    drop_depths,
+    intrusion,
+    intrusion_depths,
+    upright_bounds,
+    ways_out,
+)
 from apo_bench.geometry.polygon import across_axis, flat_area, plane_across, polygons_of, rings_of, straightened
 from apo_bench.geometry.pose import FARTHEST_M, is_rigid
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
@@ -55,6 +62,7 @@ __all__ = (
     "Solid",
     "across_axis",
     "all_boxes",
+    "angle_between",
     "approximate_symmetries",
     "ball_around",
     "balls_apart",
@@ -62,6 +70,7 @@ __all__ = (
     "copyable",
     "cylinder_hull",
     "depth_inside",
+    "drop",
     "drop_depths",
     "exit_distance",
     "exp_and_jacobian",
@@ -74,12 +83,16 @@ __all__ = (
     "frozen",
     "held_span",
     "held_width",
+    "holds",
     "holds_whole",
+    "intrusion",
     "intrusion_depths",
     "is_rigid",
     "is_way_free",
+    "mate",
     "nearest_alike",
     "nearest_symmetric_pose",
+    "overlap",
     "overlap_area",
     "passage",
     "physical_pieces",

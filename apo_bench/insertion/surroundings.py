@@ -3,8 +3,7 @@
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Poses, mouth, outline_points, touched_contacts
-from apo_bench.geometry import Array, Face, extent
-from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry import Array, Face, extent, overlap
 from apo_bench.insertion.arrival import Arrival
 
 _SLOW_M = 0.003

@@ -7,9 +7,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, ContactKind, Poses, apart_limit_mm, contact_kind, deep_limit_mm
-from apo_bench.geometry import Face, Mate, Overlap
-from apo_bench.geometry.mate import mate
-from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry import Face, Mate, Overlap, mate, overlap
 from apo_bench.records import Thresholds
 
 ContactMoment = Literal["made", "end"]

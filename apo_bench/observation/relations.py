@@ -31,8 +31,7 @@ from apo_bench.assembly import (
     round_pairs,
 )
 from apo_bench.errors import InputError, failed
-from apo_bench.geometry import Array, Face, RoundFace, Solid
-from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry import Array, Face, RoundFace, Solid, overlap
 from apo_bench.names import resolve
 from apo_bench.records import GIVEN, SHIFT_MM, WRONG_RELATIONS, relations_name
 

@@ -9,9 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Operation, Poses
-from apo_bench.geometry import Array, Face, Mate, RoundFace, pose
-from apo_bench.geometry.mate import mate
-from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry import Array, Face, Mate, RoundFace, mate, overlap, pose
 
 _LEVEL = 0.5
 """A face whose normal makes a larger cosine with the vertical is a support, any other one a side."""

@@ -11,9 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Operation, Poses, placements
-from apo_bench.geometry import Array, Face, RoundFace, across_axis, all_boxes, pose
-from apo_bench.geometry.mate import mate
-from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry import Array, Face, RoundFace, across_axis, all_boxes, mate, overlap, pose
 
 _LEVEL = float(np.cos(np.radians(30.0)))
 """A face whose normal is nearer to the vertical than this carries weight; a steeper one is a wall."""

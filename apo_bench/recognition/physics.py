@@ -10,8 +10,7 @@ from math import exp, hypot, log, sqrt
 
 import numpy as np
 
-from apo_bench.geometry import Array, Overlap, face_area, pose, ways_out
-from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry import Array, Overlap, face_area, overlap, pose, ways_out
 from apo_bench.recognition.situation import Candidate, Situation
 from apo_bench.recognition.thresholds import Rules
 

@@ -19,10 +19,7 @@ from apo_bench.assembly import (
     play_mm,
 )
 from apo_bench.errors import InputError
-from apo_bench.geometry import Face, pose
-from apo_bench.geometry.intrusion import intrusion
-from apo_bench.geometry.mate import angle_between, mate
-from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry import Face, angle_between, intrusion, mate, overlap, pose
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.order import check_order
 from apo_bench.scenario.scenario import Scenario

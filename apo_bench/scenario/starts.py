@@ -3,8 +3,7 @@
 import numpy as np
 
 from apo_bench.assembly import Assembly, Poses
-from apo_bench.geometry import TOUCH_M, drop_depths
-from apo_bench.geometry.drop import drop
+from apo_bench.geometry import TOUCH_M, drop, drop_depths
 
 AIR_M = 1e-4
 """Lower above what is below it, a part settles within the first steps and is where it was said to be."""

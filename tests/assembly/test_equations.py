@@ -13,7 +13,7 @@ from apo_bench.assembly import Contact, Equations, Operation, PartFace, largest_
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, displacement, least_step
 from apo_bench.geometry import Array, pose
-from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry.covering import overlap
 from tests import rounds, scenes
 
 pytestmark = pytest.mark.numeric

@@ -16,7 +16,7 @@ from apo_bench.correction.baselines.intruding import intruding, meeting
 from apo_bench.correction.baselines.least_squares import least_squares
 from apo_bench.correction.baselines.penalty import loss
 from apo_bench.geometry import Array, pose
-from apo_bench.geometry.intrusion import intrusion
+from apo_bench.geometry.penetration import intrusion
 from apo_bench.simulation.scene.settling import settle
 from tests import scenes
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from apo_bench.geometry import TOUCH_M, Box, Solid, pose
-from apo_bench.geometry.drop import drop
+from apo_bench.geometry.penetration import drop
 
 
 def cuboid(*half: float) -> Solid:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from apo_bench.geometry import PAD_M, Box, Solid, held_span, holds_whole, intrusion_depths
-from apo_bench.geometry.holds import holds
+from apo_bench.geometry.pads import holds
 from apo_bench.parts.making import Frustum, bore, extrude, polygon, rectangle, shaft, solid_of, turned
 
 OPENING_M = 0.046

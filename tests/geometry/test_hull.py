@@ -23,7 +23,7 @@ from apo_bench.geometry import (
     separating_axes,
     sides_of,
 )
-from apo_bench.geometry.intrusion import intrusion
+from apo_bench.geometry.penetration import intrusion
 from apo_bench.geometry.swept import overlap_intervals
 
 

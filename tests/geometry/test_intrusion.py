@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench.geometry import Array, Box, Solid, intrusion_depths, pose
-from apo_bench.geometry.intrusion import intrusion
+from apo_bench.geometry.penetration import intrusion
 from tests import scenes
 
 coordinates = st.floats(-0.1, 0.1)

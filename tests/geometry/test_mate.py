@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench.geometry import Face, RoundFace, pose
-from apo_bench.geometry.mate import mate
+from apo_bench.geometry.mating import mate
 from tests.rounds import Z, cone, cylinder, rim, square, up
 from tests.scenes import mm
 

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench.geometry import Array, Face, beside, face_area, pose
-from apo_bench.geometry.overlap import NO_OVERLAP, overlap
+from apo_bench.geometry.covering import NO_OVERLAP, overlap
 from apo_bench.parts import load_part
 
 pytestmark = pytest.mark.numeric

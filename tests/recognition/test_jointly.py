@@ -14,7 +14,7 @@ from apo_bench import Assembly, ContactCorrector, InputError, Observation
 from apo_bench.assembly import Contact, Operation, PartFace
 from apo_bench.assembly.equations import equations
 from apo_bench.geometry import Hull, pose, ways_out
-from apo_bench.geometry.intrusion import intrusion
+from apo_bench.geometry.penetration import intrusion
 from apo_bench.recognition.estimate import estimate
 from apo_bench.recognition.jointly import recognise_jointly
 from tests import rounds, scenes

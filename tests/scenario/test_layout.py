@@ -12,8 +12,8 @@ from shapely import MultiPoint
 from apo_bench import Assembly, Scenario, draw_layout, load_scenario
 from apo_bench.assembly import Contact, Poses, largest_gap, placements
 from apo_bench.geometry import Array, Solid, pose
-from apo_bench.geometry.intrusion import intrusion
-from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry.covering import overlap
+from apo_bench.geometry.penetration import intrusion
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.scenario import Grasp, Site, Turn
 from tests import scenes

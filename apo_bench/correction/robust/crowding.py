@@ -12,8 +12,7 @@ import numpy as np
 
 from apo_bench.assembly import Observation, measure_round, placements
 from apo_bench.correction.solvers.posterior import settled_basis
-from apo_bench.geometry import Array, Face, RoundFace, face_area, overlap_area, pose
-from apo_bench.geometry.intrusion import intrusion
+from apo_bench.geometry import Array, Face, RoundFace, face_area, intrusion, overlap_area, pose
 
 PLACES_TRIED = 24
 LEAST_PLACES = 8

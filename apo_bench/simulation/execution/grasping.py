@@ -14,11 +14,11 @@ from apo_bench.geometry import (
     all_boxes,
     extent,
     held_width,
+    holds,
     holds_whole,
     intrusion_depths,
     upright_bounds,
 )
-from apo_bench.geometry.holds import holds
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.frames import frame
 from apo_bench.simulation.robot.gripper import gripper_boxes

@@ -24,7 +24,7 @@ from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.posterior import jacobian_rank
 from apo_bench.correction.solvers.whitened import noise_factor
 from apo_bench.geometry import overlap_area, pose
-from apo_bench.geometry.overlap import overlap
+from apo_bench.geometry.covering import overlap
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.relations import culprit, make_relations, with_relations
 from apo_bench.trial.pose_error import goal_errors

@@ -10,7 +10,7 @@ import numpy as np
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array
-from apo_bench.geometry.overlap import NO_OVERLAP, Overlap, own_shape, plane_frame
+from apo_bench.geometry.covering import NO_OVERLAP, Overlap, own_shape, plane_frame
 from apo_bench.geometry.round_face import WHOLE_TURN, RoundFace
 from apo_bench.geometry.solid import Face
 
