@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from apo_bench.errors import InputError
-from apo_bench.io.writing import check_target
+from apo_bench.io.ordinary_files import check_target
 
 NO_RESULT = 1
 """The exit code of a command that ended without the result it was asked for."""

@@ -1,4 +1,7 @@
-"""Follow a demonstration from range image to range image: what moved, which part it was, where it went."""
+"""Follow a demonstration from range image to range image: what moved, which part it was, where it went.
+
+So the range finder is a sensor of poses: from true range images of a demonstration to an observation of it.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -7,13 +10,14 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Assembly, Poses
+from apo_bench.assembly import Assembly, Demonstration, Observation, Poses
 from apo_bench.depth_camera.convex import alike
 from apo_bench.depth_camera.distance import Shape, join_shapes, shape_of, strike_distances
 from apo_bench.depth_camera.locate import ALIKE, Appearance, LocatedModel, Model, locate, model_shares
-from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder
+from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder, RangeImage
 from apo_bench.depth_camera.regions import Regions, regions
-from apo_bench.geometry import Array, nearest_symmetric_pose, physical_pieces, pose, symmetries, turned_alike
+from apo_bench.geometry import Array, frozen, nearest_symmetric_pose, physical_pieces, pose, symmetries, turned_alike
+from apo_bench.observation.models.isotropic import floored
 
 _GONE = 0.5
 """A part has moved if so much of what was seen of it has vanished."""
@@ -133,11 +137,10 @@ def _spell(
 
 def _gone(owners: Sequence[NDArray[np.int64]], parts: tuple[str, ...], compared: Sequence[Regions]) -> frozenset[str]:
     """The parts of whose visible surface most has vanished."""
-    seen = np.zeros(len(parts))
-    gone = np.zeros(len(parts))
-    for owner, region in zip(owners, compared, strict=True):
-        seen += np.bincount(owner[owner >= 0], minlength=len(parts))
-        gone += np.bincount(owner[(owner >= 0) & region.vanished[::_GRID, ::_GRID]], minlength=len(parts))
+    owner = np.array(owners)
+    vanished = np.array([region.vanished[::_GRID, ::_GRID] for region in compared])
+    seen = np.bincount(owner[owner >= 0], minlength=len(parts))
+    gone = np.bincount(owner[(owner >= 0) & vanished], minlength=len(parts))
     return frozenset(part for part, n, m in zip(parts, seen, gone, strict=True) if n and m >= _GONE * n)
 
 
@@ -197,3 +200,50 @@ def _turned(located: LocatedModel, T: Array) -> Array:
     """The covariance of a pose that looks the same: body twists turn along, S^-1 xi S."""
     A = pose.adjoint(pose.inverse(T) @ located.T)
     return np.asarray(A @ located.covariance @ A.T)
+
+
+_UNSEEN = frozen(np.diag(np.repeat([0.1, 1.0], 3) ** 2), 6, 6)
+"""The covariance that stands beside an operation that was not seen, [m, rad]."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class RangeSensor:
+    """Called like a noise model, it measures poses instead of drawing them: `(assembly, shown, rng) -> Observation`.
+
+    Of what was shown only the topology, where parts started and how careless people are is looked at; goals are
+    fitted to range images. Where a part looks the same when turned, the turn nearest to the planned one is reported,
+    and nothing else is taken from the plan.
+    """
+
+    finder: RangeFinder
+    images: tuple[RangeImage, ...]
+    """Without error: before the demonstration and in every quiet spell."""
+    level_m: float
+    """Standard deviation of a ray."""
+    turns: Array
+    """(n, 3, 3), the planned rotation of each goal, world."""
+    play_m: float
+    """Clearance per side, as the models are those of the parts as they are made."""
+
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
+        events = self.events(demonstration, self.sensed(rng))
+        goals = np.array([demonstration.start[operation.main] for operation in assembly.operations])
+        covariance = np.repeat(_UNSEEN[None], len(assembly), axis=0)
+        seen = np.zeros(len(assembly), dtype=np.bool_)
+        for event in events:
+            k = event.operation
+            if event.found is not None and k is not None:
+                goals[k] = event.found.T
+                covariance[k] = event.found.covariance
+                seen[k] = True
+        return Observation(assembly, demonstration.start, goals, floored(covariance + demonstration.careless), seen)
+
+    def sensed(self, rng: np.random.Generator) -> list[Array]:
+        """The images with the errors of the sensor, (views, height, width) each, [m]."""
+        return [self.finder.sense(image, self.level_m, rng) for image in self.images]
+
+    def events(self, demonstration: Demonstration, images: Sequence[Array]) -> tuple[Event, ...]:
+        """What the sensor makes of measured images, operation by operation."""
+        expected = Expected(demonstration.assembly, demonstration.start, self.turns, self.play_m)
+        return follow_demonstration(images, self.finder, self.level_m, expected)

@@ -16,7 +16,7 @@ from apo_bench.drafting.touching import walls_without_play
 from apo_bench.drafting.waiting import stance
 from apo_bench.errors import InputError
 from apo_bench.geometry import extent
-from apo_bench.io.reading import read_bytes
+from apo_bench.io.ordinary_files import read_bytes
 from apo_bench.records import TrialSettings
 from apo_bench.scenario import Scenario, layout_at, load_scenario, nominal_operations
 from apo_bench.simulation.execution.prepare import key_angles, moves

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
-from apo_bench.io.reading import opened
+from apo_bench.io.ordinary_files import opened
 from apo_bench.io.strict_csv import check_separator
 
 _COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t", "time")

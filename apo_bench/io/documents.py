@@ -17,8 +17,8 @@ import numpy as np
 from apo_bench.errors import InputError, one_line, require
 from apo_bench.geometry import Array
 from apo_bench.io.lossless_json import unique_members
+from apo_bench.io.ordinary_files import decoded, read_bytes, read_text
 from apo_bench.io.plain_text import UNSHOWN
-from apo_bench.io.reading import decoded, read_bytes, read_text
 
 DEEPEST_NESTING = 32
 """Levels of nesting; no file of ours has more than 6."""

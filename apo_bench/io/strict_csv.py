@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import NoReturn, final
 
 from apo_bench.errors import InputError, require
-from apo_bench.io.reading import read_text
+from apo_bench.io.ordinary_files import read_text
 
 Columns = Mapping[str, tuple[str, float]]
 """What a column stands for, and the size of its unit."""

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
-from apo_bench.io.writing import to_write
+from apo_bench.io.ordinary_files import to_write
 
 _OBEYED = "=+-@\t\r"
 """What a formula begins with."""

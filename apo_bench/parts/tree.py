@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 from apo_bench.errors import InputError
-from apo_bench.io.reading import read_text
+from apo_bench.io.ordinary_files import read_text
 from apo_bench.parts.allowed import ELEMENT_RULES, LARGEST_PART_BYTES, MOST_CLASSES, REMEDIES, ElementRule
 
 _DEEPEST = 8

@@ -10,7 +10,7 @@ import numpy as np
 
 from apo_bench.errors import InputError, one_line
 from apo_bench.geometry import pose
-from apo_bench.io.reading import decoded, read_bytes
+from apo_bench.io.ordinary_files import decoded, read_bytes
 from apo_bench.recording.camera_file import Conventions
 from apo_bench.recording.columns import LogColumn, check_length, poses
 from apo_bench.recording.csv_log import read_numbers

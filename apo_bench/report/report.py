@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from apo_bench.errors import InputError
+from apo_bench.io.ordinary_files import check_folders, check_target, to_write
 from apo_bench.io.tables import write_columns
-from apo_bench.io.writing import check_folders, check_target, to_write
 from apo_bench.records import Row, check_same_salt, one_salt, read_salt
 from apo_bench.records.run.report_rows import COLUMNS as KEPT
 from apo_bench.records.run.report_rows import report_rows

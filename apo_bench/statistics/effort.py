@@ -10,7 +10,7 @@ from typing import Any, final
 
 import numpy as np
 
-from apo_bench.io.reading import each_line
+from apo_bench.io.ordinary_files import each_line
 from apo_bench.records import Row
 from apo_bench.records.run.validation import timing_of
 from apo_bench.statistics.rates import by_method

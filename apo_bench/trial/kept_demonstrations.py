@@ -22,8 +22,7 @@ from apo_bench import __version__
 from apo_bench.assembly import Demonstration, Layout
 from apo_bench.errors import InputError
 from apo_bench.io.documents import parse_json
-from apo_bench.io.reading import read_text
-from apo_bench.io.writing import write_whole
+from apo_bench.io.ordinary_files import read_text, write_whole
 from apo_bench.records import RANGE, TrialSettings
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.fingerprint import code_files, content_pieces

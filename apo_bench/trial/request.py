@@ -11,7 +11,7 @@ from typing import Any, final
 from apo_bench.assembly import Observation
 from apo_bench.correction.own_code.own import OwnCorrectors
 from apo_bench.errors import InputError
-from apo_bench.io.reading import read_text
+from apo_bench.io.ordinary_files import read_text
 from apo_bench.records import (
     CORRECTOR_LIMIT_S,
     LEVEL,

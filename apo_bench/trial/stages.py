@@ -28,7 +28,7 @@ from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.scene.scene import Scene, build_scene
 
 if TYPE_CHECKING:
-    from apo_bench.depth_camera.range_sensor import RangeSensor
+    from apo_bench.depth_camera.follow import RangeSensor
     from apo_bench.simulation.sensor.watch import DemonstrationImages
 
 LAYOUT, DEMONSTRATION, OBSERVATION, ARM, RELATIONS, TV, LOOKS, HAND_EYE, JOINTS, TOOL, IN_HAND = range(11)
@@ -84,7 +84,7 @@ def watch_again(
 
 def range_sensor(scene: Scene, simulated: SimulatedDemonstration, level_mm: float) -> RangeSensor:
     """The range finder that watched a demonstration, as a noise model; `level_mm` is the noise of a ray."""
-    from apo_bench.depth_camera.range_sensor import RangeSensor
+    from apo_bench.depth_camera.follow import RangeSensor
 
     assert simulated.images is not None, "simulate the demonstration with eye='range'"
     yaw = float(np.degrees(np.mean(scene.scenario.site.yaw_rad)))

@@ -26,8 +26,8 @@ from apo_bench import (
 )
 from apo_bench.cli.app import main
 from apo_bench.depth_camera.distance import join_shapes, shape_of, strike_distances
+from apo_bench.depth_camera.follow import RangeSensor
 from apo_bench.depth_camera.range_finder import RangeFinder
-from apo_bench.depth_camera.range_sensor import RangeSensor
 from apo_bench.geometry import Array, physical_pieces, pose, symmetries
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.sensor.rays import Sight

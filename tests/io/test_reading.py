@@ -14,7 +14,7 @@ import pytest
 from apo_bench import InputError, load_scenario, read_observation
 from apo_bench.files.bop import read_results
 from apo_bench.io.documents import DEEPEST_NESTING, parse_json, parse_toml
-from apo_bench.io.reading import read_bytes, read_text
+from apo_bench.io.ordinary_files import read_bytes, read_text
 from apo_bench.observation.noise_file import read_noise
 from apo_bench.parts import load_part
 from apo_bench.sweeps.sweep_file import read_sweep

@@ -16,7 +16,7 @@ from apo_bench.assembly import Contact, Facing, Gap, Operation, placements
 from apo_bench.assembly.facing import facing
 from apo_bench.geometry import Solid, pose
 from apo_bench.observation.models.isotropic import floored
-from apo_bench.recognition.belief import Belief, initial_belief
+from apo_bench.recognition.situation import Belief, initial_belief
 from apo_bench.recognition.thresholds import FIXED_RULES, RULES_BY_NOISE, Rules, pair_thresholds, reality, slack
 from apo_bench.scenario.file import scenario_names
 from apo_bench.trial.recognised_contacts import count_contacts, recognise_by, with_recognised_contacts

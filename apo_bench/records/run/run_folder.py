@@ -14,8 +14,7 @@ from pathlib import Path
 from typing import IO, Any, Self, final
 
 from apo_bench.errors import InputError
-from apo_bench.io.reading import each_line
-from apo_bench.io.writing import check_target, is_there, put_back, to_write
+from apo_bench.io.ordinary_files import check_target, each_line, is_there, put_back, to_write
 from apo_bench.records.row import Row
 from apo_bench.records.run.run_file import check_same, write_run
 from apo_bench.records.run.validation import row_of, unwritable

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from apo_bench.errors import InputError
-from apo_bench.io.writing import check_folders, to_write
+from apo_bench.io.ordinary_files import check_folders, to_write
 from apo_bench.report.comparison import text
 from apo_bench.report.comparison.compare import Comparison
 from apo_bench.report.page.document import page
