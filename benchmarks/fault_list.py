@@ -156,10 +156,10 @@ FAULTS = (
         "a contact with what is not there yet",
     ),
     Fault(
-        "scenario/nominal.py", "(low + high) / 2]", "(high - low) / 2]", "half the width of an interval for its middle"
+        "scenario/layout.py", "(low + high) / 2]", "(high - low) / 2]", "half the width of an interval for its middle"
     ),
     Fault(
-        "scenario/nominal.py",
+        "scenario/layout.py",
         "return {part: T if part in",
         "return {part: T if part not in",
         "the wrong parts follow the site",
@@ -173,7 +173,7 @@ FAULTS = (
         "operations counted one off",
     ),
     Fault(
-        "scenario/starts.py",
+        "scenario/order.py",
         "not any(depth > TOUCH_M for depth in deep)",
         "not all(depth > TOUCH_M for depth in deep)",
         "a part must stand on all others",

@@ -11,6 +11,14 @@ from apo_bench.assembly.correction_record import (
     Try,
 )
 from apo_bench.assembly.equations import Equations, largest, largest_gap
+from apo_bench.assembly.error_models import (
+    OutlierModel,
+    SharedError,
+    Tails,
+    first_order,
+    joint_covariance,
+    measured_rates,
+)
 from apo_bench.assembly.facing import face_gap, height, opposed
 from apo_bench.assembly.facing_round import Facing, measure_round, round_pairs
 from apo_bench.assembly.goals import (
@@ -29,11 +37,8 @@ from apo_bench.assembly.graph import Arc, ArcResiduals, Graph, Node, arc_residua
 from apo_bench.assembly.joint_play import apart_limit_mm, deep_limit_mm, joint_play_mm
 from apo_bench.assembly.kinds import CONTACT_KINDS, ContactKind, contact_kind, geometric_play, play_mm
 from apo_bench.assembly.lowering import lowered, lowered_observation, lowered_together
-from apo_bench.assembly.outlier_model import OutlierModel, measured_rates
 from apo_bench.assembly.pattern import Pattern, looking_away
 from apo_bench.assembly.reached import InHand, Outcome, Reached, ReplayResult, Snapshot
-from apo_bench.assembly.shared_error import SharedError, first_order, joint_covariance
-from apo_bench.assembly.tails import Tails
 from apo_bench.assembly.topology import (
     ODL,
     Assembly,

@@ -12,9 +12,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.outlier_model import OutlierModel
-from apo_bench.assembly.shared_error import SharedError
-from apo_bench.assembly.tails import Tails
+from apo_bench.assembly.error_models import OutlierModel, SharedError, Tails
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import require
 from apo_bench.geometry import Array, copyable, freeze, pose

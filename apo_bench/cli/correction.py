@@ -10,7 +10,7 @@ from apo_bench.cli.arguments import NO_RESULT, check_outputs, writing
 from apo_bench.cli.printing import print_json, print_lines, print_tables
 from apo_bench.cli.setting_options import AsJson, ScenarioArgument
 from apo_bench.errors import InputError
-from apo_bench.io.streams import redirect_output
+from apo_bench.io.processes import redirect_output
 from apo_bench.records import CORRECTOR
 from apo_bench.scenario.scenario import Scenario
 

@@ -10,7 +10,7 @@ from apo_bench.cli.printing import console, print_json
 from apo_bench.cli.setting_options import AsJson, ScenarioArgument, StatedDeg, StatedMm, takes, trial_options
 from apo_bench.errors import InputError, unknown
 from apo_bench.files.deviations import assumed_deviations
-from apo_bench.io.streams import redirect_output
+from apo_bench.io.processes import redirect_output
 
 
 def eye_command(

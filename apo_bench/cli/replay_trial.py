@@ -12,7 +12,7 @@ from apo_bench.cli.setting_options import CacheFolder, CorrectorLimit, ScenarioA
 from apo_bench.cli.show import Port
 from apo_bench.cli.sweep import interrupted
 from apo_bench.errors import InputError
-from apo_bench.io.streams import redirect_output
+from apo_bench.io.processes import redirect_output
 from apo_bench.records import CORRECTOR_LIMIT_S
 
 if TYPE_CHECKING:

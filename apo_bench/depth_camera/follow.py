@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly, Demonstration, Observation, Poses
-from apo_bench.depth_camera.convex import alike
-from apo_bench.depth_camera.distance import Shape, join_shapes, shape_of, strike_distances
+from apo_bench.depth_camera.distance import Shape, alike, join_shapes, shape_of, strike_distances
 from apo_bench.depth_camera.locate import ALIKE, Appearance, LocatedModel, Model, locate, model_shares
 from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder, RangeImage
 from apo_bench.depth_camera.regions import Regions, regions

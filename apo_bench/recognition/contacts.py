@@ -17,9 +17,20 @@ import numpy as np
 from apo_bench.assembly import Contact, Facing, Observation, PartFace, placements
 from apo_bench.assembly.facing import facing
 from apo_bench.geometry import Array
-from apo_bench.recognition.evidence import Evidence, Recognised, evidence_of, with_contacts, without_contacts
 from apo_bench.recognition.situation import Belief, PartBeliefs, initial_belief
-from apo_bench.recognition.thresholds import RULES_BY_NOISE, PairThresholds, Rules, pair_thresholds, reality, slack
+from apo_bench.recognition.thresholds import (
+    RULES_BY_NOISE,
+    Evidence,
+    PairThresholds,
+    Recognised,
+    Rules,
+    evidence_of,
+    pair_thresholds,
+    reality,
+    slack,
+    with_contacts,
+    without_contacts,
+)
 
 _BEGINNINGS = 12
 """Candidates that are tried as the first of an operation, at most."""

@@ -3,10 +3,9 @@
 from apo_bench.scenario.checks import check_clearance
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.scenario.human_error import NOTHING_M, careless_covariance, spread_error
-from apo_bench.scenario.layout import draw_layout, layout_at
-from apo_bench.scenario.nominal import nominal_operations, nominal_start
+from apo_bench.scenario.layout import draw_layout, layout_at, nominal_operations, nominal_start
+from apo_bench.scenario.order import in_the_air
 from apo_bench.scenario.scenario import Carelessness, Grasp, Scenario, Turn
-from apo_bench.scenario.starts import in_the_air
 
 __all__ = (
     "NOTHING_M",

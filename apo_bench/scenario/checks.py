@@ -21,9 +21,8 @@ from apo_bench.assembly import (
 from apo_bench.errors import InputError
 from apo_bench.geometry import Face, angle_between, intrusion, mate, overlap, pose
 from apo_bench.scenario.layout import layout_at
-from apo_bench.scenario.order import check_order
+from apo_bench.scenario.order import check_order, in_the_air
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.scenario.starts import in_the_air
 
 _GAP_M = 1e-6
 """Faces that are said to touch are nearer than this."""

@@ -20,7 +20,7 @@ from apo_bench.resources import folder
 from apo_bench.scenario.checks import check_scenario
 from apo_bench.scenario.entries import OperationEntry, read_operations, read_parts
 from apo_bench.scenario.keys import LARGEST_LENGTH_MM, read_span, read_unit_axis, refuse_unless
-from apo_bench.scenario.nominal import with_attach_lines
+from apo_bench.scenario.layout import with_attach_lines
 from apo_bench.scenario.scenario import Carelessness, Scenario, Shift, Site, Turn
 
 _SCHEMA = 1

@@ -1,9 +1,12 @@
-"""Whether the operations of a scenario follow from each other: what is carried hangs together, nothing goes twice."""
+"""Whether parts start on something, and the operations of a scenario follow from each other: what is carried hangs
+together, nothing goes twice, nothing is left in the air.
+"""
 
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Operation, Poses
 from apo_bench.errors import InputError, require
+from apo_bench.geometry import TOUCH_M, drop, drop_depths
 
 _SAME = 1e-9
 """Poses that differ by less, [m] and unitless, are one and the same."""
@@ -87,3 +90,21 @@ def _puts_aside(assembly: Assembly, k: int, part: str) -> bool:
 def _met(operation: Operation) -> set[str]:
     """The parts that are touched or taken along."""
     return {contact.environment.part for contact in operation.contacts} | {*operation.carries}
+
+
+AIR_M = 1e-4
+"""Lower above what is below it, a part settles within the first steps and is where it was said to be."""
+
+
+def in_the_air(assembly: Assembly, start: Poses, most_m: float = AIR_M) -> tuple[str, str] | None:
+    """The first movable part that starts more than so much above what is below it, and where it is, in words."""
+    for part, solid in assembly.solids.items():
+        others = {name: other for name, other in assembly.solids.items() if name != part}
+        way = np.array([most_m])
+        deep = (drop_depths(solid, start[part], way, other, start[name])[0] for name, other in others.items())
+        if part not in assembly.fixed and not any(depth > TOUCH_M for depth in deep):
+            falls = {name: drop(solid, start[part], other, start[name]) for name, other in others.items()}
+            below = min(falls, key=lambda name: falls[name])
+            height = f"{round(1e3 * falls[below], 2):g} mm above '{below}'"
+            return part, f"'{part}' starts in the air, {'with nothing below it' if np.isinf(falls[below]) else height}"
+    return None

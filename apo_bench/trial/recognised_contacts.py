@@ -15,9 +15,8 @@ from apo_bench.assembly import Assembly, Contact, Observation
 from apo_bench.correction.correctors import correct
 from apo_bench.observation.models.isotropic import floored
 from apo_bench.recognition.contacts import recognise
-from apo_bench.recognition.evidence import Recognised
 from apo_bench.recognition.jointly import recognise_jointly
-from apo_bench.recognition.thresholds import FIXED_RULES
+from apo_bench.recognition.thresholds import FIXED_RULES, Recognised
 
 
 def recognise_by(observation: Observation, kind: str = "recognised") -> Recognised:

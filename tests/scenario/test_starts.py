@@ -8,7 +8,7 @@ from apo_bench import load_scenario
 from apo_bench.geometry import pose
 from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.layout import layout_at
-from apo_bench.scenario.starts import AIR_M, in_the_air
+from apo_bench.scenario.order import AIR_M, in_the_air
 
 
 @pytest.mark.parametrize("name", scenario_names())

@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench.assembly import Assembly, Plan, Poses, Step
 from apo_bench.geometry import Array, extent, pose, remembered
 from apo_bench.insertion.surroundings import OVER_M, ends_of, mouths, neighbours, slide_directions, slow_before
-from apo_bench.scenario.nominal import nominal_operations
+from apo_bench.scenario.layout import nominal_operations
 from apo_bench.simulation.execution.grips import centring_grips, transfer_grips
 from apo_bench.simulation.execution.transfer import (
     PUT_DOWN,
