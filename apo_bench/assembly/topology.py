@@ -235,13 +235,11 @@ class Assembly:
             left_out: Whole relations, such as `R3`, or single contacts of one, such as `R3: stick.py on castle1.spy`.
         """
         relations = self.relations()
-        kept = np.ones(len(relations), dtype=np.bool_)
         if not left_out:
-            return kept
-        for i, arc in enumerate(self.arcs(), start=1):
-            for j in arc:
-                kept[j] = not {f"R{i}", f"R{i}: {self.given(relations[j].contact)}"}.intersection(left_out)
-        return kept
+            return np.ones(len(relations), dtype=np.bool_)
+        arc_of = {j: f"R{i}" for i, arc in enumerate(self.arcs(), start=1) for j in arc}
+        names = [(arc_of[j], f"{arc_of[j]}: {self.given(each.contact)}") for j, each in enumerate(relations)]
+        return np.array([not {*both}.intersection(left_out) for both in names], dtype=np.bool_)
 
 
 def _lost(moved: Mapping[str, Sequence[int]], contact: Contact, made: int) -> int | None:

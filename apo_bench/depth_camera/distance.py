@@ -84,8 +84,7 @@ def _nearest_on_edges(edges: Array, points: Array) -> Array:
     part = np.clip(((points[:, None] - start) * along).sum(axis=-1) / (along * along).sum(axis=-1), 0.0, 1.0)
     at = start + part[..., None] * along
     off = points[:, None] - at
-    nearest = (off * off).sum(axis=-1).argmin(axis=1)
-    return np.asarray(at[np.arange(len(points)), nearest])
+    return np.asarray(at[np.arange(len(points)), (off * off).sum(axis=-1).argmin(axis=1)])
 
 
 def _cylinder_distance(cylinder: Cylinder, points: Array) -> tuple[Array, Array]:

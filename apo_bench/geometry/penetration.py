@@ -204,8 +204,7 @@ def drop(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
     """How far `a` can go straight down until it meets `b`, to 2 um, [m]; infinite if it passes it by."""
     low_a, high_a = upright_bounds(a.pieces, T_a[:3, :3], T_a[:3, 3])
     low_b, high_b = upright_bounds(b.pieces, T_b[:3, :3], T_b[:3, 3])
-    over = (low_a[:2] < high_b[:2]).all() and (low_b[:2] < high_a[:2]).all() and low_b[2] < high_a[2]
-    if not over:
+    if not ((low_a[:2] < high_b[:2]).all() and (low_b[:2] < high_a[:2]).all() and low_b[2] < high_a[2]):
         return np.inf
     # Between the first and the last way at which the boxes around both may meet: first coarsely, then between the last
     # place without and the first place with a meeting.
@@ -233,5 +232,4 @@ def _first_met(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> int |
 
 def drop_depths(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> Array:
     """How deep `a` is in `b` once it went down so far, (k,), [m]; negative where they are apart."""
-    at = T_a[:3, 3] - np.outer(ways, (0.0, 0.0, 1.0))
-    return intrusion_depths(a.pieces, T_a[:3, :3], at, b.pieces, T_b)
+    return intrusion_depths(a.pieces, T_a[:3, :3], T_a[:3, 3] - np.outer(ways, (0.0, 0.0, 1.0)), b.pieces, T_b)

@@ -87,8 +87,7 @@ def turned_alike(solid: Solid, T: Array, true: Array) -> Array:
     a = about.axis
     across = across_axis(a)
     flips = [np.eye(3), 2.0 * np.outer(across, across) - np.eye(3)] if about.reversible else [np.eye(3)]
-    turns = [flip @ _least_turn(M @ flip, a) for flip in flips]
-    best = max(turns, key=lambda g: float(np.trace(M @ g)))
+    best = max((flip @ _least_turn(M @ flip, a) for flip in flips), key=lambda g: float(np.trace(M @ g)))
     out = np.array(T)
     out[:3, :3] = T[:3, :3] @ best
     out[:3, 3] += T[:3, :3] @ (about.point - best @ about.point)

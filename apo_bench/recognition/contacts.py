@@ -14,20 +14,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Contact, Facing, Observation, PartFace, placements
+from apo_bench.assembly import Contact, Facing, Observation, placements
 from apo_bench.assembly.facing import facing
 from apo_bench.geometry import Array
-from apo_bench.recognition.situation import Belief, PartBeliefs, initial_belief
+from apo_bench.recognition.situation import Belief, Candidate, PartBeliefs, initial_belief, judged
 from apo_bench.recognition.thresholds import (
     RULES_BY_NOISE,
     Evidence,
-    PairThresholds,
     Recognised,
     Rules,
     evidence_of,
-    pair_thresholds,
-    reality,
-    slack,
     with_contacts,
     without_contacts,
 )
@@ -68,26 +64,10 @@ def recognise(
     return Recognised(with_contacts(assembly, evidence), tuple(evidence))
 
 
-class _Candidate(NamedTuple):
-    """A pair of faces that may touch, and how well that fits what is believed."""
-
-    contact: Contact
-    pair: Facing
-    slope: Array
-    """(r, 6 n): derivative of its residual by body twists of all goals; r is 3 of flat faces."""
-    noise: Array
-    """(r, r): see `reality`."""
-    most: PairThresholds
-    distance: float
-    """Squared Mahalanobis length of its residual."""
-    gain: float
-    """Twice the logarithm of how much likelier a closed pair is than one anywhere within the bounds, see `_gain`."""
-
-
 class _Found(NamedTuple):
     """Contacts that go together."""
 
-    taken: tuple[_Candidate, ...]
+    taken: tuple[Candidate, ...]
     belief: Belief
     score: float
     """Sum of the squared lengths, less what each equation that was not implied gains by closing: see `_gain`."""
@@ -104,13 +84,13 @@ class _Around:
     k: int
     others: tuple[str, ...]
 
-    def candidates(self, belief: Belief, taken: Collection[Contact] = ()) -> tuple[_Candidate, ...]:
+    def candidates(self, belief: Belief, taken: Collection[Contact] = ()) -> tuple[Candidate, ...]:
         """The pairs within the thresholds that were not taken yet, the likeliest first."""
         now = belief.standing(self.k)
         solids = self.seen.assembly.solids
         rules = self.rules
         bounds = {"gap_m": rules.gap_m, "angle_rad": rules.angle_rad, "share": rules.share}
-        candidates = list[_Candidate]()
+        candidates = list[Candidate]()
         for a in self.seen.assembly.operations[self.k].moves:
             for b in self.others:
                 known = {(m.face, e.face) for m, e in taken if (m.part, e.part) == (a, b)}
@@ -134,7 +114,7 @@ class _Around:
     def _followed(self, belief: Belief, first: Contact | None) -> _Found:
         """Take the likeliest candidate (or a given one), put the goals where it closes, and look again."""
         at_first = at_hand = self.candidates(belief)
-        taken = list[_Candidate]()
+        taken = list[Candidate]()
         total = 0.0
         while at_hand:
             chosen = next((c for c in at_hand if c.contact == first), at_hand[0])
@@ -147,22 +127,16 @@ class _Around:
         have = {c.contact for c in taken}
         return _Found(tuple(taken), belief, total, tuple(c.contact for c in at_first if c.contact not in have))
 
-    def _judged(self, a: str, b: str, pair: Facing, now: PartBeliefs, belief: Belief) -> Iterator[_Candidate]:
+    def _judged(self, a: str, b: str, pair: Facing, now: PartBeliefs, belief: Belief) -> Iterator[Candidate]:
         """The pair as a candidate, if it is one."""
         # Body twists of all goals -> world twist of part a beside part b -> gap and tilts of the pair.
         slope = pair.slope @ (now.reach[a] - now.reach[b])
         if slope.reshape(len(slope), -1, 6)[:, ~self.seen.seen].any():
             return
-        contact = Contact(PartFace(a, pair.a), PartFace(b, pair.b))
-        play_m = self.seen.assembly.play(contact, self.seen.play_m)
         C = slope @ belief.covariance @ slope.T
-        noise = reality(pair, play_m)
-        most = pair_thresholds(self.rules, C, slack(pair, play_m), pair.lengths)
-        if abs(pair.gap_m) <= most.gap_m and pair.angle_rad <= most.angle_rad:
-            # Squared Mahalanobis length: C is of the goals, noise of play and softness of a contact that is there.
-            e = pair.residual
-            distance = float(e @ np.linalg.solve(C + noise, e))
-            yield _Candidate(contact, pair, slope, noise, most, distance, _gain(C, noise, self.rules, pair.lengths))
+        candidate = judged(self.seen, self.rules, a, b, now.poses[b], pair, slope, C)
+        if candidate is not None:
+            yield candidate._replace(gain=_gain(C, candidate.noise, self.rules, pair.lengths))
 
 
 def _gain(C: Array, noise: Array, rules: Rules, lengths: int) -> float:

@@ -97,6 +97,10 @@ class Candidate(NamedTuple):
 
     contact: Contact
     pair: Facing
+    slope: Array
+    """(r, 6 n): derivative of its residual by body twists of all goals; r is 3 of flat faces."""
+    noise: Array
+    """(r, r): see `reality`."""
     most: PairThresholds
     distance: float
     """Squared Mahalanobis length of its residual."""
@@ -116,6 +120,29 @@ class Candidate(NamedTuple):
     def parts(self) -> tuple[str, str]:
         """Manipulated, environment."""
         return self.contact.manipulated.part, self.contact.environment.part
+
+
+def judged(
+    seen: Observation, rules: Rules, a: str, b: str, T_b: Array, pair: Facing, slope: Array, C: Array
+) -> Candidate | None:
+    """A pair of faces of parts a and b as a candidate that gains nothing yet; None beyond the thresholds.
+
+    Args:
+        T_b: Where part b is, (4, 4), world, [m].
+        slope: (r, 6 n): derivative of the residual by body twists of all goals.
+        C: (r, r): covariance of the residual, from the goals alone.
+    """
+    contact = Contact(PartFace(a, pair.a), PartFace(b, pair.b))
+    play_m = seen.assembly.play(contact, seen.play_m)
+    noise = reality(pair, play_m)
+    most = pair_thresholds(rules, C, slack(pair, play_m), pair.lengths)
+    if abs(pair.gap_m) > most.gap_m or pair.angle_rad > most.angle_rad:
+        return None
+    # Squared Mahalanobis length: C is of the goals, noise of play and softness of a contact that is there.
+    distance = float(pair.residual @ np.linalg.solve(C + noise, pair.residual))
+    is_flat = not seen.assembly.is_round(contact)
+    normal = T_b[:3, :3] @ seen.assembly.face(contact.environment).normal if is_flat else np.zeros(3)
+    return Candidate(contact, pair, slope, noise, most, distance, 0.0, sqrt(C[0, 0] + noise[0, 0]), normal)
 
 
 @final
@@ -176,23 +203,15 @@ class Situation:
 
     def _judged(self, rules: Rules, a: str, b: str, pair: Facing) -> Iterator[Candidate]:
         """The pair as a candidate, if it is one."""
-        contact = Contact(PartFace(a, pair.a), PartFace(b, pair.b))
-        play_m = self.seen.assembly.play(contact, self.seen.play_m)
         J = pair.slope @ self._reach(a, b)
-        noise = reality(pair, play_m)
-        e = pair.residual
         C = J @ self.estimate.covariance @ J.T
-        room = J @ self.estimate.room @ J.T
-        most = pair_thresholds(rules, C, slack(pair, play_m), pair.lengths)
-        distance = float(e @ np.linalg.solve(C + noise, e))
-        if abs(pair.gap_m) > most.gap_m or pair.angle_rad > most.angle_rad:
-            return
-        soft = noise + np.diag([_FLAT_M**2] * pair.lengths + [_FLAT_RAD**2] * (len(e) - pair.lengths))
-        gain = float(np.linalg.slogdet(room + soft)[1] - np.linalg.slogdet(C + soft)[1])
-        normal = np.zeros(3)
-        if not self.seen.assembly.is_round(contact):
-            normal = self.now.poses[b][:3, :3] @ self.seen.assembly.face(contact.environment).normal
-        yield Candidate(contact, pair, most, distance, gain, sqrt(C[0, 0] + noise[0, 0]), normal)
+        candidate = judged(self.seen, rules, a, b, self.now.poses[b], pair, J, C)
+        if candidate is not None:
+            flat = np.diag([_FLAT_M**2] * pair.lengths + [_FLAT_RAD**2] * (len(C) - pair.lengths))
+            soft = candidate.noise + flat
+            room = J @ self.estimate.room @ J.T
+            gain = float(np.linalg.slogdet(room + soft)[1] - np.linalg.slogdet(C + soft)[1])
+            yield candidate._replace(gain=gain)
 
     def _bounds(self, rules: Rules, a: str, b: str) -> PairThresholds:
         """No pair of faces of two parts has wider thresholds: those of the worst point in the worst direction."""

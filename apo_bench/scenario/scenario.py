@@ -129,7 +129,7 @@ class Scenario:
     goals: Array
     """(n, 4, 4): the nominal goals, consistent with every contact; frame of the assembly."""
     attach: tuple[Attach, ...]
-    """The line of every operation, stated or found (`apo_bench.scenario.attach`)."""
+    """The line of every operation, stated or found (`apo_bench.insertion`)."""
     grasps: tuple[Grasp, ...]
     site: Site
     shifts: tuple[Shift, ...]

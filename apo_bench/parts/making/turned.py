@@ -82,8 +82,7 @@ def _length(outer: Sequence[Frustum], inner: Sequence[Frustum], a: float, b: flo
     high = around.at(b)
     if bore is None and abs(low - high) < _SAME_MM:
         center = np.array([0.0, 0.0, 5e-4 * (a + b)])
-        half = 5e-4 * (b - a)
-        yield cylinder_hull("", Cylinder(center, np.array([0.0, 0.0, 1.0]), 1e-3 * low, half))
+        yield cylinder_hull("", Cylinder(center, np.array([0.0, 0.0, 1.0]), 1e-3 * low, 5e-4 * (b - a)))
     elif bore is None:
         yield Hull("", 1e-3 * np.concatenate([_ring(low, around.count, a), _ring(high, around.count, b)]))
     else:

@@ -73,8 +73,7 @@ def _piece(name: str, hull: Hull) -> Piece:
     """A piece; a box where it is one."""
     if hull.cylinder is None and len(hull.corners) == 8 and hull.half.min() >= THINNEST_M:
         box = Box(name, hull.center, hull.half)
-        off = np.abs(hull.corners[:, None] - box.corners[None]).max(axis=2).min(axis=0)
-        if off.max() < _ALIGNED:
+        if np.abs(hull.corners[:, None] - box.corners[None]).max(axis=2).min(axis=0).max() < _ALIGNED:
             return box
     return replace(hull, name=name)
 
