@@ -1,7 +1,6 @@
 """Faces of two solids that look at each other: how far apart, how far from parallel, how much they cover each other."""
 
 from collections.abc import Collection, Iterator
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -83,20 +82,8 @@ class _Posed(NamedTuple):
 
 def _posed(solid: Solid, T: Array) -> _Posed:
     faces = tuple(solid.faces.values())
-    normals = np.array([_measured(face).normal for face in faces]).reshape(-1, 3)
+    normals = np.array([face.normal for face in faces]).reshape(-1, 3)
     return _Posed(faces, normals @ T[:3, :3].T, [pose.apply(T, face.outline) for face in faces])
-
-
-class _Measured(NamedTuple):
-    """What does not depend on where a face is."""
-
-    normal: Array
-    area: float
-
-
-@lru_cache(maxsize=4096)
-def _measured(face: Face) -> _Measured:
-    return _Measured(face.normal, face_area(face))
 
 
 def _pair(a: _Posed, i: int, T_a: Array, b: _Posed, j: int, T_b: Array, share: float) -> Facing | None:
@@ -106,7 +93,7 @@ def _pair(a: _Posed, i: int, T_a: Array, b: _Posed, j: int, T_b: Array, share: f
     n_a = a.normals[i]
     n_b = b.normals[j]
     common = overlap(face_a, T_a, face_b, T_b)
-    covered = common.area / min(_measured(face_a).area, _measured(face_b).area)
+    covered = common.area / min(face_area(face_a), face_area(face_b))
     if covered < share or not len(common.corners):
         return None
     middle = common.corners.mean(axis=0)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.kinds import WALLS, contact_kind, geometric_play
-from apo_bench.geometry import Array, Face, RoundFace, Solid, copyable, freeze, pose, remembered
+from apo_bench.geometry import Array, Face, RoundFace, Solid, copyable, freeze, frozen, pose, remembered
 
 
 class PartFace(NamedTuple):
@@ -179,9 +179,8 @@ class Assembly:
     @remembered
     def intervals(self, play_m: float) -> Array:
         """The least and the largest distance of every contact, (c, 2), in the order of `relations()`, [m]."""
-        every = np.array([self.interval(relation.contact, play_m) for relation in self.relations()]).reshape(-1, 2)
-        every.flags.writeable = False
-        return every
+        every = [self.interval(relation.contact, play_m) for relation in self.relations()]
+        return frozen(np.reshape(every, (-1, 2)))
 
     def first(self, n: int) -> "Assembly":
         """What is known after n operations: the same parts, no later operation."""

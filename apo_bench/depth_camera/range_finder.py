@@ -7,7 +7,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from apo_bench.geometry import Array, frozen
+from apo_bench.geometry import Array, frozen, pose
 
 VIEWED_POINT_M = (0.05, 0.0, 0.03)
 """The point of the table that all views look at."""
@@ -42,9 +42,7 @@ class PinholeView:
         x = (u + 0.5 - self.width / 2) / focal
         y = (v + 0.5 - self.height / 2) / focal
         rays = np.stack([x, y, np.ones_like(x)], axis=-1).reshape(-1, 3) @ self.T_world_view[:3, :3].T
-        rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-        rays.flags.writeable = False
-        return rays
+        return frozen(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
 
 class RangeImage(NamedTuple):
@@ -63,10 +61,7 @@ def look_at(from_m: ArrayLike, at_m: ArrayLike) -> Array:
     z = (at - origin) / np.linalg.norm(at - origin)
     x = np.cross(z, (0.0, 0.0, 1.0))
     x /= np.linalg.norm(x)
-    T = np.eye(4)
-    T[:3, :3] = np.stack([x, np.cross(z, x), z], axis=1)
-    T[:3, 3] = origin
-    return T
+    return pose.displacement(np.stack([x, np.cross(z, x), z], axis=1), origin)
 
 
 @lru_cache(maxsize=4)

@@ -19,18 +19,25 @@ _ROUNDING = 1e-9
 """A component of a quaternion that is nearer to zero has no sign."""
 
 
+def displacement(R: ArrayLike, t: ArrayLike) -> Array:
+    """The pose with a rotation, (*, 3, 3), and a shift, (*, 3), [m] -> (*, 4, 4)."""
+    R = np.asarray(R)
+    T = np.zeros((*R.shape[:-2], 4, 4))
+    T[..., :3, :3] = R
+    T[..., :3, 3] = t
+    T[..., 3, 3] = 1.0
+    return T
+
+
 def exp(twist: ArrayLike) -> Array:
     """The displacement a body twist makes, (*, 6) -> (*, 4, 4). A zero twist gives exactly the identity."""
     twist = np.asarray(twist, dtype=np.float64)
     K = hat(twist[..., 3:])
     # Rodrigues: R = 1 + A K + B K^2, and the shift is V v with V = 1 + B K + C K^2, A = sin a / a and so on.
     A, B, C = _series(np.linalg.norm(twist[..., 3:], axis=-1)[..., None, None])
-    T = np.zeros((*twist.shape[:-1], 4, 4))
     K2 = K @ K
-    T[..., :3, :3] = np.eye(3) + A * K + B * K2
-    T[..., :3, 3] = ((np.eye(3) + B * K + C * K2) @ twist[..., :3, None])[..., 0]
-    T[..., 3, 3] = 1.0
-    return T
+    V = np.eye(3) + B * K + C * K2
+    return displacement(np.eye(3) + A * K + B * K2, (V @ twist[..., :3, None])[..., 0])
 
 
 def log(T: ArrayLike) -> Array:
@@ -53,11 +60,7 @@ def inverse(T: ArrayLike) -> Array:
     """The inverse displacement, (*, 4, 4) -> (*, 4, 4)."""
     T = np.asarray(T, dtype=np.float64)
     R_inverse = np.swapaxes(T[..., :3, :3], -1, -2)
-    out = np.zeros(T.shape)
-    out[..., :3, :3] = R_inverse
-    out[..., :3, 3] = -(R_inverse @ T[..., :3, 3, None])[..., 0]
-    out[..., 3, 3] = 1.0
-    return out
+    return displacement(R_inverse, -(R_inverse @ T[..., :3, 3, None])[..., 0])
 
 
 def hat(w: ArrayLike) -> Array:
@@ -86,10 +89,7 @@ def at(position: ArrayLike, turn_deg: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
     Quarter turns are exact, so that parts that stand upright stand exactly upright.
     """
     rx, ry, rz = (_turn(axis, angle) for axis, angle in enumerate(np.asarray(turn_deg, dtype=np.float64)))
-    T = np.eye(4)
-    T[:3, :3] = rz @ ry @ rx
-    T[:3, 3] = position
-    return T
+    return displacement(rz @ ry @ rx, position)
 
 
 def turn_deg(T: ArrayLike) -> Array:
@@ -136,12 +136,8 @@ def unpack(pose: ArrayLike) -> Array:
     from scipy.spatial.transform import Rotation
 
     pose = np.asarray(pose, dtype=np.float64)
-    T = np.zeros((*pose.shape[:-1], 4, 4))
-    q = pose[..., 3:].reshape(-1, 4)
-    T[..., :3, :3] = Rotation.from_quat(q, scalar_first=True).as_matrix().reshape(*pose.shape[:-1], 3, 3)
-    T[..., :3, 3] = pose[..., :3]
-    T[..., 3, 3] = 1.0
-    return T
+    R = Rotation.from_quat(pose[..., 3:].reshape(-1, 4), scalar_first=True).as_matrix()
+    return displacement(R.reshape(*pose.shape[:-1], 3, 3), pose[..., :3])
 
 
 def nearest_rotations(R: Array) -> Array:

@@ -7,6 +7,7 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, copyable, freeze, frozen
 from apo_bench.geometry.polygon import across_axis
 
@@ -100,7 +101,4 @@ class RoundFace:
         """A frame on the axis, z along it, x towards the middle of the face if there is one, (4, 4)."""
         z = self.axis
         x = across_axis(z, self.toward)
-        T = np.eye(4)
-        T[:3, :3] = np.column_stack([x, np.cross(z, x), z])
-        T[:3, 3] = self.point
-        return frozen(T, 4, 4)
+        return frozen(pose.displacement(np.column_stack([x, np.cross(z, x), z]), self.point), 4, 4)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.exact_turns import carries_faces, exact_turns, fills_the_same
+from apo_bench.geometry.exact_turns import carries_faces, exact_turns, fills_the_same, turned
 from apo_bench.geometry.polygon import across_axis
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Solid, all_boxes
@@ -139,12 +139,8 @@ def symmetries(solid: Solid) -> Array:
         return frozen(exact_turns(solid) if about is None else [np.eye(4), *[_over(about)] * about.reversible])
     c = solid.centroid
     centred = [(box.center - c, box.half) for box in solid.pieces]
-    turned = [R for R in quarter_turns() if _same(centred, [(R @ at, np.abs(R) @ half) for at, half in centred])]
-    # x -> R x + (c - R c): the turn about the centre of volume.
-    g = np.tile(np.eye(4), (len(turned), 1, 1))
-    g[:, :3, :3] = turned
-    g[:, :3, 3] = c - np.array(turned) @ c
-    return frozen(g[[_keeps_fit(solid, T) for T in g]])
+    kept = [R for R in quarter_turns() if _same(centred, [(R @ at, np.abs(R) @ half) for at, half in centred])]
+    return frozen([g for g in (turned(solid, R) for R in kept) if _keeps_fit(solid, g)])
 
 
 def _over(about: Revolution) -> Array:
