@@ -77,6 +77,7 @@ def beside(face: Face, T_face: Array, on: Face, T_on: Array) -> float:
     return float(face_shape(face, _into_plane(on) @ pose.inverse(T_on) @ T_face).distance(own_shape(on)))
 
 
+@lru_cache(maxsize=4096)
 def face_area(face: Face) -> float:
     """The area of a face without its holes, [m^2]."""
     return float(own_shape(face).area)
