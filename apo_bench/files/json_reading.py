@@ -111,8 +111,9 @@ def _shared(node: JsonNode, n: int) -> SharedError:
         operations and len(set(operations)) == len(operations) and all(0 <= k < n for k in operations),
         f"operations from 1 to {n}, each once, are needed",
     )
-    if "local" in fields and "frame" not in fields:
-        fields["local"].fail("a frame is needed with it", "state the frame, or leave this out")
+    fields.get("local", node).require(
+        "local" not in fields or "frame" in fields, "a frame is needed with it", "state the frame, or leave this out"
+    )
     m = len(operations)
     correlation = None
     if "correlation" in fields:

@@ -19,16 +19,14 @@ _ROUNDS = 100
 @contextmanager
 def environment(variables: Mapping[str, str]) -> Iterator[None]:
     """What processes that are started meanwhile find in their environment besides."""
-    before = {name: os.environ.get(name) for name in variables}
+    before = {name: os.environ[name] for name in variables if name in os.environ}
     os.environ.update(variables)
     try:
         yield
     finally:
-        for name, value in before.items():
-            if value is None:
-                del os.environ[name]
-            else:
-                os.environ[name] = value
+        for name in variables:
+            os.environ.pop(name, None)
+        os.environ.update(before)
 
 
 def descendants(pid: int) -> list[int]:

@@ -143,8 +143,9 @@ def _round(name: str, node: JsonNode, kind: str) -> RoundFace:
             abs(radii[1] - radii[0]) >= 1e-3, 'two radii that differ are needed, else kind = "cylinder"'
         )
     span = _within(keys["span_mm"], 2) if "span_mm" in keys else np.zeros(2)
-    if kind != "rim" and span[1] - span[0] < 1e-3:
-        keys["span_mm"].fail("a start and an end that is greater are needed")
+    keys.get("span_mm", node).require(
+        kind == "rim" or span[1] - span[0] >= 1e-3, "a start and an end that is greater are needed"
+    )
     axis = _unit(keys["axis"])
     extent = np.radians(keys["extent_deg"].number(0.0, 360.0, above=True)) if "extent_deg" in keys else WHOLE_TURN
     node.require(

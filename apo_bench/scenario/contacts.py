@@ -88,8 +88,7 @@ def _described(face: Face | RoundFace) -> str:
 
 def _gap(keys: Mapping[str, JsonNode], node: JsonNode, contact: Contact, fits: bool) -> Gap:
     kind: GapKind = keys["kind"].value if "kind" in keys else Gap().kind
-    if kind not in _KINDS:
-        keys["kind"].fail(f"{', '.join(_KINDS[:-1])} or {_KINDS[-1]} is needed")
+    keys.get("kind", node).require(kind in _KINDS, f"{', '.join(_KINDS[:-1])} or {_KINDS[-1]} is needed")
     if "gap_mm" not in keys:
         refuse_unless(
             kind != "clearance" or fits,

@@ -22,7 +22,6 @@ from apo_bench.scenario.keys import (
     read_pose,
     read_span,
     read_unit_axis,
-    refuse,
     refuse_name,
     refuse_unless,
 )
@@ -83,8 +82,11 @@ def _part(node: JsonNode, name: str, folder: Path, solids: dict[Path, Solid]) ->
     keys = node.fields(("file",), ("fixed", "follows_site", "start", "color"))
     fixed = "fixed" in keys and keys["fixed"].flag()
     follows = "follows_site" in keys and keys["follows_site"].flag()
-    if follows and not fixed:
-        refuse(keys["follows_site"], "only a fixed part can follow the site; say fixed = true, or leave this key out")
+    refuse_unless(
+        fixed or not follows,
+        keys.get("follows_site", node),
+        "only a fixed part can follow the site; say fixed = true, or leave this key out",
+    )
     refuse_unless(
         fixed or "start" in keys,
         node,
@@ -201,8 +203,10 @@ def _attach(node: JsonNode) -> Preference:
     keys = node.fields((), ("along", "travel_mm"))
     direction = read_unit_axis(keys["along"]) if "along" in keys else None
     travel_m = 1e-3 * keys["travel_mm"].number(0.0, above=True) if "travel_mm" in keys else None
-    if travel_m is not None and travel_m > 1e-3 * LARGEST_LENGTH_MM:
-        keys["travel_mm"].fail(f"a length of at most {LARGEST_LENGTH_MM:g} mm is needed")
+    keys.get("travel_mm", node).require(
+        travel_m is None or travel_m <= 1e-3 * LARGEST_LENGTH_MM,
+        f"a length of at most {LARGEST_LENGTH_MM:g} mm is needed",
+    )
     return Preference(direction, travel_m)
 
 

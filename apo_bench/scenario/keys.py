@@ -35,8 +35,7 @@ def read_pose(node: JsonNode) -> Array:
     keys = node.fields(("at_mm",), ("turn_deg",))
     at = read_point(keys["at_mm"])
     turn = keys["turn_deg"].numbers(3) if "turn_deg" in keys else np.zeros(3)
-    if np.abs(turn).max() > 360:
-        keys["turn_deg"].fail("three angles from -360 to 360 degrees are needed")
+    keys.get("turn_deg", node).require(np.abs(turn).max() <= 360, "three angles from -360 to 360 degrees are needed")
     return pose.at(at, turn)
 
 

@@ -151,7 +151,7 @@ def _bored(each: Bore, cell: Array, low: float, high: float) -> Iterator[Array]:
     heights = heights_of(each.steps, low, high)
     at = np.array(each.at)
     for a, b in pairwise(heights):
-        step = next((s for s in each.steps if s.part(a, b)), None)
+        step = next((s for s in each.steps if s.covers(a, b)), None)
         if step is None:
             yield prism(cell, a, b)
             continue

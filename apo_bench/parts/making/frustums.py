@@ -45,11 +45,9 @@ class Frustum:
         a, b = self.radii
         return a + (b - a) * (height - self.low) / (self.high - self.low)
 
-    def part(self, low: float, high: float) -> tuple[float, float] | None:
-        """Its radii at both ends of a shorter length; None beside it."""
-        if low < self.low - _SAME_MM or high > self.high + _SAME_MM:
-            return None
-        return self.at(low), self.at(high)
+    def covers(self, low: float, high: float) -> bool:
+        """Whether a shorter length lies in it."""
+        return self.low - _SAME_MM <= low and high <= self.high + _SAME_MM
 
     def moments(self) -> Moments:
         """[mm]."""

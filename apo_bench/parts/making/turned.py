@@ -74,8 +74,8 @@ def shaft(
 
 def _length(outer: Sequence[Frustum], inner: Sequence[Frustum], a: float, b: float) -> Iterator[Hull]:
     """The pieces between two heights between which nothing changes."""
-    around = next((s for s in outer if s.part(a, b)), None)
-    bore = next((s for s in inner if s.part(a, b)), None)
+    around = next((s for s in outer if s.covers(a, b)), None)
+    bore = next((s for s in inner if s.covers(a, b)), None)
     if around is None:
         raise ValueError(f"no outer step reaches from {a:g} to {b:g} mm")
     low = around.at(a)
