@@ -1,7 +1,5 @@
 """The straight line on which a part comes to its goal."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple, final
 
@@ -23,7 +21,7 @@ class Attach:
         freeze(self, direction=(3,))
 
     @property
-    def stated(self) -> Preference:
+    def stated(self) -> "Preference":
         """The whole line as a preference."""
         return Preference(self.direction, self.travel_m)
 

@@ -1,7 +1,5 @@
 """Bodies as they are built: convex pieces, faces and exact moments, in [m]; and what becomes of them side by side."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, final
@@ -30,7 +28,7 @@ class Body:
     rounds: tuple[RoundFace, ...]
     moments: Moments
 
-    def moved(self, at_mm: Sequence[float] = (0.0, 0.0, 0.0), turn_deg: Sequence[float] = (0.0, 0.0, 0.0)) -> Body:
+    def moved(self, at_mm: Sequence[float] = (0.0, 0.0, 0.0), turn_deg: Sequence[float] = (0.0, 0.0, 0.0)) -> "Body":
         """Turned about x, then y, then z of the frame, in degrees, then shifted."""
         R = Rotation.from_euler("xyz", turn_deg, degrees=True).as_matrix()
         t = 1e-3 * np.asarray(at_mm)
@@ -55,7 +53,7 @@ class Body:
         axis: Sequence[float],
         radius_mm: float,
         hole: bool = True,
-    ) -> Body:
+    ) -> "Body":
         """With the circle at the end of a hole, or of a shaft, as a face of its own.
 
         Args:
@@ -67,7 +65,7 @@ class Body:
         rim = RoundFace(name, 1e-3 * np.asarray(at_mm), n / np.linalg.norm(n), (0.0, 0.0), (r, r), hole)
         return replace(self, rounds=(*self.rounds, rim))
 
-    def prefixed(self, prefix: str) -> Body:
+    def prefixed(self, prefix: str) -> "Body":
         """The same with names that begin so; faces without a name stay without."""
         return replace(
             self,

@@ -1,7 +1,5 @@
 """Volume, centroid and inertia of exact shapes: moments up to the second, which add up."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from functools import reduce
 from typing import NamedTuple
@@ -18,19 +16,19 @@ class Moments(NamedTuple):
     first: Array
     second: Array
 
-    def plus(self, other: Moments, sign: float = 1.0) -> Moments:
+    def plus(self, other: "Moments", sign: float = 1.0) -> "Moments":
         return Moments(
             self.size + sign * other.size, self.first + sign * other.first, self.second + sign * other.second
         )
 
-    def moved(self, R: Array, t: Array) -> Moments:
+    def moved(self, R: Array, t: Array) -> "Moments":
         """Of the shape after x -> R x + t."""
         m = R @ self.first
         second = R @ self.second @ R.T + np.outer(m, t) + np.outer(t, m) + self.size * np.outer(t, t)
         return Moments(self.size, m + self.size * t, second)
 
     @property
-    def in_metres(self) -> Moments:
+    def in_metres(self) -> "Moments":
         """Of a solid whose lengths are in mm."""
         return Moments(1e-9 * self.size, 1e-12 * self.first, 1e-15 * self.second)
 
