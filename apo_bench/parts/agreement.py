@@ -1,7 +1,4 @@
-"""Faces that are stated, held against the pieces: flat ones against their sides, round ones by rays from their axes.
-
-One file of more than 250 lines, since both kinds of faces are held against the same sides.
-"""
+"""Faces that are stated, held against the pieces: flat ones against their sides, round ones by rays from their axes."""
 
 from collections.abc import Iterable
 from dataclasses import replace
