@@ -61,7 +61,7 @@ def look_at(from_m: ArrayLike, at_m: ArrayLike) -> Array:
     z = (at - origin) / np.linalg.norm(at - origin)
     x = np.cross(z, (0.0, 0.0, 1.0))
     x /= np.linalg.norm(x)
-    return pose.displacement(np.stack([x, np.cross(z, x), z], axis=1), origin)
+    return pose.rigid(np.stack([x, np.cross(z, x), z], axis=1), origin)
 
 
 @lru_cache(maxsize=4)

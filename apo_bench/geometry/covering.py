@@ -111,7 +111,7 @@ def plane_frame(face: Face) -> Array:
     longest = edges[np.argmax(np.linalg.norm(edges, axis=1))]
     z = face.normal
     x = longest / np.linalg.norm(longest)
-    return pose.displacement(np.column_stack([x, np.cross(z, x), z]), face.outline[0])
+    return pose.rigid(np.column_stack([x, np.cross(z, x), z]), face.outline[0])
 
 
 def face_shape(face: Face, T: Array) -> Any:

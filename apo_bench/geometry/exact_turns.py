@@ -39,14 +39,14 @@ def exact_turns(solid: Solid) -> Array:
     turns = [np.eye(3)]
     for R in _candidates(marks):
         new = all(np.abs(R - known).max() > 1e-6 for known in turns)
-        if new and _carries(marks, R) and fills_the_same(solid, turned(solid, R), _doubt(solid)):
+        if new and _carries(marks, R) and fills_the_same(solid, centred_turn(solid, R), _doubt(solid)):
             turns.append(R)
-    return np.array([turned(solid, R) for R in turns])
+    return np.array([centred_turn(solid, R) for R in turns])
 
 
 def carries_faces(solid: Solid, g: Array) -> bool:
     """Whether a displacement, (4, 4), carries faces onto faces that are alike, and pieces into pieces."""
-    about = turned(solid, g[:3, :3])
+    about = centred_turn(solid, g[:3, :3])
     return bool(
         np.abs(g - about).max() < _SAME_M
         and _carries(_marks(solid), g[:3, :3])
@@ -89,9 +89,9 @@ def _doubt(solid: Solid) -> float:
     return _SAME_M + _COARSE * max((max(face.radii) for face in solid.rounds.values()), default=0.0)
 
 
-def turned(solid: Solid, R: Array) -> Array:
+def centred_turn(solid: Solid, R: Array) -> Array:
     """The turn about the centre of volume, (4, 4): x -> R x + (c - R c)."""
-    return pose.displacement(R, solid.centroid - R @ solid.centroid)
+    return pose.rigid(R, solid.centroid - R @ solid.centroid)
 
 
 def _marks(solid: Solid) -> _Marks:

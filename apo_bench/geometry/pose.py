@@ -19,7 +19,7 @@ _ROUNDING = 1e-9
 """A component of a quaternion that is nearer to zero has no sign."""
 
 
-def displacement(R: ArrayLike, t: ArrayLike) -> Array:
+def rigid(R: ArrayLike, t: ArrayLike) -> Array:
     """The pose with a rotation, (*, 3, 3), and a shift, (*, 3), [m] -> (*, 4, 4)."""
     R = np.asarray(R)
     T = np.zeros((*R.shape[:-2], 4, 4))
@@ -37,7 +37,7 @@ def exp(twist: ArrayLike) -> Array:
     A, B, C = _series(np.linalg.norm(twist[..., 3:], axis=-1)[..., None, None])
     K2 = K @ K
     V = np.eye(3) + B * K + C * K2
-    return displacement(np.eye(3) + A * K + B * K2, (V @ twist[..., :3, None])[..., 0])
+    return rigid(np.eye(3) + A * K + B * K2, (V @ twist[..., :3, None])[..., 0])
 
 
 def log(T: ArrayLike) -> Array:
@@ -60,7 +60,7 @@ def inverse(T: ArrayLike) -> Array:
     """The inverse displacement, (*, 4, 4) -> (*, 4, 4)."""
     T = np.asarray(T, dtype=np.float64)
     R_inverse = np.swapaxes(T[..., :3, :3], -1, -2)
-    return displacement(R_inverse, -(R_inverse @ T[..., :3, 3, None])[..., 0])
+    return rigid(R_inverse, -(R_inverse @ T[..., :3, 3, None])[..., 0])
 
 
 def hat(w: ArrayLike) -> Array:
@@ -89,7 +89,7 @@ def at(position: ArrayLike, turn_deg: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
     Quarter turns are exact, so that parts that stand upright stand exactly upright.
     """
     rx, ry, rz = (_turn(axis, angle) for axis, angle in enumerate(np.asarray(turn_deg, dtype=np.float64)))
-    return displacement(rz @ ry @ rx, position)
+    return rigid(rz @ ry @ rx, position)
 
 
 def turn_deg(T: ArrayLike) -> Array:
@@ -137,7 +137,7 @@ def unpack(pose: ArrayLike) -> Array:
 
     pose = np.asarray(pose, dtype=np.float64)
     R = Rotation.from_quat(pose[..., 3:].reshape(-1, 4), scalar_first=True).as_matrix()
-    return displacement(R.reshape(*pose.shape[:-1], 3, 3), pose[..., :3])
+    return rigid(R.reshape(*pose.shape[:-1], 3, 3), pose[..., :3])
 
 
 def nearest_rotations(R: Array) -> Array:

@@ -101,4 +101,4 @@ class RoundFace:
         """A frame on the axis, z along it, x towards the middle of the face if there is one, (4, 4)."""
         z = self.axis
         x = across_axis(z, self.toward)
-        return frozen(pose.displacement(np.column_stack([x, np.cross(z, x), z]), self.point), 4, 4)
+        return frozen(pose.rigid(np.column_stack([x, np.cross(z, x), z]), self.point), 4, 4)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from apo_bench.geometry import pose
 from apo_bench.geometry.arrays import Array, frozen
-from apo_bench.geometry.exact_turns import carries_faces, exact_turns, fills_the_same, turned
+from apo_bench.geometry.exact_turns import carries_faces, centred_turn, exact_turns, fills_the_same
 from apo_bench.geometry.polygon import across_axis
 from apo_bench.geometry.round_face import RoundFace
 from apo_bench.geometry.solid import Solid, all_boxes
@@ -140,7 +140,7 @@ def symmetries(solid: Solid) -> Array:
     c = solid.centroid
     centred = [(box.center - c, box.half) for box in solid.pieces]
     kept = [R for R in quarter_turns() if _same(centred, [(R @ at, np.abs(R) @ half) for at, half in centred])]
-    return frozen([g for g in (turned(solid, R) for R in kept) if _keeps_fit(solid, g)])
+    return frozen([g for g in (centred_turn(solid, R) for R in kept) if _keeps_fit(solid, g)])
 
 
 def _over(about: Revolution) -> Array:

@@ -9,7 +9,7 @@ import shapely
 from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import WHOLE_TURN, Array, Face, Hull, RoundFace, flat_area, polygons_of, rings_of, straightened
-from apo_bench.parts.making.moments import Moments, total
+from apo_bench.parts.making.moments import Moments, summed
 
 _SAME_M = 1e-9
 _PARALLEL = 1e-12
@@ -82,7 +82,7 @@ def join(*bodies: Body) -> Body:
         tuple(piece for body in bodies for piece in body.pieces),
         tuple(_joined_flats(flats)),
         tuple(_joined_rounds(rounds)),
-        total(bodies[0].moments, (body.moments for body in bodies[1:])),
+        summed(bodies[0].moments, (body.moments for body in bodies[1:])),
     )
 
 

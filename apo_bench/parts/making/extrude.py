@@ -12,7 +12,7 @@ from apo_bench.geometry import WHOLE_TURN, Array, Face, Hull, RoundFace, straigh
 from apo_bench.parts.making.body import Body
 from apo_bench.parts.making.cells import bands, bore_cell, clipped, convex_cells, wedges
 from apo_bench.parts.making.frustums import Frustum, at_height, chamfered, heights_of, prism, raised, tangent, without
-from apo_bench.parts.making.moments import extruded, total
+from apo_bench.parts.making.moments import extruded, summed
 from apo_bench.parts.making.outline import Outline, arc_of, circle, goes_on, outline_moments, receding, ring
 
 _NARROW_MM = 6e-3
@@ -93,7 +93,7 @@ def extrude(
     for cell in cells:
         rest = rest.difference(Polygon(cell))
     prisms = [prism(cell, low, high) for cell in (*beside, *convex_cells(rest))]
-    moments = extruded(total(outline_moments(outline), map(outline_moments, holes), -1.0), low, high)
+    moments = extruded(summed(outline_moments(outline), map(outline_moments, holes), -1.0), low, high)
     for each in bores:
         moments = without(moments, each.steps, each.at)
     pieces = [*prisms, *(piece for b, cell in zip(bores, cells, strict=True) for piece in _bored(b, cell, low, high))]

@@ -7,7 +7,7 @@ from typing import final
 import numpy as np
 
 from apo_bench.geometry import Array, RoundFace
-from apo_bench.parts.making.moments import Moments, frustum_moments, total
+from apo_bench.parts.making.moments import Moments, frustum_moments, summed
 from apo_bench.parts.making.outline import needed_sides
 
 _SAME_MM = 1e-6
@@ -85,7 +85,7 @@ def chamfered(wall: Frustum, at_low: float, at_high: float, sign: float) -> list
 def without(moments: Moments, steps: Sequence[Frustum], at: tuple[float, float] = (0.0, 0.0)) -> Moments:
     """What is left of moments without those of some lengths about an axis along z."""
     there = np.array([*at, 0.0])
-    return total(moments, (step.moments().moved(np.eye(3), there) for step in steps), -1.0)
+    return summed(moments, (step.moments().moved(np.eye(3), there) for step in steps), -1.0)
 
 
 def raised(flat: Array, z: float) -> Array:

@@ -43,7 +43,7 @@ class Moments(NamedTuple):
         return np.asarray(np.trace(S) * np.eye(3) - S)
 
 
-def total(first: Moments, others: Iterable[Moments], sign: float = 1.0) -> Moments:
+def summed(first: Moments, others: Iterable[Moments], sign: float = 1.0) -> Moments:
     """Those of one shape and of others, or less others, one after the other."""
     return reduce(lambda moments, other: moments.plus(other, sign), others, first)
 

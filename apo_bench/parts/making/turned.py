@@ -20,7 +20,7 @@ from apo_bench.parts.making.frustums import (
     tangent,
     without,
 )
-from apo_bench.parts.making.moments import total
+from apo_bench.parts.making.moments import summed
 
 _SAME_MM = 1e-6
 _NARROW_MM = 6e-3
@@ -45,7 +45,7 @@ def turned(
         fit: Which flat faces, by name, recede by the clearance.
     """
     heights = heights_of((*outer, *inner))
-    moments = total(outer[0].moments(), (step.moments() for step in outer[1:]))
+    moments = summed(outer[0].moments(), (step.moments() for step in outer[1:]))
     pieces = [p for a, b in pairwise(heights) for p in _length(outer, inner, a, b)]
     rounds = [step.wall((0.0, 0.0), hole) for steps, hole in ((outer, False), (inner, True)) for step in steps]
     return Body(
