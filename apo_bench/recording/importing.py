@@ -12,15 +12,13 @@ from apo_bench.errors import InputError, unknown
 from apo_bench.geometry import Array
 from apo_bench.observation.models.isotropic import floored, with_shared
 from apo_bench.observation.models.outliers import UNSEEN_DEVIATION, last_seen
-from apo_bench.recording.arranging import Arrangement, arrangement_of, staying
-from apo_bench.recording.camera_file import CameraFile
-from apo_bench.recording.camera_pose import CameraPose
-from apo_bench.recording.contact_fit import ContactFit
+from apo_bench.recording.arranging import Arrangement, CameraPose, arrangement_of, staying
 from apo_bench.recording.doubts import check_arrangement, check_direction, unclear
 from apo_bench.recording.log import PoseTrack
 from apo_bench.recording.operations import SeenOperation, seen_operation
-from apo_bench.recording.ordering import NoOrder, Stated
-from apo_bench.recording.rests import RestSpan, least_rest_s
+from apo_bench.recording.ordering import ContactFit, NoOrder, Stated
+from apo_bench.recording.rests import least_rest_s
+from apo_bench.recording.setup_files import CameraFile
 from apo_bench.recording.stays import Stay, Stays, all_stays
 from apo_bench.scenario import Scenario, layout_at
 
@@ -66,9 +64,23 @@ def import_recording(
         InputError: A part is not of the scenario or is missing, the moves are not its operations, or no contact fits.
     """
     assembly = scenario.assembly
-    _check_parts(tracks, assembly, file)
+    for part in tracks:
+        if part not in assembly.solids:
+            raise InputError(f"{file}: {unknown('part', part, assembly.solids)}")
+    for k, operation in enumerate(assembly.operations):
+        if operation.main not in tracks:
+            raise InputError(
+                f"{file}: '{operation.main}', which operation {k + 1} moves, is not tracked; name its id in the "
+                "objects file."
+            )
     stays = all_stays(tracks)
-    _check_rests(tracks, stays, file)
+    for part, track in tracks.items():
+        if not stays[part]:
+            raise InputError(
+                f"{file}: '{part}' never rests, so nothing is known of it (frames: {len(track.t)}, in "
+                f"{track.t[-1] - track.t[0]:.2f} s); give a log in which it lies still for "
+                f"{least_rest_s(track):.1f} s and more."
+            )
     arrange = partial(arrangement_of, camera=camera, assembly=assembly, planned=planned_starts(scenario), stated=stated)
     try:
         arrangement = arrange(stays)
@@ -86,42 +98,22 @@ def planned_starts(scenario: Scenario) -> Poses:
     return layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start
 
 
-def _check_parts(tracks: Mapping[str, PoseTrack], assembly: Assembly, file: str) -> None:
-    """Refuse parts that the scenario does not have, and operations of parts that were not tracked."""
-    for part in tracks:
-        if part not in assembly.solids:
-            raise InputError(f"{file}: {unknown('part', part, assembly.solids)}")
-    for k, operation in enumerate(assembly.operations):
-        if operation.main not in tracks:
-            raise InputError(
-                f"{file}: '{operation.main}', which operation {k + 1} moves, is not tracked; name its id in the "
-                "objects file."
-            )
-
-
-def _check_rests(tracks: Mapping[str, PoseTrack], stays: Stays, file: str) -> None:
-    """Refuse parts that never rest."""
-    for part, track in tracks.items():
-        if not stays[part]:
-            raise InputError(
-                f"{file}: '{part}' never rests, so nothing is known of it (frames: {len(track.t)}, in "
-                f"{track.t[-1] - track.t[0]:.2f} s); give a log in which it lies still for "
-                f"{least_rest_s(track):.1f} s and more."
-            )
-
-
 def _imported(
     tracks: Mapping[str, PoseTrack], stays: Stays, arrangement: Arrangement, camera: CameraFile, scenario: Scenario
 ) -> ImportedRecording:
     assembly = scenario.assembly
-    solved = arrangement.camera
+    solved, order, start, whence, _ = arrangement
     X = solved.T_world_camera
-    start = arrangement.start
-    chosen = arrangement.order.stays
-    operations = tuple(seen_operation(tracks, stays, chosen, assembly, X, k) for k in range(len(assembly)))
+    operations = tuple(seen_operation(tracks, stays, order.stays, assembly, X, k) for k in range(len(assembly)))
     seen = np.array([operation.rest is not None for operation in operations])
     goals = np.array([np.eye(4) if operation.rest is None else X @ operation.rest.T for operation in operations])
-    covariance = np.array([_covariance(operation.rest, camera) for operation in operations])
+    # What frames differ by averages out, what stays does not.
+    covariance = np.array(
+        [
+            np.diag(UNSEEN_DEVIATION**2) if rest is None else rest.mean.covariance + staying(camera, rest.mean)
+            for rest in (operation.rest for operation in operations)
+        ]
+    )
     observation = Observation(
         assembly=assembly,
         start=start,
@@ -141,18 +133,11 @@ def _imported(
         camera=solved,
         stays=stays,
         operations=operations,
-        stood=arrangement.whence,
+        stood=whence,
         fit=arrangement.fit,
         stays_stated=camera.stays is not None,
         unclear=unclear(stays, arrangement, operations, covariance, assembly),
     )
-
-
-def _covariance(rest: RestSpan | None, camera: CameraFile) -> Array:
-    """(6, 6), of the goal that a rest shows: what frames differ by averages out, what stays does not."""
-    if rest is None:
-        return np.diag(UNSEEN_DEVIATION**2)
-    return rest.mean.covariance + staying(camera, rest.mean)
 
 
 def _adjustments(operations: Sequence[SeenOperation], assembly: Assembly) -> Array:

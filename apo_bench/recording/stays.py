@@ -62,14 +62,13 @@ def stays_of(part: str, rests: Sequence[RestSpan]) -> tuple[Stay, ...]:
     return tuple(Stay(part, tuple(together)) for together in groups)
 
 
-def poses_at(stays: Mapping[str, Sequence[Stay]], t: float) -> Mapping[str, Array]:
+def poses_at(stays: Stays, t: float) -> Mapping[str, Array]:
     """Where every part is at a time, in the frame of the camera: of one that moves, where it was last; (4, 4), [m]."""
-    latest = {
-        part: next((stay for stay in reversed(known) if stay.begins <= t), known[0])
+    return {
+        part: next((stay for stay in reversed(known) if stay.begins <= t), known[0]).at(t).T
         for part, known in stays.items()
         if known
     }
-    return {part: stay.at(t).T for part, stay in latest.items()}
 
 
 def _is_adjusted(before: RestSpan, after: RestSpan) -> bool:

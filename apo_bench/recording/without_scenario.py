@@ -8,12 +8,11 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
-from apo_bench.recording.arranging import solved_camera, staying
+from apo_bench.recording.arranging import CameraPose, solved_camera, staying
 from apo_bench.recording.averaging import per_axis
-from apo_bench.recording.camera_file import CameraFile
-from apo_bench.recording.camera_pose import CameraPose
 from apo_bench.recording.log import PoseTrack
 from apo_bench.recording.rests import RestSpan
+from apo_bench.recording.setup_files import CameraFile
 from apo_bench.recording.stays import Stay, Stays, all_stays
 
 

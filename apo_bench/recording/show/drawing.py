@@ -1,6 +1,7 @@
 """A recording drawn, whether it fits, is refused or has no scenario: frames of camera and parts, paths, and rests."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import combinations, product
 from pathlib import Path
@@ -8,15 +9,14 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly import Poses
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Solid, pose
 from apo_bench.io.figures import default_looks, save_figure
 from apo_bench.recording.arranging import camera_pose
-from apo_bench.recording.camera_file import CameraFile
 from apo_bench.recording.importing import ImportedRecording, planned_starts
 from apo_bench.recording.log import Log, PoseTrack
 from apo_bench.recording.operations import approaches
+from apo_bench.recording.setup_files import CameraFile
 from apo_bench.recording.stays import Stays, all_stays
 from apo_bench.recording.without_scenario import UnplannedRecording
 from apo_bench.scenario.scenario import Scenario
@@ -72,7 +72,7 @@ def drawing_of(
             if seen.rest is not None
         ],
         solids=recording.scenario.assembly.solids,
-        places=_places(camera, planned_starts(recording.scenario)),
+        places=camera.places(planned_starts(recording.scenario)),
         path_ends=_path_ends(recording),
     )
 
@@ -83,14 +83,16 @@ def unfit_drawing(
     """Of a recording that is refused: as it was read, with the camera where it fits best."""
     stays = all_stays(tracks)
     planned = planned_starts(scenario)
-    X = _camera(stays, camera, planned)
+    X = None
+    with suppress(InputError, LookupError, np.linalg.LinAlgError):
+        X = camera_pose(stays, camera, planned).T_world_camera
     return RecordingDrawing(
         title=f"{_title(log, scenario)}; it does not fit",
         tracks=tracks,
         stays=stays,
         T_world_camera=X,
         solids=scenario.assembly.solids,
-        places={} if X is None else _places(camera, planned),
+        places={} if X is None else camera.places(planned),
     )
 
 
@@ -109,25 +111,11 @@ def _title(log: Log, scenario: Scenario | None) -> str:
     return f"{log.file}{f', {scenario.name}' if scenario else ''}\n{'; '.join(log.notes)}"
 
 
-def _places(camera: CameraFile, planned: Poses) -> Poses:
-    """Known places, world, [m]."""
-    return {part: planned[part] if T is None else T for part, T in camera.known.items()}
-
-
-def _camera(stays: Stays, camera: CameraFile, planned: Poses) -> Array | None:
-    try:
-        return camera_pose(stays, camera, planned).T_world_camera
-    except (InputError, LookupError, np.linalg.LinAlgError):
-        return None
-
-
 def _path_ends(recording: ImportedRecording) -> Sequence[DrawnEnd]:
     drawn = []
-    X = recording.camera.T_world_camera
-    for approach in approaches(recording.scenario, recording.operations, X):
-        rest = recording.operations[approach.operation].rest
-        if approach.end is not None and rest is not None:
-            goal = X @ rest.T
+    for approach in approaches(recording.scenario, recording.operations, recording.camera.T_world_camera):
+        if approach.end is not None:
+            goal = recording.observation.goals[approach.operation]
             way = approach.end.length_m * goal[:3, :3] @ approach.end.direction
             part = recording.scenario.assembly.operations[approach.operation].main
             label = f"{approach.operation + 1}: {approach.macro}, {approach.off_deg:.0f} deg off"

@@ -1,19 +1,23 @@
-"""CAMERA.toml: how a log is written, where its camera stands, and what of its error stays while a part rests."""
+"""CAMERA.toml and OBJECTS.toml: how a log is written, where its camera stands, and which of its ids is which part."""
 
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal, final
+from typing import Any, Literal, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.errors import unknown
+from apo_bench.errors import InputError, one_line, unknown
 from apo_bench.geometry import Array
 from apo_bench.io.documents import JsonNode, read_toml
+from apo_bench.recording.log import Log, PoseTrack
 from apo_bench.scenario.keys import read_any_pose, refuse
 
-_SCHEMA = "apo-bench/camera/1"
+_CAMERA = "apo-bench/camera/1"
+_OBJECTS = "apo-bench/objects/1"
+_MOST_IDS = 12
+"""So many ids are named in a sentence."""
 LENGTH_UNITS = MappingProxyType({"mm": 1e-3, "cm": 1e-2, "m": 1.0})
 ANGLE_UNITS = MappingProxyType({"deg": np.pi / 180.0, "rad": 1.0})
 TIME_UNITS = MappingProxyType({"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9})
@@ -56,6 +60,14 @@ class CameraFile:
     stays: Array | None
     """(2,), standard deviation of the error that stays while a part rests, per axis, [m, rad]; None: not stated."""
 
+    def places(self, planned: Mapping[str, Array]) -> Mapping[str, Array]:
+        """Where known parts stand in the world, (4, 4), [m].
+
+        Args:
+            planned: Where the scenario starts them.
+        """
+        return {part: planned[part] if T is None else T for part, T in self.known.items()}
+
 
 def read_camera(path: str | Path) -> CameraFile:
     """What a camera file states.
@@ -63,7 +75,7 @@ def read_camera(path: str | Path) -> CameraFile:
     Raises:
         InputError: Anything that is not as described, naming file and key.
     """
-    top = read_toml(path, "camera file").fields_of(_SCHEMA, (), ("log", "pose", "known", "noise"))
+    top = read_toml(path, "camera file").fields_of(_CAMERA, (), ("log", "pose", "known", "noise"))
     if "pose" in top and "known" in top:
         refuse(top["known"], "the pose of the camera is stated too; state one of the two")
     return CameraFile(
@@ -130,3 +142,92 @@ def _place(node: JsonNode) -> Array | None:
 def _stays(node: JsonNode) -> Array:
     keys = node.fields(("stays_mm", "stays_deg"))
     return np.array([keys["stays_mm"].number(0.0, 100.0) * 1e-3, np.radians(keys["stays_deg"].number(0.0, 90.0))])
+
+
+class TrackedPart(NamedTuple):
+    """A part as a tracker knows it."""
+
+    id: str
+    T_model_part: Array
+    """(4, 4), [m]."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ObjectsFile:
+    """What an objects file states."""
+
+    file: str
+    parts: Mapping[str, TrackedPart]
+    ignored: frozenset[str]
+    """Ids that are no parts."""
+
+    @property
+    def models(self) -> Mapping[str, Array]:
+        """Part -> where its frame lies in the tracker's model, (4, 4), [m]."""
+        return {part: tracked.T_model_part for part, tracked in self.parts.items()}
+
+
+def read_objects(path: str | Path) -> ObjectsFile:
+    """What an objects file states.
+
+    Raises:
+        InputError: Anything that is not as described, naming file and key.
+    """
+    top = read_toml(path, "objects file").fields_of(_OBJECTS, ("objects",), ("ignore",))
+    if not isinstance(top["objects"].value, dict) or not top["objects"].value:
+        top["objects"].fail('parts with ids are needed, such as castle1 = { id = "7" }')
+    parts: dict[str, TrackedPart] = {}
+    owners: dict[str, str] = {}
+    for part, value in top["objects"].value.items():
+        node = top["objects"].child(value, part)
+        tracked = _tracked(node)
+        if tracked.id in owners:
+            refuse(node, f"the id '{tracked.id}' is that of '{owners[tracked.id]}' already; give each part its own")
+        parts[part] = tracked
+        owners[tracked.id] = part
+    ignored = frozenset(_id(node) for node in top["ignore"].items("ignored id")) if "ignore" in top else frozenset()
+    return ObjectsFile(str(path), parts, ignored)
+
+
+def part_tracks(log: Log, objects: ObjectsFile) -> Mapping[str, PoseTrack]:
+    """The tracks of parts, camera from part.
+
+    Raises:
+        InputError: An id of the log is no part, or a part is not in the log.
+    """
+    known = {tracked.id for tracked in objects.parts.values()} | objects.ignored
+    strange = [name for name in log.tracks if name not in known]
+    if strange:
+        file = objects.file
+        which = f"the id {_quoted(strange)}{_of_file(strange[0], log)} is no part; name its part in {file}, or add it"
+        if len(strange) > 1:
+            which = f"the ids {_quoted(strange)} are no parts; name their parts in {file}, or add them"
+        raise InputError(f"{log.file}: {which} to its key `ignore`. Known: {', '.join(sorted(known))}.")
+    tracks: dict[str, PoseTrack] = {}
+    for part, tracked in objects.parts.items():
+        if tracked.id not in log.tracks:
+            sentence = unknown("id", tracked.id, log.tracks).replace("Known", "In the log")
+            raise InputError(f"{objects.file}, {part}: {sentence}")
+        track = log.tracks[tracked.id]
+        tracks[part] = PoseTrack(track.t, track.T @ tracked.T_model_part)
+    return tracks
+
+
+def _quoted(names: list[str]) -> str:
+    more = ", ..." if len(names) > _MOST_IDS else ""
+    return ", ".join(f"'{one_line(name, 60)}'" for name in names[:_MOST_IDS]) + more
+
+
+def _of_file(name: str, log: Log) -> str:
+    return ", the name of the file because it has no column of ids," if name == Path(log.file).stem else ""
+
+
+def _tracked(node: JsonNode) -> TrackedPart:
+    keys = node.fields(("id",), ("frame",))
+    return TrackedPart(_id(keys["id"]), read_any_pose(keys["frame"]) if "frame" in keys else np.eye(4))
+
+
+def _id(node: JsonNode) -> str:
+    """A text, or a whole number as in BOP files."""
+    return str(node.value) if isinstance(node.value, int) and not isinstance(node.value, bool) else node.text()
