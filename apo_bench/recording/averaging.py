@@ -70,28 +70,17 @@ def pooled_mean(mean: Mean, others: Array) -> Mean:
     """
     # The mean of two covariances, weighted by degrees of freedom: that of an inverse Wishart prior of _PRIOR frames.
     n = float(mean.inlier.sum())
-    A = _axes(mean.T)
+    A = np.kron(np.eye(2), mean.T[:3, :3])  # from axes of the part to those of the camera, at the same origin
     scatter = ((n - 1.0) * mean.scatter + _PRIOR * A.T @ others @ A) / (n - 1.0 + _PRIOR)
     return Mean(mean.T, scatter + np.diag(_FRAME_FLOOR**2), mean.inlier, mean.independent)
 
 
 def common_scatter(means: list[Mean]) -> Array:
     """The covariance of one frame over many rests, (6, 6), in the axes of the camera."""
-    total = np.zeros((6, 6))
-    frames = 0.0
-    for mean in means:
-        n = float(mean.inlier.sum()) - 1.0
-        A = _axes(mean.T)
-        total += n * A @ mean.scatter @ A.T
-        frames += n
-    return total / max(frames, 1.0) + np.diag(_FRAME_FLOOR**2)
-
-
-def _axes(T: Array) -> Array:
-    """From axes of the part to those of the camera, at the same origin, (6, 6)."""
-    A = np.zeros((6, 6))
-    A[:3, :3] = A[3:, 3:] = T[:3, :3]
-    return A
+    freedom = [float(mean.inlier.sum()) - 1.0 for mean in means]
+    axes = [np.kron(np.eye(2), mean.T[:3, :3]) for mean in means]
+    scatters = [n * A @ mean.scatter @ A.T for n, A, mean in zip(freedom, axes, means, strict=True)]
+    return np.sum([np.zeros((6, 6)), *scatters], axis=0) / max(sum(freedom), 1.0) + np.diag(_FRAME_FLOOR**2)
 
 
 def _middle(T: Array) -> Array:

@@ -12,15 +12,16 @@ from apo_bench.errors import InputError, unknown
 from apo_bench.geometry import Array
 from apo_bench.observation.models.isotropic import floored, with_shared
 from apo_bench.observation.models.outliers import UNSEEN_DEVIATION, last_seen
-from apo_bench.recording.arranging import Arrangement, CameraPose, arrangement_of, staying
+from apo_bench.recording.arranging import CameraPose, arrangement_of, staying
 from apo_bench.recording.doubts import check_arrangement, check_direction, unclear
 from apo_bench.recording.log import PoseTrack
 from apo_bench.recording.operations import SeenOperation, seen_operation
 from apo_bench.recording.ordering import ContactFit, NoOrder, Stated
 from apo_bench.recording.rests import least_rest_s
 from apo_bench.recording.setup_files import CameraFile
-from apo_bench.recording.stays import Stay, Stays, all_stays
-from apo_bench.scenario import Scenario, layout_at
+from apo_bench.recording.stays import Stay, all_stays
+from apo_bench.scenario.layout import layout_at
+from apo_bench.scenario.scenario import Scenario
 
 _SLOW_S = 0.5
 """Rests that have to be longer are said: hands pause for less."""
@@ -90,18 +91,6 @@ def import_recording(
         slow = f" At this rate of frames a rest is seen from {least:.1f} s on." if least > _SLOW_S else ""
         raise InputError(f"{file}: {error}{slow}") from error
     check_arrangement(arrangement, arrange, stays, models or {}, camera, file)
-    return _imported(tracks, stays, arrangement, camera, scenario)
-
-
-def planned_starts(scenario: Scenario) -> Poses:
-    """Where the scenario starts every part, world, [m]."""
-    return layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start
-
-
-def _imported(
-    tracks: Mapping[str, PoseTrack], stays: Stays, arrangement: Arrangement, camera: CameraFile, scenario: Scenario
-) -> ImportedRecording:
-    assembly = scenario.assembly
     solved, order, start, whence, _ = arrangement
     X = solved.T_world_camera
     operations = tuple(seen_operation(tracks, stays, order.stays, assembly, X, k) for k in range(len(assembly)))
@@ -138,6 +127,11 @@ def _imported(
         stays_stated=camera.stays is not None,
         unclear=unclear(stays, arrangement, operations, covariance, assembly),
     )
+
+
+def planned_starts(scenario: Scenario) -> Poses:
+    """Where the scenario starts every part, world, [m]."""
+    return layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start
 
 
 def _adjustments(operations: Sequence[SeenOperation], assembly: Assembly) -> Array:

@@ -181,7 +181,8 @@ def read_objects(path: str | Path) -> ObjectsFile:
     owners: dict[str, str] = {}
     for part, value in top["objects"].value.items():
         node = top["objects"].child(value, part)
-        tracked = _tracked(node)
+        keys = node.fields(("id",), ("frame",))
+        tracked = TrackedPart(_id(keys["id"]), read_any_pose(keys["frame"]) if "frame" in keys else np.eye(4))
         if tracked.id in owners:
             refuse(node, f"the id '{tracked.id}' is that of '{owners[tracked.id]}' already; give each part its own")
         parts[part] = tracked
@@ -199,33 +200,21 @@ def part_tracks(log: Log, objects: ObjectsFile) -> Mapping[str, PoseTrack]:
     known = {tracked.id for tracked in objects.parts.values()} | objects.ignored
     strange = [name for name in log.tracks if name not in known]
     if strange:
-        file = objects.file
-        which = f"the id {_quoted(strange)}{_of_file(strange[0], log)} is no part; name its part in {file}, or add it"
+        quoted = ", ".join(f"'{one_line(name, 60)}'" for name in strange[:_MOST_IDS])
+        quoted += ", ..." if len(strange) > _MOST_IDS else ""
+        file = ", the name of the file because it has no column of ids," if strange[0] == Path(log.file).stem else ""
+        which = f"the id {quoted}{file} is no part; name its part in {objects.file}, or add it"
         if len(strange) > 1:
-            which = f"the ids {_quoted(strange)} are no parts; name their parts in {file}, or add them"
+            which = f"the ids {quoted} are no parts; name their parts in {objects.file}, or add them"
         raise InputError(f"{log.file}: {which} to its key `ignore`. Known: {', '.join(sorted(known))}.")
     tracks: dict[str, PoseTrack] = {}
     for part, tracked in objects.parts.items():
         if tracked.id not in log.tracks:
             sentence = unknown("id", tracked.id, log.tracks).replace("Known", "In the log")
             raise InputError(f"{objects.file}, {part}: {sentence}")
-        track = log.tracks[tracked.id]
-        tracks[part] = PoseTrack(track.t, track.T @ tracked.T_model_part)
+        t, T = log.tracks[tracked.id]
+        tracks[part] = PoseTrack(t, T @ tracked.T_model_part)
     return tracks
-
-
-def _quoted(names: list[str]) -> str:
-    more = ", ..." if len(names) > _MOST_IDS else ""
-    return ", ".join(f"'{one_line(name, 60)}'" for name in names[:_MOST_IDS]) + more
-
-
-def _of_file(name: str, log: Log) -> str:
-    return ", the name of the file because it has no column of ids," if name == Path(log.file).stem else ""
-
-
-def _tracked(node: JsonNode) -> TrackedPart:
-    keys = node.fields(("id",), ("frame",))
-    return TrackedPart(_id(keys["id"]), read_any_pose(keys["frame"]) if "frame" in keys else np.eye(4))
 
 
 def _id(node: JsonNode) -> str:
