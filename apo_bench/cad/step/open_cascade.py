@@ -7,53 +7,19 @@ import sys
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
+from OCP import Bnd, BRep, BRepAdaptor, BRepBndLib, BRepGProp, BRepMesh, GProp, TopAbs, TopLoc, TopoDS, gp
 
 from apo_bench.cad.solids.raw_solid import SolidPlace
 from apo_bench.cad.step.step_tree import leaves_of, matrix_of, shapes_in
+from apo_bench.cad.step.surfaces import READER_BYTES, READER_S, TRIANGLES_RAD, BrepFace, BrepSolid
 from apo_bench.geometry import Array
 
-READER_BYTES = 2_000_000_000
-READER_S = 20
-TRIANGLES_RAD = 0.2
-"""The angle between neighbours on round walls, the same on walls around one axis."""
 _SAGITTA = 1e-2
 """Distance of triangles from the surface at most, as part of the size of the solid."""
 _MOST_SAMPLES = 600
-
-
-class BrepFace(NamedTuple):
-    """A face of a solid."""
-
-    kind: str
-    """`plane`, `cylinder`, `cone`, `sphere`, `torus`, `free` for what is stored as a spline; `none`: no triangles."""
-    point: Array
-    """Of the plane or the axis, [mm]; of a free one, points on it, (k, 3)."""
-    direction: Array
-    """Normal or axis; of a free one, its normals there, (k, 3)."""
-    radius: float
-    """At the point."""
-    slope: float
-    """By how much the radius grows along the axis."""
-    corners: Array
-    """(c, 3)."""
-    triangles: Any
-    """(t, 3), counter-clockwise seen from outside."""
-
-
-class BrepSolid(NamedTuple):
-    """A solid, or a shell that may be one."""
-
-    name: str
-    faces: tuple[BrepFace, ...]
-    size: float
-    """Volume, [mm^3]."""
-    centroid: Array
-    inertia: Array
-    """About the centroid, [mm^5]."""
-    places: tuple[SolidPlace, ...]
 
 
 def solids_of(path: Path) -> list[BrepSolid]:
@@ -67,8 +33,6 @@ def solids_of(path: Path) -> list[BrepSolid]:
 
 def _solids(name: str, shape: Any, places: tuple[SolidPlace, ...]) -> Iterator[BrepSolid]:
     """The solids in a shape, and its shells that belong to none."""
-    from OCP import TopAbs
-
     every = [*shapes_in(shape, TopAbs.TopAbs_SOLID), *shapes_in(shape, TopAbs.TopAbs_SHELL, TopAbs.TopAbs_SOLID)]
     if not every and any(shapes_in(shape, TopAbs.TopAbs_FACE)):
         every = [shape]
@@ -79,8 +43,6 @@ def _solids(name: str, shape: Any, places: tuple[SolidPlace, ...]) -> Iterator[B
 
 def _mass_properties(shape: Any) -> tuple[float, Array, Array]:
     """Volume, centroid, inertia about it."""
-    from OCP import BRepGProp, GProp
-
     properties = GProp.GProp_GProps()
     BRepGProp.BRepGProp.VolumeProperties_s(shape, properties)
     J = properties.MatrixOfInertia()
@@ -89,8 +51,6 @@ def _mass_properties(shape: Any) -> tuple[float, Array, Array]:
 
 
 def _faces(shape: Any) -> Iterator[BrepFace]:
-    from OCP import Bnd, BRepBndLib, BRepMesh, TopAbs, TopoDS
-
     box = Bnd.Bnd_Box()
     BRepBndLib.BRepBndLib.Add_s(shape, box, False)
     size = float(np.sqrt(box.SquareExtent())) if not box.IsVoid() else 1.0
@@ -100,8 +60,6 @@ def _faces(shape: Any) -> Iterator[BrepFace]:
 
 
 def _face(face: Any) -> BrepFace:
-    from OCP import BRep, TopAbs, TopLoc
-
     location = TopLoc.TopLoc_Location()
     mesh = BRep.BRep_Tool.Triangulation_s(face, location)
     if mesh is None:
@@ -117,8 +75,6 @@ def _face(face: Any) -> BrepFace:
 
 def _surface(face: Any, mesh: Any, triangles: Any) -> tuple[str, Array, Array, float, float]:
     """Its kind and parameters."""
-    from OCP import BRepAdaptor
-
     surface = BRepAdaptor.BRepAdaptor_Surface(face)
     kind = str(surface.GetType()).rsplit("_", 1)[-1].lower()
     if kind in ("plane", "cylinder", "cone"):
@@ -133,8 +89,6 @@ def _surface(face: Any, mesh: Any, triangles: Any) -> tuple[str, Array, Array, f
 
 def _samples(surface: Any, mesh: Any, triangles: Any) -> tuple[Array, Array]:
     """Points on a surface and its normals there: at corners and middles of triangles."""
-    from OCP import gp
-
     nodes = [mesh.UVNode(i) for i in range(1, mesh.NbNodes() + 1)]
     uv = np.array([(p.X(), p.Y()) for p in nodes])
     every = np.concatenate([uv, uv[triangles].mean(axis=1)])

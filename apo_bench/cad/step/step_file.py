@@ -19,7 +19,7 @@ from apo_bench.cad.meshes.mesh_file import (
 )
 from apo_bench.cad.solids.raw_solid import RawSolid, without_copies
 from apo_bench.cad.step.from_brep import raw_of
-from apo_bench.cad.step.open_cascade import READER_BYTES, READER_S, BrepSolid
+from apo_bench.cad.step.surfaces import READER_BYTES, READER_S, BrepSolid
 from apo_bench.errors import InputError
 
 STEP_SUFFIXES = (".step", ".stp")
@@ -65,8 +65,8 @@ def read_step(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
             f"{MOST_CAD_TRIANGLES:,} are the most, so save less of it."
         )
     _check_size(path, solids, own_unit)
-    raws: list[RawSolid] = []
-    left_out: list[str] = []
+    raws = list[RawSolid]()
+    left_out = list[str]()
     for solid in solids:
         try:
             raws.append(raw_of(path, solid))

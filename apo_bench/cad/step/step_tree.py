@@ -7,6 +7,8 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+from OCP import TDF, IFSelect, Quantity, STEPCAFControl, TCollection, TDataStd, TDocStd, TopAbs, TopExp, TopLoc, XCAFDoc
+from OCP import collections as sequences
 
 from apo_bench.cad.solids.raw_solid import Rgb
 from apo_bench.geometry import Array
@@ -38,15 +40,13 @@ def leaves_of(path: Path) -> Iterator[Leaf]:
     Raises:
         ValueError: The file cannot be read.
     """
-    from OCP import IFSelect, STEPCAFControl, TCollection, TDocStd, XCAFDoc, collections
-
     document = TDocStd.TDocStd_Document(TCollection.TCollection_ExtendedString("XCAF"))
     reader = STEPCAFControl.STEPCAFControl_Reader()
     reader.SetNameMode(True)
     reader.SetColorMode(True)
     if reader.ReadFile(str(path)) != IFSelect.IFSelect_RetDone or not reader.Transfer(document):
         raise ValueError("no STEP file")
-    roots = collections.Sequence_TDF_Label()
+    roots = sequences.Sequence_TDF_Label()
     XCAFDoc.XCAFDoc_DocumentTool.ShapeTool_s(document.Main()).GetFreeShapes(roots)
     colors = XCAFDoc.XCAFDoc_DocumentTool.ColorTool_s(document.Main())
     for root in roots:
@@ -59,8 +59,6 @@ def _below(label: Any, T: Array, product: str, name: str, colors: Any) -> Iterat
     Args:
         product, name: Of what it is in, for those that have none.
     """
-    from OCP import TDF, TopLoc, XCAFDoc, collections
-
     part = label
     if XCAFDoc.XCAFDoc_ShapeTool.IsReference_s(label):
         part = TDF.TDF_Label()
@@ -70,7 +68,7 @@ def _below(label: Any, T: Array, product: str, name: str, colors: Any) -> Iterat
     name = _name(label) or own_name or name
     here = T @ matrix_of(XCAFDoc.XCAFDoc_ShapeTool.GetLocation_s(label).Transformation())
     if XCAFDoc.XCAFDoc_ShapeTool.IsAssembly_s(part):
-        inside = collections.Sequence_TDF_Label()
+        inside = sequences.Sequence_TDF_Label()
         XCAFDoc.XCAFDoc_ShapeTool.GetComponents_s(part, inside)
         for each in inside:
             yield from _below(each, here, product, name, colors)
@@ -85,8 +83,6 @@ def _below(label: Any, T: Array, product: str, name: str, colors: Any) -> Iterat
 
 def _name(label: Any) -> str:
     """As a person gave it, or empty."""
-    from OCP import TDataStd
-
     attribute = TDataStd.TDataStd_Name()
     if not label.FindAttribute(TDataStd.TDataStd_Name.GetID_s(), attribute):
         return ""
@@ -102,41 +98,23 @@ def matrix_of(transformation: Any) -> Array:
 
 def _first_color(get: Callable[[Any, Any, Any], bool], owner: Any) -> Rgb | None:
     """The colour of a surface, else that of all of it; of an entry of the tree, or a shape."""
-    from OCP import Quantity, XCAFDoc
-
     color = Quantity.Quantity_Color()
-    return (
-        _rgb(color)
-        if any(get(owner, kind, color) for kind in (XCAFDoc.XCAFDoc_ColorSurf, XCAFDoc.XCAFDoc_ColorGen))
-        else None
-    )
+    if not any(get(owner, kind, color) for kind in (XCAFDoc.XCAFDoc_ColorSurf, XCAFDoc.XCAFDoc_ColorGen)):
+        return None
+    r, g, b = np.clip(color.Values(Quantity.Quantity_TOC_sRGB), 0.0, 1.0).tolist()
+    return r, g, b
 
 
 def _color_of_faces(colors: Any, shape: Any) -> Rgb | None:
     """Of a shape, or what most of its coloured faces have, where it has none itself."""
-    from OCP import TopAbs
-
-    of_shape = _first_color(colors.GetColor, shape)
-    if of_shape is not None:
-        return of_shape
-    counts = Counter(
-        color for face in shapes_in(shape, TopAbs.TopAbs_FACE) if (color := _first_color(colors.GetColor, face))
-    )
-    return counts.most_common(1)[0][0] if counts else None
-
-
-def _rgb(color: Any) -> Rgb:
-    from OCP import Quantity
-
-    r, g, b = (float(np.clip(x, 0.0, 1.0)) for x in color.Values(Quantity.Quantity_TOC_sRGB))
-    return r, g, b
+    of_faces = (_first_color(colors.GetColor, face) for face in shapes_in(shape, TopAbs.TopAbs_FACE))
+    counts = Counter(color for color in of_faces if color)
+    return _first_color(colors.GetColor, shape) or max(counts, key=lambda color: counts[color], default=None)
 
 
 def shapes_in(shape: Any, kind: Any, outside: Any = None) -> Iterator[Any]:
     """Of one kind, those inside of another kind left out."""
-    from OCP import TopExp
-
-    explorer = TopExp.TopExp_Explorer(shape, kind) if outside is None else TopExp.TopExp_Explorer(shape, kind, outside)
+    explorer = TopExp.TopExp_Explorer(shape, kind, *([] if outside is None else [outside]))
     while explorer.More():
         yield explorer.Current()
         explorer.Next()
