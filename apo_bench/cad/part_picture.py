@@ -17,11 +17,9 @@ _MOST_DRAWN = 30_000
 @default_looks()
 def draw_part(raw: RawSolid, refused: frozenset[str], title: str, path: Path) -> None:
     """Write it as PNG: flat faces blue, round ones orange, red what can make no contact though it has a name."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 6.0), layout="constrained")
-    FigureCanvasAgg(figure)
     figure.suptitle(title)
     for k, (elevation, azimuth) in enumerate(_VIEWS, start=1):
         axes: Any = figure.add_subplot(1, 2, k, projection="3d")
@@ -64,8 +62,5 @@ def _draw(axes: Any, raw: RawSolid, refused: frozenset[str], eye: Array) -> None
 
 
 def _color(region: Region, refused: frozenset[str]) -> str:
-    if not region.name:
-        return "#cfcfcf"
-    if region.name in refused:
-        return "#d98f8f"
-    return "#e0b070" if region.is_round else "#8fb3d9"
+    named = "#d98f8f" if region.name in refused else "#e0b070" if region.is_round else "#8fb3d9"
+    return named if region.name else "#cfcfcf"

@@ -7,8 +7,8 @@ from typing import final
 
 import numpy as np
 
+from apo_bench.cad.import_report import named_places, write_places
 from apo_bench.cad.importing import import_part, raw_solids
-from apo_bench.cad.poses_file import named_places, write_places
 from apo_bench.cad.solids.naming import free_name, part_name
 from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, Region, SolidPlace
 from apo_bench.errors import InputError

@@ -60,8 +60,7 @@ def circle_through(points: Array, axis: Array) -> Round | None:
     solution, _, rank, _ = np.linalg.lstsq(A, (u * u + v * v) / size**2, rcond=1e-9)
     if rank < 3 or not np.isfinite(solution).all():
         return None
-    a = solution[0] / 2.0
-    b = solution[1] / 2.0
+    a, b = solution[:2] / 2.0
     radius = float(np.sqrt(max(solution[2] + a * a + b * b, 0.0)))
     return Round(middle + size * (a * x + b * y), axis, size * radius, 0.0)
 
@@ -89,9 +88,7 @@ def refined(start: Round, points: Array, cone: bool) -> Round | None:
         return Round(at + size * (p[2] * x + p[3] * y), axis, size * p[4], p[5] if cone else 0.0)
 
     def off(p: Array) -> Array:
-        each = moved(p)
-        h, d, _ = each.polar(points)
-        return np.asarray((d - each.radius - each.slope * h) / size / np.hypot(1.0, each.slope))
+        return np.asarray(moved(p).off(points) / size)
 
     first = [0.0, 0.0, 0.0, 0.0, radius / size, *([slope] if cone else [])]
     if len(points) < len(first):

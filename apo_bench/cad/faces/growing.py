@@ -50,7 +50,10 @@ def _add_from_edges(mesh: Mesh, facets: Facets, group: Any, inside: Any, walls: 
     """Look for round surfaces in part of a smooth surface, the longest edges first; returns what work is left."""
     taken = np.zeros(len(facets.areas), dtype=bool)
     rows = np.flatnonzero(inside)
-    around = _edges_of_pieces(facets, rows)
+    around: dict[int, list[int]] = {}  # the smooth edges of each flat piece
+    for row, pieces in zip(rows.tolist(), facets.smooth[rows].tolist(), strict=True):
+        for piece in pieces:
+            around.setdefault(piece, []).append(row)
     ends = mesh.corners[facets.along[rows]]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     failed = 0
@@ -78,15 +81,6 @@ def _add_from_edges(mesh: Mesh, facets: Facets, group: Any, inside: Any, walls: 
             walls.append(best)
             taken[best.members] = True
     return work
-
-
-def _edges_of_pieces(facets: Facets, rows: Any) -> dict[int, list[int]]:
-    """The smooth edges of each flat piece."""
-    edges: dict[int, list[int]] = {}
-    for row in rows.tolist():
-        for piece in facets.smooth[row].tolist():
-            edges.setdefault(piece, []).append(row)
-    return edges
 
 
 def _whole_starts(mesh: Mesh, facets: Facets, group: Any, inside: Any) -> Iterator[tuple[Round | None, bool]]:

@@ -43,17 +43,17 @@ def regions_of(mesh: Mesh) -> tuple[tuple[Region, ...], Any]:
     """The faces of a closed mesh in an order that its triangles give, and the flat piece of each triangle."""
     facets = facets_of(mesh)
     walls = _without_bands(mesh, facets, walls_of(mesh, facets))
-    regions = []
-    for wall in walls:
-        triangles = np.flatnonzero(np.isin(facets.of, wall.members))
-        regions.append(round_region(mesh, triangles, wall.surface, wall.hole, _turn(facets, wall)))
+    triangles = [np.flatnonzero(np.isin(facets.of, wall.members)) for wall in walls]
+    regions = [
+        round_region(mesh, mine, wall.surface, wall.hole, _turn(facets, wall))
+        for wall, mine in zip(walls, triangles, strict=True)
+    ]
     left = _wall_of_pieces(facets, walls) < 0
     thin = facets.areas < (FLAT * mesh.extent) ** 2
     free = _free(facets, left) | (thin & left)
-    for f in np.flatnonzero(left & ~free):
-        regions.append(fitted_plane(mesh, np.flatnonzero(facets.of == f)))
-    for group in smooth_groups(facets, np.flatnonzero(free)):
-        regions.append(Region("other", np.flatnonzero(np.isin(facets.of, group))))
+    regions += [fitted_plane(mesh, np.flatnonzero(facets.of == f)) for f in np.flatnonzero(left & ~free)]
+    groups = smooth_groups(facets, np.flatnonzero(free))
+    regions += [Region("other", np.flatnonzero(np.isin(facets.of, group))) for group in groups]
     return tuple(sorted(regions, key=lambda region: int(region.triangles[0]))), facets.of
 
 

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.cad.pieces.corners import SAME_CORNER_MM, corners_of, mesh_of
+from apo_bench.cad.pieces.corners import corners_of, mesh_of
 from apo_bench.cad.solids.raw_solid import Region
 from apo_bench.geometry import Array
 
@@ -48,7 +48,7 @@ def convex_parts(solid: Any, size: float, flats: Array) -> Iterator[CutPart]:
     volume = solid.volume()
     for part in _cut(CutPart(solid, np.zeros((0, 4))), size, flats, True, cuts, volume):
         planes = _reflex_planes(part.body, size)
-        if not len(planes) or (part.body.num_tri() > _FINE_TRIANGLES and _is_nearly_convex(part.body)):
+        if not len(planes) or (part.body.num_tri() > _FINE_TRIANGLES and _spare(part) < 1e-3 * part.body.volume()):
             yield part
         elif len(planes) <= _MOST_FREE_PLANES:
             yield from _cut(part, size, flats, False, cuts, volume)
@@ -113,10 +113,6 @@ def _planes_to_cut(body: Any, size: float, flats: Array, only_flats: bool) -> li
     return planes
 
 
-def _is_nearly_convex(body: Any) -> bool:
-    return bool(body.hull().volume() < 1.001 * body.volume())
-
-
 def _spare(part: CutPart) -> float:
     """What the hull of a part fills beyond the part."""
     return float(part.body.hull().volume() - part.body.volume())
@@ -154,8 +150,9 @@ def _best_halves(part: CutPart) -> list[CutPart]:
 def at_shoulders(parts: Iterator[CutPart], shafts: Sequence[Region], size: float) -> Iterator[CutPart]:
     """Parts cut where one round wall goes over into another one: a cylinder and its chamfer are two pieces."""
     for part in parts:
+        # So many corners of a part are on the wall of a shaft that it is one.
         corners = corners_of(part.body)
-        mine = [shaft for shaft in shafts if _touches(corners, shaft)]
+        mine = [shaft for shaft in shafts if shaft.is_on_wall(corners, 1e-3).sum() >= 6]
         slices = [part]
         if len(mine) > 1:
             for n, d in ((s.direction, float(s.point @ s.direction) + end) for s in mine for end in s.span):
@@ -168,13 +165,6 @@ def _across(part: CutPart, n: Array, d: float, hair: float) -> Sequence[CutPart]
     height = corners_of(part.body) @ n - d
     is_beside = height.min() > -10.0 * hair or height.max() < 10.0 * hair
     return (part,) if is_beside else part.halves(n, d, hair)
-
-
-def _touches(corners: Array, shaft: Region) -> bool:
-    """Whether so many corners of a part are on the wall of a shaft that it is one."""
-    height, distance, _ = shaft.polar(corners)
-    within = (height > shaft.span[0] - SAME_CORNER_MM) & (height < shaft.span[1] + SAME_CORNER_MM)
-    return int((within & (np.abs(distance - shaft.radius_at(height)) < 1e-3)).sum()) >= 6
 
 
 def settled(corners: Array, planes: Array, size: float) -> Array:

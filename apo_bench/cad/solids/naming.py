@@ -2,6 +2,7 @@
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain, count
 
 import numpy as np
 
@@ -64,12 +65,7 @@ def part_name(text: str) -> str:
 
 def free_name(name: str, used: Container[str]) -> str:
     """The name, or with a number behind it that makes it one that nothing else has."""
-    free = name
-    n = 2
-    while free in used:
-        free = f"{name}_{n}"
-        n = n + 1
-    return free
+    return next(free for free in chain([name], (f"{name}_{n}" for n in count(2))) if free not in used)
 
 
 def _plain(name: str) -> str:
@@ -83,11 +79,8 @@ def _stem(region: Region) -> str:
         if abs(region.direction[axis]) < 1.0 - 1e-9:
             return "flat"
         return ("p" if region.direction[axis] > 0.0 else "n") + "xyz"[axis]
-    if not region.is_whole:
-        return ""
-    if region.kind == "cone":
-        return "cone"
-    return "hole" if region.hole else "shaft"
+    whole = "cone" if region.kind == "cone" else "hole" if region.hole else "shaft"
+    return whole if region.is_whole else ""
 
 
 def _order(mesh: Mesh, region: Region) -> tuple[float, ...]:
