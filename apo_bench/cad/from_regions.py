@@ -114,8 +114,11 @@ def solid_moments(raw: RawSolid, cut: Cut) -> Moments:
     Where pieces stand for free shapes, of the pieces; where there are other curved faces, as the file has it. It is not
     asked of flat and round solids: a kernel integrates faces that are trimmed badly up to a hundredth wrong.
     """
+    import manifold3d
+
     if cut.hulls:
-        moments = _mesh_moments(_union(cut))
+        pieces = [manifold3d.Manifold.hull_points(1e3 * piece.corners) for piece in cut.pieces]
+        moments = _mesh_moments(mesh_of(manifold3d.Manifold.batch_boolean(pieces, manifold3d.OpType.Add)))
     elif raw.moments is not None and not all(r.kind == "plane" or r.square for r in raw.regions):
         moments = raw.moments
     else:
@@ -124,14 +127,6 @@ def solid_moments(raw: RawSolid, cut: Cut) -> Moments:
             if region.square:
                 moments = moments.plus(_behind_strips(raw, region))
     return moments.in_metres
-
-
-def _union(cut: Cut) -> Mesh:
-    """The pieces as one mesh, [mm]."""
-    import manifold3d
-
-    pieces = [manifold3d.Manifold.hull_points(1e3 * piece.corners) for piece in cut.pieces]
-    return mesh_of(manifold3d.Manifold.batch_boolean(pieces, manifold3d.OpType.Add))
 
 
 def _mesh_moments(mesh: Mesh) -> Moments:
@@ -167,8 +162,7 @@ def _behind_strips(raw: RawSolid, region: Region) -> Moments:
     span = reach.sum(axis=1)
     # Behind a strip lies a segment of a circle, r^2 (span - sin span) / 2, times its length along the axis.
     r = region.radius_at(height)
-    chord = np.maximum(2.0 * r * np.sin(span / 2.0), 1e-300)
-    tall = areas / chord / np.sqrt(1.0 + region.slope**2)
+    tall = areas / np.maximum(2.0 * r * np.sin(span / 2.0), 1e-300) / np.sqrt(1.0 + region.slope**2)
     sizes = (-1.0 if region.hole else 1.0) * tall * r**2 / 2.0 * (span - np.sin(span))
     # The centroid of a thin segment of height h is 0.4 h from its chord c. It is put at 0.6 h: so x x^T about the axis
     # has the spread across the strip, too, as 2 r 0.2 h = c^2 / 20 with c^2 = 8 r h. On a whole turn x adds up to 0.

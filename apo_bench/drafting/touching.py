@@ -157,6 +157,5 @@ def _off(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> float:
     each = _facing(solids, poses, contact)
     if each is None:
         return np.inf
-    assembly = Assembly(solids, (), frozenset())
-    is_on_rim = contact_kind(*map(assembly.face_of, contact)) == "cone on rim"
+    is_on_rim = contact_kind(*map(Assembly(solids, (), frozenset()).face_of, contact)) == "cone on rim"
     return max(abs(each.gap_m) / _CLOSED_M, 0.0 if is_on_rim else each.angle_rad / _CLOSED_RAD)

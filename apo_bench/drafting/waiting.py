@@ -124,11 +124,12 @@ def _with_room(
         # the box that is nearest to its middle is.
         low, high = boxes[part]
         half = (high - low) / 2
+        # Two boxes, each from one corner to the other, are apart if they are so along one axis.
         middle = next(
             (
                 at
                 for at in _grid()
-                if all(_are_apart(at - half, at + half, *other, room) for other in taken)
+                if all(((at - half > b + room) | (a > at + half + room)).any() for a, b in taken)
                 and all(np.linalg.norm(np.clip(c, at - half, at + half) - c) > r + room for c, r in kept_free)
             ),
             None,
@@ -148,11 +149,6 @@ def _grid() -> Array:
     places = places[(far > _NEAREST_M) & (far < _FARTHEST_M)]
     cost = np.hypot(places[:, 0] - _LIKED_M[0], np.abs(places[:, 1]) - _LIKED_M[1])
     return np.asarray(places[np.lexsort((places[:, 1], np.round(cost, 6)))])
-
-
-def _are_apart(a: Array, b: Array, c: Array, d: Array, room: float) -> bool:
-    """Whether two boxes, each from one corner to the other, have room between them."""
-    return bool(((a > d + room) | (c > b + room)).any())
 
 
 def _box(solid: Solid, R: Array) -> Array:

@@ -87,8 +87,7 @@ def _middle(T: Array) -> Array:
     """The pose of a frame that is near to most: medians of positions, and of turns from that frame."""
     # Of the 25 frames nearest to the middle, the one from which the median turn to the others is the least.
     place = np.median(T[:, :3, 3], axis=0)
-    off = np.linalg.norm(T[:, :3, 3] - place, axis=1)
-    few = T[np.argsort(off)[: min(len(T), 25)]]
+    few = T[np.argsort(np.linalg.norm(T[:, :3, 3] - place, axis=1))[: min(len(T), 25)]]
     turns = np.linalg.norm(pose.log(pose.inverse(few)[:, None] @ few[None])[..., 3:], axis=-1)
     middle = np.array(few[int(np.argmin(np.median(turns, axis=1)))])
     middle[:3, 3] = place
@@ -98,8 +97,7 @@ def _middle(T: Array) -> Array:
 def _near(xi: Array) -> NDArray[np.bool_]:
     """Which frames are no outliers: at least half of them, since few frames say little of their spread."""
     off = np.abs(xi - np.median(xi, axis=0))
-    deviation = np.maximum(_MAD * np.median(off, axis=0), _FRAME_FLOOR)
-    worst = (off / deviation).max(axis=1)
+    worst = (off / np.maximum(_MAD * np.median(off, axis=0), _FRAME_FLOOR)).max(axis=1)
     return np.asarray(worst <= max(_FAR, float(np.median(worst))))
 
 

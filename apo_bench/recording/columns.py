@@ -1,11 +1,11 @@
 """Columns of numbers become poses: positions, quaternions, rotation vectors, Euler angles, matrices."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from apo_bench.errors import InputError, one_line, unknown
+from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from apo_bench.recording.setup_files import ANGLE_UNITS, LENGTH_UNITS, TIME_UNITS, Conventions
 
@@ -54,24 +54,6 @@ def column(name: str) -> LogColumn | None:
         unit = ""
     meaning = _SAME.get(stem, stem)
     return LogColumn(meaning, unit) if meaning in _KNOWN else None
-
-
-def check_renamed(names: Sequence[str], renamed: Mapping[str, str], known: Callable[[str], bool], file: str) -> None:
-    """Refuse names that the camera file gives to columns that are not there, or that nothing is called.
-
-    Args:
-        names: Of the columns of the file.
-        known: Whether a name means something.
-    """
-    there = {name.strip().lower() for name in names}
-    for theirs, ours in renamed.items():
-        if theirs not in there:
-            raise InputError(f"{file}: the camera file, log.columns, {ours}: {unknown('column', theirs, there)}")
-        if not known(ours):
-            raise InputError(
-                f"{file}: the camera file, log.columns: '{one_line(ours, 40)}' means nothing here; allowed are names "
-                "of columns such as id, t_s, x_mm, qw."
-            )
 
 
 def row_times(cells: Mapping[str, Array], units: Mapping[str, str], how: Conventions, file: str) -> Array:

@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.errors import InputError, one_line
+from apo_bench.errors import InputError, one_line, unknown
 from apo_bench.geometry import Array, pose
 from apo_bench.io.reading import opened
 from apo_bench.io.strict_csv import check_separator
-from apo_bench.recording.columns import LogColumn, check_length, check_renamed, column, poses, row_times
+from apo_bench.recording.columns import LogColumn, check_length, column, poses, row_times
 from apo_bench.recording.log import LARGEST_LOG_BYTES, MOST_POSES, LogRows
 from apo_bench.recording.setup_files import Conventions
 
@@ -99,7 +99,15 @@ def read_numbers(path: Path, meaning: Callable[[str], LogColumn | None], renamed
         raise InputError(f"{path}: the file is empty; its first line names the columns, such as t_s,id,x_mm,y_mm,z_mm.")
     place = f"{path}, line {first}"
     check_separator(place, names)
-    check_renamed(names, renamed, lambda name: meaning(name) is not None, str(path))
+    there = {name.strip().lower() for name in names}
+    for theirs, ours in renamed.items():
+        if theirs not in there:
+            raise InputError(f"{path}: the camera file, log.columns, {ours}: {unknown('column', theirs, there)}")
+        if meaning(ours) is None:
+            raise InputError(
+                f"{path}: the camera file, log.columns: '{one_line(ours, 40)}' means nothing here; allowed are names "
+                "of columns such as id, t_s, x_mm, qw."
+            )
     known = [meaning(renamed.get(name.strip().lower(), name)) for name in names]
     columns = {i: each for i, each in enumerate(known) if each is not None}
     for name, count in Counter(each.meaning for each in columns.values()).items():

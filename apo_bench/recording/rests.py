@@ -77,8 +77,10 @@ def rests_of(track: PoseTrack) -> tuple[RestSpan, ...]:
         a, b = _trimmed(T, *span, noise)
         if b - a + 1 >= _FEWEST and t[b] - t[a] >= 0.5 * LEAST_REST_S:
             spans += _split(T, a, b, noise)
-    merged = _merged(T, spans, noise, half_window)
-    spans = [(stride * a, stride * b) for a, b in merged if t[b] - t[a] >= 0.5 * LEAST_REST_S]
+    # Neighbouring stretches of one pose become one, unless the part went away and came back.
+    groups = grouped(spans, lambda group, span: _one_rest(T, (group[0][0], group[-1][1]), span, noise, half_window))
+    ends = [(group[0][0], group[-1][1]) for group in groups]
+    spans = [(stride * a, stride * b) for a, b in ends if t[b] - t[a] >= 0.5 * LEAST_REST_S]
     means = [average(track.T[a : b + 1]) for a, b in spans]
     common = common_scatter(means)
     return tuple(
@@ -138,8 +140,7 @@ def _still_spans(T: Array, noise: Array, m: int) -> list[_Span]:
 def _trimmed(T: Array, a: int, b: int, noise: Array) -> tuple[int, int]:
     """Without frames at the ends that still move: three in a row of them belong to the rest."""
     quarter = (b - a + 1) // 4
-    core = average(T[a + quarter : b + 1 - quarter])
-    off = pose.log(pose.inverse(core.T) @ T[a : b + 1])
+    off = pose.log(pose.inverse(average(T[a + quarter : b + 1 - quarter]).T) @ T[a : b + 1])
     near = ((off / noise) ** 2).sum(axis=1) < _EDGE
     good = np.flatnonzero(np.convolve(near, np.ones(3), "valid") == 3)
     return (a + int(good[0]), a + int(good[-1]) + 2) if len(good) else (a + quarter, b - quarter)
@@ -150,8 +151,7 @@ def _split(T: Array, a: int, b: int, noise: Array) -> list[_Span]:
     n = b - a + 1
     if n < 2 * _FEWEST:
         return [(a, b)]
-    mean = average(T[a : b + 1])
-    xi = np.clip(pose.log(pose.inverse(mean.T) @ T[a : b + 1]) / noise, -4.0, 4.0)
+    xi = np.clip(pose.log(pose.inverse(average(T[a : b + 1]).T) @ T[a : b + 1]) / noise, -4.0, 4.0)
     sums = np.cumsum(xi, axis=0)
     # With the frame before which it is cut after k of n: the squared difference of the two means in units of its
     # variance 1/k + 1/(n - k) is chi-square with 6 degrees of freedom if there is no shift.
@@ -179,12 +179,6 @@ def _alike(xi: Array) -> float:
     wide = float(np.median(np.abs(xi[far:] - xi[:-far])))
     r = 1.0 - min(1.0, (near / max(wide, 1e-12)) ** 2)
     return (1.0 + r) / (1.0 - min(r, 0.99))
-
-
-def _merged(T: Array, spans: list[_Span], noise: Array, m: int) -> list[_Span]:
-    """Neighbouring stretches of one pose become one, unless the part went away and came back."""
-    groups = grouped(spans, lambda group, span: _one_rest(T, (group[0][0], group[-1][1]), span, noise, m))
-    return [(group[0][0], group[-1][1]) for group in groups]
 
 
 def grouped(items: Iterable[_Item], belongs: Callable[[Sequence[_Item], _Item], bool]) -> list[list[_Item]]:

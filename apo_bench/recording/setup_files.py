@@ -1,7 +1,8 @@
 """CAMERA.toml and OBJECTS.toml: how a log is written, where its camera stands, and which of its ids is which part."""
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, final
@@ -88,11 +89,11 @@ def read_camera(path: str | Path) -> CameraFile:
 
 def _conventions(node: JsonNode) -> Conventions:
     readers: Mapping[str, Callable[[JsonNode], Any]] = {
-        "length": _one_of(LENGTH_UNITS),
-        "angle": _one_of(ANGLE_UNITS),
-        "time": _one_of(TIME_UNITS),
-        "quaternion": _one_of(("wxyz", "xyzw")),
-        "mirror": _one_of("xyz"),
+        "length": partial(_one_of, allowed=LENGTH_UNITS),
+        "angle": partial(_one_of, allowed=ANGLE_UNITS),
+        "time": partial(_one_of, allowed=TIME_UNITS),
+        "quaternion": partial(_one_of, allowed=("wxyz", "xyzw")),
+        "mirror": partial(_one_of, allowed=("x", "y", "z")),
         "euler": _euler,
         "rate_hz": lambda rate: rate.number(0.0, 1e6, above=True),
         "scene": JsonNode.integer,
@@ -102,13 +103,10 @@ def _conventions(node: JsonNode) -> Conventions:
     return Conventions(**{key: readers[key](value) for key, value in node.fields((), readers).items()})
 
 
-def _one_of(allowed: Iterable[str]) -> Callable[[JsonNode], str]:
-    def read(node: JsonNode) -> str:
-        if node.text() not in tuple(allowed):
-            node.fail(f"{' or '.join(allowed)} is needed")
-        return node.text()
-
-    return read
+def _one_of(node: JsonNode, allowed: Collection[str]) -> str:
+    if node.text() not in allowed:
+        node.fail(f"{' or '.join(allowed)} is needed")
+    return node.text()
 
 
 def _columns(node: JsonNode) -> Mapping[str, str]:
@@ -126,9 +124,15 @@ def _euler(node: JsonNode) -> str:
 
 
 def _known(node: JsonNode) -> Mapping[str, Array | None]:
+    entries = _entries(node, 'parts that stand still are needed, such as castle1 = "start"')
+    return {part: _place(each) for part, each in entries.items()}
+
+
+def _entries(node: JsonNode, wanted: str) -> Mapping[str, JsonNode]:
+    """The entries of a table, which must not be empty."""
     if not isinstance(node.value, dict) or not node.value:
-        node.fail('parts that stand still are needed, such as castle1 = "start"')
-    return {part: _place(node.child(value, part)) for part, value in node.value.items()}
+        node.fail(wanted)
+    return {key: node.child(value, key) for key, value in node.value.items()}
 
 
 def _place(node: JsonNode) -> Array | None:
@@ -175,12 +179,9 @@ def read_objects(path: str | Path) -> ObjectsFile:
         InputError: Anything that is not as described, naming file and key.
     """
     top = read_toml(path, "objects file").fields_of(_OBJECTS, ("objects",), ("ignore",))
-    if not isinstance(top["objects"].value, dict) or not top["objects"].value:
-        top["objects"].fail('parts with ids are needed, such as castle1 = { id = "7" }')
     parts: dict[str, TrackedPart] = {}
     owners: dict[str, str] = {}
-    for part, value in top["objects"].value.items():
-        node = top["objects"].child(value, part)
+    for part, node in _entries(top["objects"], 'parts with ids are needed, such as castle1 = { id = "7" }').items():
         keys = node.fields(("id",), ("frame",))
         tracked = TrackedPart(_id(keys["id"]), read_any_pose(keys["frame"]) if "frame" in keys else np.eye(4))
         if tracked.id in owners:

@@ -65,10 +65,15 @@ def circle_through(points: Array, axis: Array) -> Round | None:
     return Round(middle + size * (a * x + b * y), axis, size * radius, 0.0)
 
 
-def refined(start: Round, points: Array, cone: bool) -> Round | None:
-    """The nearest to points in the sense of least squares: distances square to the wall, Levenberg-Marquardt."""
+def refined(start: Round | None, points: Array, cone: bool) -> Round | None:
+    """The nearest to points in the sense of least squares: distances square to the wall, Levenberg-Marquardt.
+
+    None: there is no start, there are too few points, or nothing fits.
+    """
     from scipy.optimize import least_squares
 
+    if start is None:
+        return None
     points = points[:: -(-len(points) // _MOST_POINTS)]
     middle = points.mean(axis=0)
     height, distance, _ = start.polar(points)
@@ -113,8 +118,7 @@ def on_it(mesh: Mesh, facets: Facets, among: Any, wall: Round, tolerance: float)
     starts = np.cumsum([0, *counts[:-1]])
     rows = np.repeat(first - starts, counts) + np.arange(counts.sum())
     owner = np.repeat(np.arange(len(among)), counts)
-    points = mesh.corners[facets.corner[rows]]
-    height, distance, out = wall.polar(points)
+    height, distance, out = wall.polar(mesh.corners[facets.corner[rows]])
     _, _, outward = wall.polar(facets.centers[among])
     facing = (facets.normals[among] * wall.normals(outward)).sum(axis=1)
     # The angle of each corner about the axis from the middle of its piece; a corner on the axis has none.
@@ -179,8 +183,7 @@ def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: f
     if slope:
         radii = [0.0 if r < ON_WALL * mesh.extent else r for r in radii]
     # How far corners of the border are from the nearer end: of a square wall all of them are on one of the two.
-    on_border = np.isin(every, border_of(mesh, triangles))
-    ends = np.minimum(height - low, high - height)[on_border]
+    ends = np.minimum(height - low, high - height)[np.isin(every, border_of(mesh, triangles))]
     off = (distance - radii[0] - slope * (height - low)) / np.hypot(1.0, slope)
     on = off > -ON_WALL * mesh.extent
     return Region(

@@ -74,8 +74,7 @@ def _free(facets: Facets, left: Any) -> Any:
     owner, other = np.concatenate([pairs, pairs[:, ::-1]]).T
     order = np.lexsort((facets.areas[other], owner))
     pieces, first, count = np.unique(owner[order], return_index=True, return_counts=True)
-    beside = facets.areas[other[order]]
-    free[pieces] = facets.areas[pieces] < _LARGER * beside[first + 3 * count // 4]
+    free[pieces] = facets.areas[pieces] < _LARGER * facets.areas[other[order]][first + 3 * count // 4]
     return free
 
 
@@ -138,7 +137,6 @@ def _turn(facets: Facets, wall: FoundWall) -> float:
     x, y = square_to(wall.surface.axis)
     _, _, out = wall.surface.polar(facets.centers[wall.members])
     middle = np.sort(np.arctan2(out @ y, out @ x))
-    gaps = np.diff(np.append(middle, middle[0] + WHOLE_TURN))
-    widest = float(gaps.max())
+    widest = float(np.diff(middle, append=middle[0] + WHOLE_TURN).max())
     strip = float(wall.spans.max())
     return WHOLE_TURN if widest < _GAP * strip else WHOLE_TURN - widest + strip

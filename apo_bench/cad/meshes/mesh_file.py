@@ -69,15 +69,15 @@ def read_meshes(path: Path, unit: str | None = None) -> tuple[CadFile, list[tupl
         else (None, [(path.stem, _by_trimesh(path, raw, suffix[1:]))])
     )
     count = sum(len(mesh.triangles) for _, mesh in meshes)
-    if not count:
-        raise InputError(f"{path}: the file holds no triangles; save the part as a mesh.")
-    if count > MOST_CAD_TRIANGLES:
-        raise InputError(
-            f"{path}: the file has {count:,} triangles; {MOST_CAD_TRIANGLES:,} are the most, so save it with a coarser "
-            "one."
-        )
-    if not all(np.isfinite(mesh.corners).all() for _, mesh in meshes):
-        raise InputError(f"{path}: a corner is no finite number; save the part again.")
+    is_finite = all(np.isfinite(mesh.corners).all() for _, mesh in meshes)
+    most = f"{MOST_CAD_TRIANGLES:,} are the most, so save it with a coarser one"
+    for is_wrong, sentence in (
+        (count == 0, "the file holds no triangles; save the part as a mesh"),
+        (count > MOST_CAD_TRIANGLES, f"the file has {count:,} triangles; {most}"),
+        (not is_finite, "a corner is no finite number; save the part again"),
+    ):
+        if is_wrong:
+            raise InputError(f"{path}: {sentence}.")
     size = np.ptp(np.concatenate([mesh.corners[mesh.triangles.ravel()] for _, mesh in meshes]), axis=0).max()
     file = _with_unit(path, unit, stated, float(size))
     scale = _UNITS_MM[file.unit]

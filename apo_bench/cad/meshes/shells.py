@@ -38,16 +38,16 @@ def closed_solids(path: Path, name: str, mesh: Mesh) -> Iterator[RawSolid]:
 def _joined(mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
     """With corners in one place as one, and without triangles that are none then."""
     corners, index = np.unique(mesh.corners, axis=0, return_inverse=True)
-    exact = without_slivers(corners, index.ravel()[mesh.triangles])
+    exact = _without_slivers(corners, index.ravel()[mesh.triangles])
     if _is_closed(exact):
         return exact, ()
     grid = max(_SAME_CORNER * mesh.extent, 1e-9)
     rounded, index = np.unique(np.round(mesh.corners / grid), axis=0, return_inverse=True)
-    near = without_slivers(rounded * grid, index.ravel()[mesh.triangles])
+    near = _without_slivers(rounded * grid, index.ravel()[mesh.triangles])
     return (near, (f"corners within {grid:.1g} mm were joined",)) if _is_closed(near) else (exact, ())
 
 
-def without_slivers(corners: Array, triangles: Any) -> Mesh:
+def _without_slivers(corners: Array, triangles: Any) -> Mesh:
     """A mesh without triangles that have one corner twice."""
     return Mesh(corners, triangles[has_three(triangles)])
 
@@ -107,8 +107,7 @@ def _alike(path: Path, mesh: Mesh) -> Mesh:
     # Each triangle twice, as it is (t) and turned (t + count): what looks the same way hangs together. A shell is two
     # groups then, one the other one turned; they are one group if the surface has one side only.
     other = np.where(opposed, k, k + count)
-    turned_other = np.where(opposed, k + count, k)
-    pairs = np.column_stack([np.append(i, i + count), np.append(other, turned_other)])
+    pairs = np.column_stack([np.append(i, i + count), np.append(other, np.where(opposed, k + count, k))])
     _, group = connected(pairs, 2 * count)
     as_is, turned = group.reshape(2, count)
     if (as_is == turned).any():

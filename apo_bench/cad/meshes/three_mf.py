@@ -74,10 +74,9 @@ class _Model:
         if len(self.within) > _DEEPEST_ELEMENT:
             _refuse(self.path, f"its elements are nested deeper than {_DEEPEST_ELEMENT}")
         where = tuple(self.within)
-        if where == _OBJECT or where in _PLACES:
-            self._count += 1
-            if self._count > _MOST_OBJECTS:
-                _refuse(self.path, f"it names more than {_MOST_OBJECTS:,} objects and places")
+        self._count += where == _OBJECT or where in _PLACES
+        if self._count > _MOST_OBJECTS:
+            _refuse(self.path, f"it names more than {_MOST_OBJECTS:,} objects and places")
         if where == (*_OBJECT, "mesh", "vertices", "vertex"):
             self._open.coordinates.extend([float(values[axis]) for axis in "xyz"])
         elif where == (*_OBJECT, "mesh", "triangles", "triangle"):

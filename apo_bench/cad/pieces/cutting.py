@@ -53,8 +53,7 @@ def cut(raw: RawSolid) -> Cut:
         body = body + manifold3d.Manifold.hull_points(raw.mesh.corners[np.unique(raw.mesh.triangles[bore.triangles])])
     if body.num_tri() > _MOST_TRIANGLES:
         body = body.simplify(1e-3 * size)
-    grown = 0.0
-    hulls = 0
+    grown = list[float]()
     flats = np.array([(*r.direction, r.direction @ r.point) for r in raw.regions if r.kind == "plane"]).reshape(-1, 4)
     outlines: list[Array] = []
     shafts = [r for r in raw.regions if r.is_round and not r.hole and r.square]
@@ -68,9 +67,7 @@ def cut(raw: RawSolid) -> Cut:
         true = part.body.volume()
         coarse_volume, fine_volume, kept_volume = (ConvexHull(each).volume for each in (coarse, fine, corners))
         more = coarse_volume - true + kept_volume - fine_volume
-        if abs(more) > _LOSS * true:
-            grown += more
-            hulls += 1
+        grown += [more] if abs(more) > _LOSS * true else []
         outlines.append(corners)
     pieces: list[Hull] = []
     for corners in outlines:
@@ -80,4 +77,4 @@ def cut(raw: RawSolid) -> Cut:
                 f"the part takes more than {MOST_PIECES:,} convex pieces, which are the most; leave out small holes "
                 "and fillets."
             )
-    return Cut(tuple(as_cylinders(pieces, shafts)), grown, hulls)
+    return Cut(tuple(as_cylinders(pieces, shafts)), sum(grown, 0.0), len(grown))

@@ -64,7 +64,9 @@ def _cut(
     least = 1e-7 * volume
     while to_cut:
         whole, along = to_cut.pop()
-        for body in _without_cavities(whole, least):
+        # The bodies that one consists of; the whole, if there is a cavity in one of them: a smaller one is rounding.
+        bodies = whole.decompose()
+        for body in [whole] if any(each.volume() < -least for each in bodies) else bodies:
             if body.volume() < least:
                 continue
             each = CutPart(body, along)
@@ -79,16 +81,6 @@ def _cut(
                     break
             else:
                 yield each
-
-
-def _without_cavities(body: Any, least: float) -> list[Any]:
-    """The bodies that one consists of; the whole, if there is a cavity in one of them.
-
-    Args:
-        least: A cavity that is smaller is rounding.
-    """
-    bodies = body.decompose()
-    return [body] if any(each.volume() < -least for each in bodies) else bodies
 
 
 def _through_cavity(body: Any, least: float) -> Iterator[tuple[Array, float]]:
@@ -107,10 +99,8 @@ def _planes_to_cut(body: Any, size: float, flats: Array, only_flats: bool) -> li
         # The side of a body is rounded by the cuts before; the plane of the face that it lies on is not.
         cosine = flats[:, :3] @ plane[:3]
         same = (np.abs(cosine) > 1.0 - 1e-6) & (np.abs(flats[:, 3] * np.sign(cosine) - plane[3]) < _HAIR * size)
-        if same.any() or not only_flats:
-            n_d = flats[same][0] if same.any() else plane
-            planes.append((n_d[:3], float(n_d[3])))
-    return planes
+        planes += [*flats[same], *([] if only_flats else [plane])][:1]
+    return [(plane[:3], float(plane[3])) for plane in planes]
 
 
 def _spare(part: CutPart) -> float:
@@ -198,8 +188,7 @@ def _reflex_planes(body: Any, size: float) -> Array:
     planes = np.column_stack([n, (n * mesh.corners[mesh.triangles[sides, 0]]).sum(axis=1)])
     # Each plane once, up to rounding; the score of a plane is the length of all reflex edges in it, planes along the
     # frame before others of the same score.
-    keys = np.round(planes * [1e5, 1e5, 1e5, 1e5 / size])
-    _, first = np.unique(keys, axis=0, return_index=True)
+    _, first = np.unique(np.round(planes * [1e5, 1e5, 1e5, 1e5 / size]), axis=0, return_index=True)
     planes = planes[np.sort(first)][:400]
     inside = (np.abs(ends @ planes[:, :3].T - planes[:, 3]) < 2e-6 * size).all(axis=1)
     score = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) @ inside

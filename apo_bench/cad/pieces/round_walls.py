@@ -40,12 +40,10 @@ def bored(corners: Array, bores: Sequence[Region], flats: Array, most: int) -> l
     for a, b in combinations(bores, 2):
         plane = _between(a, b)
         if plane is not None:
-            n, d = plane
-            through = [_meets(part, a) and _meets(part, b) for part in parts]
             parts = [
                 half
-                for part, is_cut in zip(parts, through, strict=True)
-                for half in (part.split_by_plane(n, d) if is_cut else (part,))
+                for part in parts
+                for half in (part.split_by_plane(*plane) if _meets(part, a) and _meets(part, b) else (part,))
             ]
     for bore in bores:
         if len(parts) > most:

@@ -39,7 +39,8 @@ def renamed(raw: RawSolid, names: Mapping[str, str]) -> RawSolid:
     Raises:
         InputError: No face has the name, or two would have one.
     """
-    new_names = {_plain(old): new for old, new in names.items()}
+    signs = {"+": "p", "-": "n"}
+    new_names = {signs.get(old[:1], old[:1]) + old[1:]: new for old, new in names.items()}
     have = list(raw.named())
     for old, new in new_names.items():
         if old not in have:
@@ -68,17 +69,12 @@ def free_name(name: str, used: Container[str]) -> str:
     return next(free for free in chain([name], (f"{name}_{n}" for n in count(2))) if free not in used)
 
 
-def _plain(name: str) -> str:
-    return {"+": "p", "-": "n"}.get(name[:1], name[:1]) + name[1:]
-
-
 def _stem(region: Region) -> str:
     """What a name begins with; empty for what has none."""
     if region.kind == "plane":
         axis = int(np.abs(region.direction).argmax())
-        if abs(region.direction[axis]) < 1.0 - 1e-9:
-            return "flat"
-        return ("p" if region.direction[axis] > 0.0 else "n") + "xyz"[axis]
+        side = ("p" if region.direction[axis] > 0.0 else "n") + "xyz"[axis]
+        return "flat" if abs(region.direction[axis]) < 1.0 - 1e-9 else side
     whole = "cone" if region.kind == "cone" else "hole" if region.hole else "shaft"
     return whole if region.is_whole else ""
 

@@ -41,7 +41,9 @@ def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
     mended = (INSIDE_OUT,) if mesh.volume < 0.0 else ()
     mesh = mesh.flipped() if mended else mesh
     # Faces that touch on one surface are one region; from here on `owner` is the region of each triangle.
-    group = _joined(mesh, owner, surfaces)
+    beside = np.unique(np.sort(owner[mesh.neighbours], axis=1), axis=0)
+    pairs = [(i, k) for i, k in beside.tolist() if i != k and is_same(surfaces[i], surfaces[k], mesh.extent)]
+    _, group = connected(np.array(pairs, dtype=np.int64).reshape(-1, 2), len(surfaces))
     mesh, owner = _in_strips(mesh, group[owner], [surfaces[int(k)] for k in np.unique(group, return_index=True)[1]])
     regions = []
     for g in np.unique(owner):
@@ -83,13 +85,6 @@ def _mesh(faces: tuple[BrepFace, ...]) -> tuple[Mesh, Any]:
     triangles = group[whole.triangles]
     sound = has_three(triangles)
     return Mesh(whole.corners[first], triangles[sound]), owner[sound]
-
-
-def _joined(mesh: Mesh, owner: Any, surfaces: list[Flat | Wall | None]) -> Any:
-    """The group of each face, (f,): of those that touch, on one surface."""
-    beside = np.unique(np.sort(owner[mesh.neighbours], axis=1), axis=0)
-    pairs = [(i, k) for i, k in beside.tolist() if i != k and is_same(surfaces[i], surfaces[k], mesh.extent)]
-    return connected(np.array(pairs, dtype=np.int64).reshape(-1, 2), len(surfaces))[1]
 
 
 def _in_strips(mesh: Mesh, owner: Any, surfaces: list[Flat | Wall | None]) -> tuple[Mesh, Any]:

@@ -79,9 +79,8 @@ def surface_of(face: BrepFace) -> Flat | Wall | None:
         return Wall(Round(face.point, face.direction, face.radius, face.slope), 0.0)
     if face.kind != "free" or len(face.point) < _FEWEST:
         return None
-    points = face.point
-    normals = face.direction
-    return _flat(points, normals) or _wall(points, normals, False) or _wall(points, normals, True)
+    free = (face.point, face.direction)
+    return _flat(*free) or _wall(*free, False) or _wall(*free, True)
 
 
 def _flat(points: Array, normals: Array) -> Flat | None:
@@ -94,8 +93,7 @@ def _flat(points: Array, normals: Array) -> Flat | None:
 
 
 def _wall(points: Array, normals: Array, cone: bool) -> Wall | None:
-    first = circle_through(points, axis_of(normals, cone))
-    wall = None if first is None else refined(first, points, cone)
+    wall = refined(circle_through(points, axis_of(normals, cone)), points, cone)
     if wall is None or wall.radius > _FLATTEST * np.ptp(points, axis=0).max():
         return None
     residual = float(np.abs(wall.off(points)).max())
