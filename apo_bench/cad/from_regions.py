@@ -27,8 +27,8 @@ def contact_faces(raw: RawSolid) -> tuple[list[Face], list[RoundFace], dict[str,
             refused[region.name] = "it is too thin"
         elif region.is_round:
             span, radii = (1e-3 * np.array([region.span, region.radii])).tolist()
-            axis = (1e-3 * region.point, region.direction)
-            rounds.append(RoundFace(region.name, *axis, tuple(span), tuple(radii), region.hole))
+            point = 1e-3 * region.point
+            rounds.append(RoundFace(region.name, point, region.direction, tuple(span), tuple(radii), region.hole))
         elif (face := _flat_face(raw, region)) is not None:
             flats.append(face)
         else:

@@ -207,6 +207,7 @@ def _failed(row: Mapping[str, Any], scenario: Scenario) -> str:
     """What went wrong in a trial, after what to change."""
     k = row["failure_operation"]
     part = scenario.assembly.operations[k - 1].main if k else ""
-    remedy = "{}: ".format(_REMEDIES[row["failure_code"]]) if row["failure_code"] in _REMEDIES else ""
+    remedy = _REMEDIES.get(row["failure_code"])
+    change = f"{remedy.format(k=k, part=part)}: " if remedy else ""
     who = "the human" if row["failure_stage"] == "demonstrate" else "the robot"
-    return f"{remedy.format(k=k, part=part)}{who} with seed {row['seed']}: {row['sentence'].rstrip('.')}"
+    return f"{change}{who} with seed {row['seed']}: {row['sentence'].rstrip('.')}"

@@ -67,7 +67,8 @@ def cut(raw: RawSolid) -> Cut:
         true = part.body.volume()
         coarse_volume, fine_volume, kept_volume = (ConvexHull(each).volume for each in (coarse, fine, corners))
         more = coarse_volume - true + kept_volume - fine_volume
-        grown += [more] if abs(more) > _LOSS * true else []
+        if abs(more) > _LOSS * true:
+            grown.append(more)
         outlines.append(corners)
     pieces: list[Hull] = []
     for corners in outlines:

@@ -137,7 +137,8 @@ def _turn(mesh: Mesh, triangles: Any, wall: Wall) -> float:
     # Gaps between the farthest angle that was reached so far and the next lowest one, around the turn.
     reach = np.maximum.accumulate(high)
     gaps = np.append(low[1:], low[0] + WHOLE_TURN) - np.maximum(reach, reach[-1] - WHOLE_TURN)
-    return WHOLE_TURN - float(gaps.max()) * bool(gaps.max() >= _FULL_RAD)
+    widest = float(gaps.max())
+    return WHOLE_TURN if widest < _FULL_RAD else WHOLE_TURN - widest
 
 
 def _wall_strips(mesh: Mesh, triangles: Any, surface: Round) -> Any:
