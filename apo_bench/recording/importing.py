@@ -20,8 +20,7 @@ from apo_bench.recording.ordering import ContactFit, NoOrder, Stated
 from apo_bench.recording.rests import least_rest_s
 from apo_bench.recording.setup_files import CameraFile
 from apo_bench.recording.stays import Stay, all_stays
-from apo_bench.scenario.layout import layout_at
-from apo_bench.scenario.scenario import Scenario
+from apo_bench.scenario import Scenario, layout_at
 
 _SLOW_S = 0.5
 """Rests that have to be longer are said: hands pause for less."""
