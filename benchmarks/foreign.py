@@ -18,10 +18,9 @@ from typing import NamedTuple
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.assembly import contact_kind
-from apo_bench.drafting.assembly_file import import_assembly
 from apo_bench.drafting.checking import check_file
 from apo_bench.drafting.draft import draft
-from apo_bench.drafting.posed import PosedPart, on_the_table, read_posed
+from apo_bench.drafting.posed import PosedPart, import_assembly, on_the_table, read_posed
 from apo_bench.drafting.writing import scenario_text
 from apo_bench.errors import InputError
 from apo_bench.scenario.file import load_scenario

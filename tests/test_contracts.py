@@ -43,8 +43,8 @@ BREACHES = {
         ("apo_bench.cad.solids.raw_solid", "apo_bench.cad.pieces.corners"),
     ],
     "cad-loose": [
-        ("apo_bench.cad.pieces.cutting", "apo_bench.cad.solid_moments"),
-        ("apo_bench.cad.solids.naming", "apo_bench.cad.poses_file"),
+        ("apo_bench.cad.pieces.cutting", "apo_bench.cad.from_regions"),
+        ("apo_bench.cad.solids.naming", "apo_bench.cad.import_report"),
     ],
     "correction": [
         ("apo_bench.correction.solvers.gauss_newton", "apo_bench.correction.contact"),

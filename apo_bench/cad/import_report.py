@@ -1,6 +1,7 @@
-"""What an import of a CAD file did: in lines for a person, and as one JSON object with the same, in mm."""
+"""What an import of a CAD file did: in lines for a person, as JSON with the same, in mm, and as a file of poses."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -8,9 +9,16 @@ import numpy as np
 
 from apo_bench.cad.importing import Imported
 from apo_bench.cad.meshes.mesh_file import CadFile
+from apo_bench.cad.solids.naming import free_name, part_name
 from apo_bench.cad.solids.raw_solid import RawSolid, Region, SolidPlace
+from apo_bench.geometry import pose
 
-_KIND_WORDS = {"plane": ("flat", "flat"), "cylinder": ("cylinder", "cylinders"), "cone": ("cone", "cones")}
+_KIND_WORDS = {
+    "plane": ("flat", "flat"),
+    "cylinder": ("cylinder", "cylinders"),
+    "cone": ("cone", "cones"),
+    "other": ("other", "other"),
+}
 
 
 def unit_line(file: CadFile) -> str:
@@ -29,22 +37,22 @@ def import_lines(part: Imported) -> Iterator[str]:
         turn = np.degrees(np.arccos(np.clip((np.trace(T[:3, :3]) - 1.0) / 2.0, -1.0, 1.0)))
         if len(raw.places) > 1 or turn or T[:3, 3].any():
             yield f"  place {k} of it in the file: shifted by ({_numbers(T[:3, 3])}) mm, turned by {turn:.4g} degrees"
-    yield f"  faces: {_counts(raw)}"
+    counts: Counter[str] = Counter(region.kind for region in raw.regions)
+    words = (f"{counts[kind]} {each[counts[kind] > 1]}" for kind, each in _KIND_WORDS.items() if counts[kind])
+    yield f"  faces: {', '.join(words)}"
     for name, region in raw.named().items():
-        line = f"    {name}: {_region_words(region)}"
-        if name in part.refused:
-            line += f"; NO CONTACT: {part.refused[name]}"
-        elif name in part.shares:
-            line += f"; {100.0 * part.shares[name]:.3g} % of it can touch, its border is coarser"
-        yield line
-    partly_round = _partly_round(raw)
+        less = (
+            f"; {100.0 * part.shares[name]:.3g} % of it can touch, its border is coarser" if name in part.shares else ""
+        )
+        no_contact = f"; NO CONTACT: {part.refused[name]}" if name in part.refused else less
+        yield f"    {name}: {_region_words(region)}{no_contact}"
+    partly_round, free = _without_contact(raw)
     if partly_round:
-        radii = sorted({f"{max(r.radii):.4g}" for r in partly_round}, key=float)
+        radii = dict.fromkeys(f"{radius:.4g}" for radius in partly_round)
         yield (
             f"  without contact: {len(partly_round)} round walls that do not go all the way round, such as fillets "
-            f"(radius {', '.join(radii[:8])} mm)"
+            f"(radius {', '.join([*radii][:8])} mm)"
         )
-    free = _other_surfaces(raw)
     if free:
         yield f"  without contact: {free} surfaces that are neither flat, nor cylinders, nor cones"
     for name, radius in part.free_mm.items():
@@ -55,31 +63,17 @@ def import_lines(part: Imported) -> Iterator[str]:
         yield f"  volume: {raw.moments.size:.6g} mm^3 in the file, {written:.6g} mm^3 as written"
     else:
         yield f"  volume: {raw.mesh.volume:.6g} mm^3 as tessellated, {written:.6g} mm^3 with round walls as fitted"
-    line = f"  pieces: {len(part.solid.pieces)} convex ones"
-    if part.cut.hulls:
-        line += (
-            f"; {part.cut.hulls} of them stand for hollow or free shapes, which changes what collides by "
-            f"{part.cut.grown:+.3g} mm^3 ({100.0 * part.cut.grown / written:+.2g} %)"
-        )
-    yield line
+    hulls = (
+        f"; {part.cut.hulls} of them stand for hollow or free shapes, which changes what collides by "
+        f"{part.cut.grown:+.3g} mm^3 ({100.0 * part.cut.grown / written:+.2g} %)"
+    )
+    yield f"  pieces: {len(part.solid.pieces)} convex ones{hulls if part.cut.hulls else ''}"
 
 
-def _partly_round(raw: RawSolid) -> list[Region]:
-    return [region for region in raw.regions if region.is_round and not region.name]
-
-
-def _other_surfaces(raw: RawSolid) -> int:
-    return sum(region.kind == "other" for region in raw.regions)
-
-
-def _counts(raw: RawSolid) -> str:
-    words = []
-    for kind, (singular, plural) in _KIND_WORDS.items():
-        count = sum(region.kind == kind for region in raw.regions)
-        if count:
-            words.append(f"{count} {singular if count == 1 else plural}")
-    other = _other_surfaces(raw)
-    return ", ".join([*words, *([f"{other} other"] if other else [])])
+def _without_contact(raw: RawSolid) -> tuple[list[float], int]:
+    """Radii of walls that do not go all the way round, ascending, [mm]; how many other surfaces."""
+    radii = sorted(float(max(region.radii)) for region in raw.regions if region.is_round and not region.name)
+    return radii, sum(region.kind == "other" for region in raw.regions)
 
 
 def _region_words(region: Region) -> str:
@@ -113,19 +107,16 @@ def _part_form(part: Imported) -> dict[str, Any]:
     return {
         "part": part.path.stem,
         "written": str(part.path),
-        "size_mm": _list(np.ptp(raw.mesh.corners, axis=0)),
+        "size_mm": np.ptp(raw.mesh.corners, axis=0).tolist(),
         "triangles": len(raw.mesh.triangles),
         "watertight": True,
         "mended": list(raw.mended),
-        "places": [_place_form(place) for place in raw.places],
+        "places": [{"name": name, "matrix_mm": T.tolist(), "color": color} for name, T, color in raw.places],
         "faces": {
             name: {**_face_form(region), "no_contact": part.refused.get(name), "share": part.shares.get(name, 1.0)}
             for name, region in raw.named().items()
         },
-        "without_contact": {
-            "partly_round_radii_mm": sorted(max(region.radii) for region in _partly_round(raw)),
-            "other_surfaces": _other_surfaces(raw),
-        },
+        "without_contact": dict(zip(("partly_round_radii_mm", "other_surfaces"), _without_contact(raw), strict=True)),
         "free_radius_mm": {
             name: {"free": radius, "of_wall": min(raw.named()[name].radii)} for name, radius in part.free_mm.items()
         },
@@ -139,22 +130,48 @@ def _part_form(part: Imported) -> dict[str, Any]:
     }
 
 
-def _place_form(place: SolidPlace) -> dict[str, Any]:
-    return {"name": place.name, "matrix_mm": [_list(row) for row in place.T], "color": place.color}
-
-
 def _face_form(region: Region) -> dict[str, Any]:
     form: dict[str, Any] = {"kind": region.kind, "residual_um": 1e3 * region.residual}
     if region.kind == "plane":
-        return {**form, "normal": _list(region.direction), "offset_mm": float(region.direction @ region.point)}
+        return {**form, "normal": region.direction.tolist(), "offset_mm": float(region.direction @ region.point)}
     return {
         **form,
         "hole": region.hole,
-        "axis": _list(region.direction),
-        "ends_mm": [_list(end) for end in region.ends],
+        "axis": region.direction.tolist(),
+        "ends_mm": region.ends.tolist(),
         "radii_mm": [float(r) for r in region.radii],
     }
 
 
-def _list(values: Any) -> list[float]:
-    return [float(x) for x in values]
+def named_places(parts: Mapping[str, Iterable[SolidPlace]]) -> list[tuple[str, str, SolidPlace]]:
+    """Part, name and place of each copy: as the file calls it, with a number where that is taken.
+
+    Args:
+        parts: Places of each part file.
+    """
+    used: set[str] = set()
+    copies = []
+    for part, places in parts.items():
+        for place in places:
+            name = free_name(part_name(place.name), used)
+            used.add(name)
+            copies.append((part, name, place))
+    return copies
+
+
+def write_places(places: Iterable[tuple[str, str, SolidPlace]], folder: Path, source: str) -> Path:
+    """Write `poses.toml`, which `scenario new` reads beside the part files."""
+    lines = [f"# where {source} has its parts".replace("\n", " ")]
+    for part, name, place in places:
+        packed = pose.pack(place.T)
+        lines += ["", "[[pose]]", f'part = "{part}"', f'name = "{name}"', f"at_mm = {_list(packed[:3])}"]
+        lines.append(f"quaternion_wxyz = {_list(packed[3:])}")
+        if place.color is not None:
+            lines.append(f"color = {_list(np.round(place.color, 4))}")
+    path = folder / "poses.toml"
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def _list(values: Iterable[float]) -> str:
+    return "[" + ", ".join(f"{round(float(x), 12) + 0.0:.12g}" for x in values) + "]"

@@ -9,12 +9,11 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.cad.contact_faces import contact_faces
 from apo_bench.cad.faces.regions import regions_of
+from apo_bench.cad.from_regions import contact_faces, solid_moments
 from apo_bench.cad.meshes.mesh_file import CadFile, read_meshes
 from apo_bench.cad.meshes.shells import closed_solids
 from apo_bench.cad.pieces.cutting import Cut, cut
-from apo_bench.cad.solid_moments import solid_moments
 from apo_bench.cad.solids.naming import with_names
 from apo_bench.cad.solids.raw_solid import RawSolid, without_copies
 from apo_bench.cad.step.step_file import STEP_SUFFIXES, read_step
@@ -79,54 +78,50 @@ def import_part(raw: RawSolid, name: str, folder: Path, source: str, density: fl
     with time_limit(
         f"{source}: cutting the part into convex pieces", "leave out small holes, fillets and free surfaces"
     ):
-        return _imported(raw, name, folder, source, density)
+        weight = 1e-9 * density * raw.mesh.volume
+        if not LIGHTEST_KG <= weight <= HEAVIEST_KG:
+            raise InputError(
+                f"{source}: the part weighs {1e3 * weight:.3g} g at {density:g} kg/m^3; {1e3 * LIGHTEST_KG:g} g to "
+                f"{HEAVIEST_KG / 1e3:g} t are allowed, so give another --density, or scale the part."
+            )
+        try:
+            pieces = cut(raw)
+        except InputError as error:
+            raise InputError(f"{source}: {error}") from error
+        corners = sum(len(piece.corners) for piece in pieces.pieces)
+        if corners > MOST_CORNERS_IN_ALL:
+            raise InputError(
+                f"{source}: the convex pieces of the part have {corners:,} corners; {MOST_CORNERS_IN_ALL:,} are the "
+                "most, so leave out small holes and fillets."
+            )
+        flats, rounds, refused = contact_faces(raw)
+        if len(flats) + len(rounds) > MOST_FACES:
+            raise InputError(f"{source}: the part has {len(flats) + len(rounds)} faces; {MOST_FACES} are the most.")
+        body = Body(pieces.pieces, tuple(flats), tuple(rounds), solid_moments(raw, pieces))
+        solid = solid_of(name, body)
+        shares: dict[str, float] = {}
+        faces: list[Face | RoundFace] = [*flats, *rounds]
+        for i, face in enumerate(faces):
+            reason = _why_not(solid, face)
+            # A flat face beside a free shape is stated as far as the pieces that stand for the shape hold it.
+            less = supported(face, solid.pieces) if reason and isinstance(face, Face) and pieces.hulls else None
+            if less is not None and less[1] > _LEAST_SHARE and not _why_not(solid, less[0]):
+                flats[i], shares[face.name] = less
+            elif reason:
+                refused[face.name] = reason
+        body = _without(replace(body, flats=tuple(flats)), refused)
+        if not (body.flats or body.rounds):
+            raise InputError(
+                f"{source}: no face of the part is flat or round, so it could touch nothing; draw one that is."
+            )
+        color = {"color": raw.places[0].color} if raw.places[0].color else {}
 
+        def write(body: Body) -> Path:
+            return write_part(name, body, folder, density=density, source=source, licence="as that file", **color)
 
-def _imported(raw: RawSolid, name: str, folder: Path, source: str, density: float) -> Imported:
-    weight = 1e-9 * density * raw.mesh.volume
-    if not LIGHTEST_KG <= weight <= HEAVIEST_KG:
-        raise InputError(
-            f"{source}: the part weighs {1e3 * weight:.3g} g at {density:g} kg/m^3; {1e3 * LIGHTEST_KG:g} g to "
-            f"{HEAVIEST_KG / 1e3:g} t are allowed, so give another --density, or scale the part."
-        )
-    try:
-        pieces = cut(raw)
-    except InputError as error:
-        raise InputError(f"{source}: {error}") from error
-    corners = sum(len(piece.corners) for piece in pieces.pieces)
-    if corners > MOST_CORNERS_IN_ALL:
-        raise InputError(
-            f"{source}: the convex pieces of the part have {corners:,} corners; {MOST_CORNERS_IN_ALL:,} are the most, "
-            "so leave out small holes and fillets."
-        )
-    flats, rounds, refused = contact_faces(raw)
-    if len(flats) + len(rounds) > MOST_FACES:
-        raise InputError(f"{source}: the part has {len(flats) + len(rounds)} faces; {MOST_FACES} are the most.")
-    body = Body(pieces.pieces, tuple(flats), tuple(rounds), solid_moments(raw, pieces))
-    solid = solid_of(name, body)
-    shares: dict[str, float] = {}
-    faces: list[Face | RoundFace] = [*flats, *rounds]
-    for i, face in enumerate(faces):
-        reason = _why_not(solid, face)
-        # A flat face beside a free shape is stated as far as the pieces that stand for the shape hold it.
-        less = supported(face, solid.pieces) if reason and isinstance(face, Face) and pieces.hulls else None
-        if less is not None and less[1] > _LEAST_SHARE and not _why_not(solid, less[0]):
-            flats[i], shares[face.name] = less
-        elif reason:
-            refused[face.name] = reason
-    body = _without(replace(body, flats=tuple(flats)), refused)
-    if not (body.flats or body.rounds):
-        raise InputError(
-            f"{source}: no face of the part is flat or round, so it could touch nothing; draw one that is."
-        )
-    color = {"color": raw.places[0].color} if raw.places[0].color else {}
-
-    def write(body: Body) -> Path:
-        return write_part(name, body, folder, density=density, source=source, licence="as that file", **color)
-
-    path, solid = _as_read(write, body, refused, source)
-    free = {wall.name: 1e3 * _free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
-    return Imported(path, raw, solid, pieces, refused, shares, free)
+        path, solid = _as_read(write, body, refused, source)
+        free = {wall.name: 1e3 * _free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
+        return Imported(path, raw, solid, pieces, refused, shares, free)
 
 
 def _without(body: Body, names: Container[str]) -> Body:
@@ -165,21 +160,18 @@ def _as_read(write: Callable[[Body], Path], body: Body, refused: dict[str, str],
 
 def _why_not(solid: Solid, face: Face | RoundFace) -> str:
     """Why a face is not as the pieces are; empty if it is."""
-    if isinstance(face, Face) and not _is_one_area(face):
-        return "its outline crosses itself"
+    from shapely import Polygon
+
+    if isinstance(face, Face):
+        across = np.argsort(np.abs(face.normal))[:2]
+        if not Polygon(face.outline[:, across], [hole[:, across] for hole in face.holes]).is_valid:
+            return "its outline crosses itself"
     flat, wall = ({face.name: face}, {}) if isinstance(face, Face) else ({}, {face.name: face})
     try:
         check_faces(replace(solid, faces=flat, rounds=wall), Path("part"))
     except InputError as error:
         return str(error).split(": ", 1)[-1].split("; ")[0]
     return ""
-
-
-def _is_one_area(face: Face) -> bool:
-    from shapely import Polygon
-
-    across = np.argsort(np.abs(face.normal))[:2]
-    return bool(Polygon(face.outline[:, across], [hole[:, across] for hole in face.holes]).is_valid)
 
 
 def _free_radius(solid: Solid, wall: RoundFace) -> float:

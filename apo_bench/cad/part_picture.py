@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.solids.raw_solid import RawSolid, Region
+from apo_bench.cad.solids.raw_solid import RawSolid
 from apo_bench.geometry import Array
 from apo_bench.io.figures import default_looks
 
@@ -17,22 +17,16 @@ _MOST_DRAWN = 30_000
 @default_looks()
 def draw_part(raw: RawSolid, refused: frozenset[str], title: str, path: Path) -> None:
     """Write it as PNG: flat faces blue, round ones orange, red what can make no contact though it has a name."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(12.0, 6.0), layout="constrained")
-    FigureCanvasAgg(figure)
     figure.suptitle(title)
     for k, (elevation, azimuth) in enumerate(_VIEWS, start=1):
         axes: Any = figure.add_subplot(1, 2, k, projection="3d")
         axes.view_init(elevation, azimuth)
-        _draw(axes, raw, refused, _to_eye(elevation, azimuth))
+        e, a = np.radians([elevation, azimuth])
+        _draw(axes, raw, refused, np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]))
     figure.savefig(path, dpi=100)
-
-
-def _to_eye(elevation: float, azimuth: float) -> Array:
-    e, a = np.radians([elevation, azimuth])
-    return np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
 
 
 def _draw(axes: Any, raw: RawSolid, refused: frozenset[str], eye: Array) -> None:
@@ -44,10 +38,11 @@ def _draw(axes: Any, raw: RawSolid, refused: frozenset[str], eye: Array) -> None
         seen = region.triangles[normals[region.triangles] @ eye > 0.0]
         if not len(seen):
             continue
+        color = "#d98f8f" if region.name in refused else "#e0b070" if region.is_round else "#8fb3d9"
         axes.plot_trisurf(
             *mesh.corners.T,
             triangles=mesh.triangles[seen[:: -(-len(seen) // _MOST_DRAWN)]],
-            color=_color(region, refused),
+            color=color if region.name else "#cfcfcf",
             shade=True,
             linewidth=0.0,
             antialiased=False,
@@ -56,16 +51,7 @@ def _draw(axes: Any, raw: RawSolid, refused: frozenset[str], eye: Array) -> None
             at = mesh.corners[mesh.triangles[seen[int(doubled[seen].argmax())]]].mean(axis=0) + 0.02 * mesh.extent * eye
             box = {"facecolor": "white", "alpha": 0.6, "edgecolor": "none", "pad": 1.0}
             axes.text(*at, region.name, ha="center", fontsize=9, zorder=1000, bbox=box)
-    middle = (mesh.corners.min(axis=0) + mesh.corners.max(axis=0)) / 2.0
-    for name, m in zip("xyz", middle, strict=True):
+    for name, m in zip("xyz", (mesh.corners.min(axis=0) + mesh.corners.max(axis=0)) / 2.0, strict=True):
         getattr(axes, f"set_{name}lim")(m - mesh.extent / 2.0, m + mesh.extent / 2.0)
         getattr(axes, f"set_{name}label")(f"{name} [mm]")
     axes.set_box_aspect((1.0, 1.0, 1.0))
-
-
-def _color(region: Region, refused: frozenset[str]) -> str:
-    if not region.name:
-        return "#cfcfcf"
-    if region.name in refused:
-        return "#d98f8f"
-    return "#e0b070" if region.is_round else "#8fb3d9"

@@ -35,9 +35,8 @@ def part_import(
     as_json: AsJson = False,
 ) -> None:
     """Make part files from a CAD file: find its faces, cut it into convex pieces, and say what was done."""
-    from apo_bench.cad.import_report import report_form, unit_line
+    from apo_bench.cad.import_report import named_places, report_form, unit_line, write_places
     from apo_bench.cad.importing import raw_solids
-    from apo_bench.cad.poses_file import named_places, write_places
     from apo_bench.cad.solids.naming import renamed
 
     names = _pairs(name or [])

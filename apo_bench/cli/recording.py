@@ -29,9 +29,8 @@ def recording_import(
     paths: Annotated[Path | None, typer.Option(help="Write the paths between rests: .csv.")] = None,
 ) -> None:
     """Turn the log of a pose tracker into an observation: frames, rests, the order of operations."""
-    from apo_bench.recording.camera_file import read_camera
     from apo_bench.recording.formats import read_log
-    from apo_bench.recording.objects_file import part_tracks, read_objects
+    from apo_bench.recording.setup_files import part_tracks, read_camera, read_objects
     from apo_bench.recording.show.text import reading_lines
 
     outputs = [(out, "--out", (".json", ".csv")), (picture, "--picture", (".png",)), (paths, "--paths", (".csv",))]

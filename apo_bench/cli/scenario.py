@@ -76,9 +76,8 @@ def scenario_new(
     overwrite: Annotated[bool, typer.Option(help="Make --out and its parts anew where they are.")] = False,
 ) -> None:
     """Make a scenario of parts at their final poses: contacts, an order, starts, grasps, a comment for each choice."""
-    from apo_bench.drafting.assembly_file import import_assembly
     from apo_bench.drafting.draft import draft
-    from apo_bench.drafting.posed import UPS, on_the_table, read_posed
+    from apo_bench.drafting.posed import UPS, import_assembly, on_the_table, read_posed
     from apo_bench.drafting.writing import draft_lines, scenario_text
     from apo_bench.scenario.file import load_scenario
 

@@ -72,12 +72,14 @@ def draft(parts: Sequence[PosedPart], fixed: Sequence[str] = (), clearance_mm: f
     if wrong:
         raise RuntimeError("; ".join(wrong) + ".")
     poses, contacts, dropped = closed(solids, poses, found_contacts(solids, poses), (TABLE, *base))
-    notes = [f"'{contact}' touches, but not exactly where the other contacts put it: left out" for contact in dropped]
-    for contact, opposite in walls_without_play(solids, poses, contacts):
-        notes.append(
+    notes = [
+        *(f"'{contact}' touches, but not exactly where the other contacts put it: left out" for contact in dropped),
+        *(
             f"'{contact}' and '{opposite}' leave no play between them; give their part room, or say fit = true of its "
             "faces"
-        )
+            for contact, opposite in walls_without_play(solids, poses, contacts)
+        ),
+    ]
     reach = reach_of(solids, poses, [each.name for each in parts])
     aside = np.array([-min(2.0 * reach + _GROUP_ROOM_M, _FARTHEST_ASIDE_M), 0.0, 0.0])
     search = OrderSearch(solids, poses, contacts, aside)
@@ -92,9 +94,8 @@ def draft(parts: Sequence[PosedPart], fixed: Sequence[str] = (), clearance_mm: f
     keep_free = [(np.array(middle), reach + max(site.spread_m)) for middle in middles]
     turns = {each.name: poses[each.name][:3, :3] for each in parts if each.name not in base}
     stances = {part: stance(solids[part], R) for part, R in turns.items()}
-    starts = {part: poses[part] for part in base}
+    starts = {part: np.array(poses[part]) for part in (*base, *turns)}
     for part, at in laid_out(solids, turns, keep_free).items():
-        starts[part] = np.array(poses[part])
         starts[part][:3, 3] = (*at, stances[part].height_m)
     grasps, crowded = _holds(solids, poses, order, base)
     return Draft(

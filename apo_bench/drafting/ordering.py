@@ -7,7 +7,7 @@ beside the assembly first, on the table.
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations
+from itertools import chain, combinations
 from typing import NamedTuple, final
 
 import numpy as np
@@ -82,12 +82,11 @@ class OrderSearch:
         yield from sorted(single, key=self._late)
         if single:
             return
-        for size in range(2, min(_LARGEST_GROUP, len(free)) + 1):
-            for group in combinations(sorted(free, key=lambda part: -self.solids[part].volume), size):
-                if self._hangs_together(group):
-                    placing = self._leaves(group, there)
-                    if placing is not None and self._beside(group) is not None:
-                        yield placing
+        large_first = sorted(free, key=lambda part: -self.solids[part].volume)
+        for group in chain.from_iterable(combinations(large_first, size) for size in range(2, _LARGEST_GROUP + 1)):
+            placing = self._leaves(group, there) if self._hangs_together(group) else None
+            if placing is not None and self._beside(group) is not None:
+                yield placing
 
     def _late(self, placing: Placing) -> tuple[float, ...]:
         """What is put in last: from above before from the side, the highest first."""
@@ -103,29 +102,28 @@ class OrderSearch:
         """How parts come to their places last of all that are there; None if they cannot."""
         rest = [part for part in self.solids if part in there and part not in moves]
         main = moves[0]
-        closes = tuple(_from(contact, moves) for contact in self.contacts if _between(contact, moves, rest))
+        # Contacts of what moves with what rests, the face of what moves first.
+        pairs = (pair for a, b in self.contacts for pair in ((a, b), (b, a)))
+        closes = tuple(Contact(a, b) for a, b in pairs if a.part in moves and b.part in rest)
+        others = ", ".join(dict.fromkeys(of.part for contact in closes for of in contact if of.part in rest))
+        poses = self.poses
+        assembly = Assembly({part: self.solids[part] for part in (*moves, *rest)}, (), frozenset())
+        # A part that is put back must rest: something is below it, and its weight is over what carries it. It must come
+        # along a straight way, which the macros of its contacts give, with nothing in the way.
         if not closes:
             self.stuck[main] = f"'{main}' touches nothing that would be there before it"
-            return None
-        poses = self.poses
-        # A part that is put back must rest: something is below it, and its weight is over what carries it.
-        falls = min(drop(self.solids[m], poses[m], self.solids[r], poses[r]) for m in moves for r in rest)
-        if falls > _FALLS_M:
+        elif min(drop(self.solids[m], poses[m], self.solids[r], poses[r]) for m in moves for r in rest) > _FALLS_M:
             self.stuck[main] = f"nothing is below '{main}' that would carry it"
-            return None
-        assembly = Assembly({part: self.solids[part] for part in (*moves, *rest)}, (), frozenset())
-        if imbalance(assembly, Operation(main, closes, tuple(moves[1:])), poses) > BALANCED:
+        elif imbalance(assembly, Operation(main, closes, tuple(moves[1:])), poses) > BALANCED:
             self.stuck[main] = f"'{main}' would not keep its balance on what is there before it"
-            return None
-        # It must come along a straight way, which the macros of its contacts give, with nothing in the way.
-        arrival = arrive(assembly, moves, closes, poses)
-        others = ", ".join(dict.fromkeys(of.part for contact in closes for of in contact if of.part in rest))
-        if not arrival.free:
+        elif not (arrival := arrive(assembly, moves, closes, poses)).free:
             self.stuck[main] = f"no straight way leads '{main}' out of {others}"
-            return None
-        way = poses[main][:3, :3] @ arrival.line.direction
-        words = "from above" if way[2] < -0.9 else "from below" if way[2] > 0.9 else f"along ({_numbers(way)})"
-        return Placing(tuple(moves), closes, poses[main], f"comes {words}, onto {others}")
+        else:
+            way = poses[main][:3, :3] @ arrival.line.direction
+            along = f"along ({', '.join(f'{x:.3g}' for x in np.round(way, 3) + 0.0)})"
+            words = "from above" if way[2] < -0.9 else "from below" if way[2] > 0.9 else along
+            return Placing(tuple(moves), closes, poses[main], f"comes {words}, onto {others}")
+        return None
 
     def _beside(self, group: tuple[str, ...]) -> tuple[Placing, ...] | None:
         """How a group is put together beside the assembly, its main part on the table."""
@@ -140,10 +138,8 @@ class OrderSearch:
         solids = {part: self.solids[part] for part in (*group, TABLE)}
         inner = OrderSearch(solids, poses, found_contacts(solids, poses), self.aside)
         first = inner._leaves((main,), frozenset((main, TABLE)))
-        if first is None:
-            return None
-        rest = inner._without(frozenset(solids), frozenset((main, TABLE)))
-        return None if rest is None else (first, *rest)
+        rest = inner._without(frozenset(solids), frozenset((main, TABLE))) if first else None
+        return None if first is None or rest is None else (first, *rest)
 
     def _hangs_together(self, group: Sequence[str]) -> bool:
         """Whether each part of a group is reached from the first by contacts within the group."""
@@ -153,18 +149,3 @@ class OrderSearch:
                 if {a.part, b.part} <= set(group) and known & {a.part, b.part}:
                     known |= {a.part, b.part}
         return known == set(group)
-
-
-def _between(contact: Contact, moves: Sequence[str], rest: Sequence[str]) -> bool:
-    a, b = (of.part for of in contact)
-    return (a in moves and b in rest) or (b in moves and a in rest)
-
-
-def _from(contact: Contact, moves: Sequence[str]) -> Contact:
-    """The contact with the face of what moves first."""
-    a, b = contact
-    return contact if a.part in moves else Contact(b, a)
-
-
-def _numbers(way: Array) -> str:
-    return ", ".join(f"{x:.3g}" for x in np.round(way, 3) + 0.0)

@@ -5,8 +5,6 @@ Poses are exact but for the digits of a file and of a fit, so a face touches whe
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
-from functools import lru_cache
 from itertools import combinations, product
 
 import numpy as np
@@ -60,17 +58,15 @@ def closed(
 
 def clashes(solids: Mapping[str, Solid], poses: Poses, clearance_mm: float) -> list[str]:
     """Press fits, threads, and other parts that are inside each other, one sentence each."""
-    sentences = []
+    sentences = list[str]()
     for a, b in combinations(solids, 2):
-        tight = next(_tight(solids, poses, a, b, clearance_mm), None)
         deep = intrusion(solids[a], poses[a], solids[b], poses[b])
-        if tight:
-            sentences.append(tight)
-        elif deep > _DEEP_M:
-            sentences.append(
-                f"'{a}' and '{b}' are {1e3 * deep:.3g} mm inside each other, and parts are rigid here: a press fit, a "
-                "thread, or a pose that is wrong; give them room in the CAD file"
-            )
+        inside = (
+            f"'{a}' and '{b}' are {1e3 * deep:.3g} mm inside each other, and parts are rigid here: a press fit, a "
+            "thread, or a pose that is wrong; give them room in the CAD file"
+        )
+        tight = next(_tight(solids, poses, a, b, clearance_mm), inside if deep > _DEEP_M else "")
+        sentences += [tight] if tight else []
     return sentences
 
 
@@ -78,17 +74,14 @@ def walls_without_play(
     solids: Mapping[str, Solid], poses: Poses, contacts: Iterable[Contact]
 ) -> tuple[tuple[Contact, Contact], ...]:
     """Opposite flat walls of one part that hold another one between them, none of which recedes."""
-    flat = [c for c in contacts if all(of.face in solids[of.part].faces for of in c) and not _fits(solids, c)]
+    flat = [c for c in contacts if all(of.face in solids[of.part].faces for of in c)]
+    firm = [c for c in flat if not any(solids[of.part].faces[of.face].fit for of in c)]
     return tuple(
         (contact, opposite)
-        for contact, opposite in combinations(flat, 2)
+        for contact, opposite in combinations(firm, 2)
         if {of.part for of in contact} == {of.part for of in opposite}
         and _normal(solids, poses, contact) @ _normal(solids, poses, opposite) < -1.0 + 1e-6
     )
-
-
-def _fits(solids: Mapping[str, Solid], contact: Contact) -> bool:
-    return any(solids[of.part].faces[of.face].fit for of in contact)
 
 
 def _normal(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> Array:
@@ -100,9 +93,7 @@ def _normal(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> Arra
 def _tight(solids: Mapping[str, Solid], poses: Poses, a: str, b: str, clearance_mm: float) -> Iterator[str]:
     """What shafts are that have no play in the holes around them."""
     for wall, other in product(solids[a].rounds.values(), solids[b].rounds.values()):
-        if contact_kind(wall, other) != "shaft in hole":
-            continue
-        play = play_mm(wall, other, clearance_mm)
+        play = play_mm(wall, other, clearance_mm) if contact_kind(wall, other) == "shaft in hole" else None
         if play is None or play > _NO_PLAY_MM or geometric_play(wall, other) < -_THREAD_M:
             continue
         fit = mate(wall, poses[a], other, poses[b])
@@ -124,24 +115,23 @@ def _solved(solids: Mapping[str, Solid], poses: Poses, contacts: list[Contact], 
         # Rows J and values e of all residuals, tilts times an arm, so that all are lengths; moving a by a twist opens a
         # contact as much as moving b by it closes it.
         rows = list[Array]()
-        values = list[float]()
+        values = list[Array]()
         for contact in contacts:
             each = _facing(solids, now, contact)
             if each is None:
                 continue
-            for i, (e, slope) in enumerate(zip(each.residual, each.slope, strict=True)):
-                row = np.zeros(6 * len(free))
-                scale = 1.0 if i < each.lengths else _ARM_M
-                for of, sign in zip(contact, (1.0, -1.0), strict=True):
-                    if of.part in first:
-                        row[first[of.part] : first[of.part] + 6] += sign * scale * slope
-                rows.append(row)
-                values.append(scale * float(e))
-        if not rows or np.abs(values).max() < 1e-12:
+            scale = np.where(np.arange(len(each.residual)) < each.lengths, 1.0, _ARM_M)
+            block = np.zeros((len(scale), 6 * len(free)))
+            for of, sign in zip(contact, (1.0, -1.0), strict=True):
+                if of.part in first:
+                    block[:, first[of.part] : first[of.part] + 6] += sign * scale[:, None] * each.slope
+            rows.append(block)
+            values.append(scale * each.residual)
+        if not rows or np.abs(np.concatenate(values)).max() < 1e-12:
             break
         # The least |x / W| with J x = -e: x = W y, y the least solution of (J W) y = -e.
         W = np.tile([1.0, 1.0, 1.0, 1 / _ARM_M, 1 / _ARM_M, 1 / _ARM_M], len(free))
-        x = W * np.linalg.lstsq(np.array(rows) * W, -np.array(values), rcond=1e-9)[0]
+        x = W * np.linalg.lstsq(np.concatenate(rows) * W, -np.concatenate(values), rcond=1e-9)[0]
         for part, at in first.items():
             now[part] = pose.exp(x[at : at + 6]) @ now[part]
     return now
@@ -151,25 +141,15 @@ def _facing(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> Faci
     """How the two faces of a contact look at each other; None if they do not."""
     a, b = contact
     pairs = facing(
-        _only(solids[a.part], a.face),
+        solids[a.part],
         poses[a.part],
-        _only(solids[b.part], b.face),
+        solids[b.part],
         poses[b.part],
         gap_m=10 * _NEAR_M,
         angle_rad=10 * _NEAR_RAD,
         share=_SHARE / 2,
     )
-    return next(pairs, None)
-
-
-@lru_cache(maxsize=4096)
-def _only(solid: Solid, face: str) -> Solid:
-    """The solid with this face alone."""
-    return replace(
-        solid,
-        faces={face: solid.faces[face]} if face in solid.faces else {},
-        rounds={face: solid.rounds[face]} if face in solid.rounds else {},
-    )
+    return next((pair for pair in pairs if (pair.a, pair.b) == (a.face, b.face)), None)
 
 
 def _off(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> float:
@@ -177,6 +157,5 @@ def _off(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> float:
     each = _facing(solids, poses, contact)
     if each is None:
         return np.inf
-    assembly = Assembly(solids, (), frozenset())
-    is_on_rim = contact_kind(*map(assembly.face_of, contact)) == "cone on rim"
+    is_on_rim = contact_kind(*map(Assembly(solids, (), frozenset()).face_of, contact)) == "cone on rim"
     return max(abs(each.gap_m) / _CLOSED_M, 0.0 if is_on_rim else each.angle_rad / _CLOSED_RAD)

@@ -45,45 +45,31 @@ class Stance(NamedTuple):
 
 def stance(solid: Solid, R: Array) -> Stance:
     """How a solid stands that is turned like this, (3, 3)."""
+    from shapely import MultiPoint, Point
+
     up = R[2]
     low = extent(solid.pieces, up)[0]
     base = (np.concatenate([_lowest(piece, up, low) for piece in solid.pieces]) @ R.T)[:, :2]
     middle = R @ solid.centroid
+    carrier = MultiPoint(base).convex_hull
+    at = Point(middle[:2])
     # It stands if the middle is above the area that carries, with a margin that grows with its height.
-    if _margin(base, middle[:2]) >= max(_LEAST_M, _SLOPE * (middle[2] - low)):
+    is_above = carrier.geom_type == "Polygon" and carrier.contains(at)
+    if is_above and carrier.exterior.distance(at) >= max(_LEAST_M, _SLOPE * (middle[2] - low)):
         return Stance(-low, True, False)
-    rolls = _is_on_line(base, middle[:2])
+    # It rolls if what carries is a line below the middle: a strip of an area that is a hair's breadth times its length.
+    area = MultiPoint(base).minimum_rotated_rectangle.buffer(0.0).area if len(base) > 1 else np.inf
+    rolls = bool(area <= _LEAST_M * np.ptp(base, axis=0).max() and carrier.distance(at) < _LEAST_M)
     return Stance(-low, rolls, rolls)
 
 
 def _lowest(piece: Piece, up: Array, low: float) -> Array:
     """The corners of a piece that touch the plane, (k, 3); of a level cylinder the ends of the line that does."""
-    if isinstance(piece, Hull) and piece.cylinder is not None and abs(piece.cylinder.axis @ up) < _LEVEL:
-        c = piece.cylinder
-        if c.center @ up - c.radius > low + _LOW_M:
-            return np.zeros((0, 3))
-        return np.asarray(c.center - c.radius * up + c.half_length * np.outer([-1.0, 1.0], c.axis))
-    return np.asarray(piece.corners[piece.corners @ up < low + _LOW_M])
-
-
-def _margin(base: Array, at: Array) -> float:
-    """How far a point is inside of the hull of others, [m]; negative where that is no area, or it lies outside."""
-    from shapely import MultiPoint, Point
-
-    hull = MultiPoint(base).convex_hull
-    if hull.geom_type != "Polygon" or not hull.contains(Point(at)):
-        return -1.0
-    return float(hull.exterior.distance(Point(at)))
-
-
-def _is_on_line(base: Array, at: Array) -> bool:
-    """Whether what carries is a line below a point: a strip of an area that is a hair's breadth times its length."""
-    from shapely import MultiPoint, Point
-
-    points = MultiPoint(base)
-    if len(base) < 2 or points.minimum_rotated_rectangle.buffer(0.0).area > _LEAST_M * np.ptp(base, axis=0).max():
-        return False
-    return bool(points.convex_hull.distance(Point(at)) < _LEAST_M)
+    corners = piece.corners
+    c = piece.cylinder if isinstance(piece, Hull) else None
+    if c is not None and abs(c.axis @ up) < _LEVEL:
+        corners = c.center - c.radius * up + c.half_length * np.outer([-1.0, 1.0], c.axis)
+    return np.asarray(corners[corners @ up < low + _LOW_M])
 
 
 def site_of(reach_m: float, is_beside: bool) -> Site:
@@ -92,10 +78,7 @@ def site_of(reach_m: float, is_beside: bool) -> Site:
     Args:
         is_beside: Whether a sub-assembly is put together beside it.
     """
-    x, y = (
-        round(float(np.clip(large - reach_m, _LEAST_SPREAD_M, most)), 3)
-        for large, most in zip(_LARGE_M, _SPREAD_M, strict=True)
-    )
+    x, y = np.clip(np.subtract(_LARGE_M, reach_m), _LEAST_SPREAD_M, _SPREAD_M).round(3).tolist()
     yaw = float(np.radians(_YAW_BESIDE_DEG if is_beside else _YAW_DEG))
     if is_beside:
         return Site((0.13, 0.0), (min(x, 0.01), min(y, 0.02)), (-yaw, yaw))
@@ -140,17 +123,21 @@ def _with_room(
         # The first place on the grid at which its box is clear of the others, and of the discs: of a disc, the point of
         # the box that is nearest to its middle is.
         low, high = boxes[part]
-        for middle in _grid():
-            a = middle - (high - low) / 2
-            b = middle + (high - low) / 2
-            if all(_are_apart(a, b, *other, room) for other in taken) and all(
-                np.linalg.norm(np.clip(c, a, b) - c) > r + room for c, r in kept_free
-            ):
-                taken.append((a, b))
-                places[part] = np.round(middle - (low + high) / 2, 4)
-                break
-        else:
+        half = (high - low) / 2
+        # Two boxes, each from one corner to the other, are apart if they are so along one axis.
+        middle = next(
+            (
+                at
+                for at in _grid()
+                if all(((at - half > b + room) | (a > at + half + room)).any() for a, b in taken)
+                and all(np.linalg.norm(np.clip(c, at - half, at + half) - c) > r + room for c, r in kept_free)
+            ),
+            None,
+        )
+        if middle is None:
             return None
+        taken.append((middle - half, middle + half))
+        places[part] = np.round(middle - (low + high) / 2, 4)
     return places
 
 
@@ -162,11 +149,6 @@ def _grid() -> Array:
     places = places[(far > _NEAREST_M) & (far < _FARTHEST_M)]
     cost = np.hypot(places[:, 0] - _LIKED_M[0], np.abs(places[:, 1]) - _LIKED_M[1])
     return np.asarray(places[np.lexsort((places[:, 1], np.round(cost, 6)))])
-
-
-def _are_apart(a: Array, b: Array, c: Array, d: Array, room: float) -> bool:
-    """Whether two boxes, each from one corner to the other, have room between them."""
-    return bool(((a > d + room) | (c > b + room)).any())
 
 
 def _box(solid: Solid, R: Array) -> Array:

@@ -91,12 +91,10 @@ def _part(draft: Draft, each: PosedPart, folder: Path) -> Iterator[str]:
         yield "follows_site = true  # it stands where the assembly stands"
         yield f"start = {_pose(draft.starts[each.name])}"
         return
-    stands = draft.stances[each.name]
-    why = "stands as in the assembly"
-    if not stands.stands:
+    stance = draft.stances[each.name]
+    why = "as in the assembly; it may roll" if stance.rolls else "stands as in the assembly"
+    if not stance.stands:
         why = "NEEDS TURNING OVER: it does not stand like this"
-    elif stands.rolls:
-        why = "as in the assembly; it may roll"
     yield f"start = {_pose(draft.starts[each.name])}  # {why}"
 
 
@@ -114,12 +112,7 @@ def _operation(draft: Draft, placing: Placing) -> Iterator[str]:
 def _contacts(contacts: Sequence[Contact], main: str) -> Iterator[str]:
     pairs = [f'["{m.face if m.part == main else m}", "{e}"]' for m, e in contacts]
     line = f"contacts = [{', '.join(pairs)}]"
-    if len(line) <= _WIDTH:
-        yield line
-        return
-    yield "contacts = ["
-    yield from (f"    {pair}," for pair in pairs)
-    yield "]"
+    yield from [line] if len(line) <= _WIDTH else ["contacts = [", *(f"    {pair}," for pair in pairs), "]"]
 
 
 def _grasp(hold: PadPlace | None, main: str, draft: Draft) -> Iterator[str]:
@@ -140,9 +133,8 @@ def _grasp(hold: PadPlace | None, main: str, draft: Draft) -> Iterator[str]:
 
 def _file_key(file: Path, folder: Path) -> str:
     """How a scenario in a folder names a part file."""
-    if file.stem in part_names() and part_path(file.stem) == file:
-        return file.stem
-    return Path(os.path.relpath(file, folder)).as_posix()
+    is_own = file.stem in part_names() and part_path(file.stem) == file
+    return file.stem if is_own else Path(os.path.relpath(file, folder)).as_posix()
 
 
 def _pose(T: Array) -> str:

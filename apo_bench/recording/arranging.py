@@ -1,24 +1,58 @@
 """What rests give: the camera's pose, where parts start, the order of operations, and how well all of it fits."""
 
 from collections.abc import Callable, Mapping
-from typing import NamedTuple
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import NamedTuple, final
 
 import numpy as np
 
 from apo_bench.assembly import Assembly, Poses
 from apo_bench.errors import InputError, unknown
-from apo_bench.geometry import Array, pose
+from apo_bench.geometry import Array, frozen, pose
 from apo_bench.recording.averaging import Mean
-from apo_bench.recording.camera_file import CameraFile
-from apo_bench.recording.camera_pose import CameraPose, solve_camera
-from apo_bench.recording.contact_fit import ContactFit, contact_fit
-from apo_bench.recording.ordering import Order, Stated, order_of, quiet, stated_order, world_poses
+from apo_bench.recording.ordering import (
+    ContactFit,
+    Order,
+    Stated,
+    contact_fit,
+    order_of,
+    quiet,
+    stated_order,
+    world_poses,
+)
+from apo_bench.recording.setup_files import CameraFile
 from apo_bench.recording.stays import Stays
 
-_CLOSED = ContactFit(0.0, 0.0)
 _HIGH_M = 0.01
 _TILTED_DEG = 10.0
 """A part that was seen so much higher or more tilted than planned stands otherwise."""
+_ROUNDS = 50
+_PLACED = frozen(np.repeat([2e-4, 2e-3], 3), 6)
+"""How well a place is known, per axis, [m, rad]."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class CameraPose:
+    """The pose of a camera, and how it is known."""
+
+    T_world_camera: Array
+    """(4, 4), [m]."""
+    residuals: Mapping[str, Array] = field(default_factory=dict)
+    """Part -> (6,), the body twist from its known place to where the camera sees it; empty of a pose that was given."""
+    covariance: Array | None = None
+    """(6, 6), of the body twist by which the pose is wrong, [m, rad]; None of a pose that was given."""
+
+    @property
+    def off_mm(self) -> float:
+        """Largest distance of a part from its known place, [mm]."""
+        return max((1e3 * float(np.linalg.norm(r[:3])) for r in self.residuals.values()), default=0.0)
+
+    @property
+    def off_deg(self) -> float:
+        """Largest turn of a part from its known place."""
+        return max((float(np.degrees(np.linalg.norm(r[3:]))) for r in self.residuals.values()), default=0.0)
 
 
 class Arrangement(NamedTuple):
@@ -36,7 +70,7 @@ class Arrangement(NamedTuple):
     @property
     def fit(self) -> ContactFit:
         """The worst contact of all."""
-        return max(self.fits.values(), key=lambda fit: fit.wrong_mm, default=_CLOSED)
+        return max(self.fits.values(), key=lambda fit: fit.wrong_mm, default=ContactFit(0.0, 0.0))
 
     @property
     def wrong_mm(self) -> float:
@@ -59,7 +93,7 @@ def arrangement_of(stays: Stays, camera: CameraFile, assembly: Assembly, planned
     """
     solved = camera_pose(stays, camera, planned)
     X = solved.T_world_camera
-    start, whence = start_poses({part: X @ known[0].rests[0].T for part, known in stays.items()}, camera.known, planned)
+    start, whence = start_poses({part: X @ known[0].rests[0].T for part, known in stays.items()}, camera, planned)
     order = (
         stated_order(assembly, stays, stated.ends)
         if stated.ends
@@ -89,7 +123,7 @@ def camera_pose(stays: Stays, camera: CameraFile, planned: Poses) -> CameraPose:
     for part in camera.known:
         if part not in stays:
             raise InputError(f"the camera file, known: {unknown('tracked part', part, stays)}")
-    return solved_camera(stays, camera, {part: planned[part] if T is None else T for part, T in camera.known.items()})
+    return solved_camera(stays, camera, camera.places(planned))
 
 
 def solved_camera(stays: Stays, camera: CameraFile, places: Poses) -> CameraPose:
@@ -98,31 +132,67 @@ def solved_camera(stays: Stays, camera: CameraFile, places: Poses) -> CameraPose
     return solve_camera(places, seen, staying(camera, next(iter(seen.values()))))
 
 
+def solve_camera(known: Mapping[str, Array], seen: Mapping[str, Mean], stays: Array) -> CameraPose:
+    """The pose at which the parts stand on their places, by weighted least squares on SE(3).
+
+    X exp(d) M = K exp(r): residuals r of parts seen at M and standing at K change by Ad(M^-1) d.
+
+    Args:
+        known: Part -> (4, 4), where it stands in the world, [m].
+        seen: Part -> where it was seen.
+        stays: (6, 6), covariance of an error of the estimator that stays, [m, rad].
+    """
+    parts = tuple(known)
+    K = np.array([known[p] for p in parts])
+    M = np.array([seen[p].T for p in parts])
+    W = np.array([np.linalg.inv(seen[p].covariance + stays + np.diag(_PLACED**2)) for p in parts])
+    # Normal equations of r + A d = 0, the sum of A^t W A over parts; A hardly depends on X.
+    A = pose.adjoint(pose.inverse(M))
+    normal = np.einsum("kji,kjl,klm->im", A, W, A)
+    # Each part alone says X = K M^-1; the one that fits all of them best is where Gauss-Newton begins.
+    X = min((K @ pose.inverse(M)), key=lambda X: _cost(_residuals(X, K, M), W))
+    for _ in range(_ROUNDS):
+        r = _residuals(X, K, M)
+        step = -np.linalg.solve(normal, np.einsum("kji,kjl,kl->i", A, W, r))
+        X = X @ pose.exp(step)
+        if np.abs(step).max() < 1e-12:
+            break
+    r = _residuals(X, K, M)
+    # Where residuals are larger than stated, chi-square over its degrees of freedom says how much too sure that was.
+    excess = max(1.0, _cost(r, W) / max(6 * len(parts) - 6, 1)) if len(parts) > 1 else 1.0
+    return CameraPose(X, MappingProxyType(dict(zip(parts, r, strict=True))), excess * np.linalg.inv(normal))
+
+
+def _residuals(X: Array, K: Array, M: Array) -> Array:
+    return pose.log(pose.inverse(K) @ X @ M)
+
+
+def _cost(r: Array, W: Array) -> float:
+    return float(np.einsum("ki,kij,kj->", r, W, r))
+
+
 def staying(camera: CameraFile, mean: Mean) -> Array:
     """The covariance of an error that stays while a part rests, (6, 6); as large as that of one frame if not stated."""
     return mean.scatter if camera.stays is None else np.diag(np.repeat(camera.stays, 3) ** 2)
 
 
-def start_poses(seen: Poses, known: Mapping[str, Array | None], planned: Poses) -> tuple[Poses, Mapping[str, str]]:
+def start_poses(seen: Poses, camera: CameraFile, planned: Poses) -> tuple[Poses, Mapping[str, str]]:
     """Where every part starts, and whence that is known: `known`, `seen`, `otherwise` or `scenario`.
 
     Args:
         seen: Of tracked parts, world, [m].
-        known: Places that were stated; None: as planned.
         planned: Of all parts.
     """
-    start = dict(planned)
-    whence = dict.fromkeys(planned, "scenario")
-    for part, T in seen.items():
-        if part in known:
-            place = known[part]
-            start[part] = planned[part] if place is None else place
-            whence[part] = "known"
-            continue
-        standing = _standing(planned[part], T)
-        start[part] = T if standing is None else standing
-        whence[part] = "otherwise" if standing is None else "seen"
-    return start, whence
+    known = {part: T for part, T in camera.places(planned).items() if part in seen}
+    standing = {part: _standing(planned[part], T) for part, T in seen.items() if part not in known}
+    stood = {part: T for part, T in standing.items() if T is not None}
+    whence = {
+        **dict.fromkeys(planned, "scenario"),
+        **dict.fromkeys(standing, "otherwise"),
+        **dict.fromkeys(stood, "seen"),
+        **dict.fromkeys(known, "known"),
+    }
+    return {**planned, **seen, **stood, **known}, whence
 
 
 def _standing(planned: Array, seen: Array) -> Array | None:
@@ -131,9 +201,7 @@ def _standing(planned: Array, seen: Array) -> Array | None:
     R = seen[:3, :3] @ planned[:3, :3].T
     turn = float(np.degrees(np.arctan2(R[1, 0] - R[0, 1], R[0, 0] + R[1, 1])))
     T = np.array(pose.at((0.0, 0.0, 0.0), (0.0, 0.0, turn)) @ planned)
-    T[:2, 3] = seen[:2, 3]
-    T[2, 3] = planned[2, 3]
+    T[:3, 3] = (*seen[:2, 3], planned[2, 3])
     off = pose.log(pose.inverse(T) @ seen)
-    if abs(seen[2, 3] - planned[2, 3]) > _HIGH_M or np.degrees(np.linalg.norm(off[3:])) > _TILTED_DEG:
-        return None
-    return T
+    is_high = abs(seen[2, 3] - planned[2, 3]) > _HIGH_M
+    return None if is_high or np.degrees(np.linalg.norm(off[3:])) > _TILTED_DEG else T

@@ -70,36 +70,24 @@ def pooled_mean(mean: Mean, others: Array) -> Mean:
     """
     # The mean of two covariances, weighted by degrees of freedom: that of an inverse Wishart prior of _PRIOR frames.
     n = float(mean.inlier.sum())
-    A = _axes(mean.T)
+    A = np.kron(np.eye(2), mean.T[:3, :3])  # from axes of the part to those of the camera, at the same origin
     scatter = ((n - 1.0) * mean.scatter + _PRIOR * A.T @ others @ A) / (n - 1.0 + _PRIOR)
     return Mean(mean.T, scatter + np.diag(_FRAME_FLOOR**2), mean.inlier, mean.independent)
 
 
 def common_scatter(means: list[Mean]) -> Array:
     """The covariance of one frame over many rests, (6, 6), in the axes of the camera."""
-    total = np.zeros((6, 6))
-    frames = 0.0
-    for mean in means:
-        n = float(mean.inlier.sum()) - 1.0
-        A = _axes(mean.T)
-        total += n * A @ mean.scatter @ A.T
-        frames += n
-    return total / max(frames, 1.0) + np.diag(_FRAME_FLOOR**2)
-
-
-def _axes(T: Array) -> Array:
-    """From axes of the part to those of the camera, at the same origin, (6, 6)."""
-    A = np.zeros((6, 6))
-    A[:3, :3] = A[3:, 3:] = T[:3, :3]
-    return A
+    freedom = [float(mean.inlier.sum()) - 1.0 for mean in means]
+    axes = [np.kron(np.eye(2), mean.T[:3, :3]) for mean in means]
+    scatters = [n * A @ mean.scatter @ A.T for n, A, mean in zip(freedom, axes, means, strict=True)]
+    return np.sum([np.zeros((6, 6)), *scatters], axis=0) / max(sum(freedom), 1.0) + np.diag(_FRAME_FLOOR**2)
 
 
 def _middle(T: Array) -> Array:
     """The pose of a frame that is near to most: medians of positions, and of turns from that frame."""
     # Of the 25 frames nearest to the middle, the one from which the median turn to the others is the least.
     place = np.median(T[:, :3, 3], axis=0)
-    off = np.linalg.norm(T[:, :3, 3] - place, axis=1)
-    few = T[np.argsort(off)[: min(len(T), 25)]]
+    few = T[np.argsort(np.linalg.norm(T[:, :3, 3] - place, axis=1))[: min(len(T), 25)]]
     turns = np.linalg.norm(pose.log(pose.inverse(few)[:, None] @ few[None])[..., 3:], axis=-1)
     middle = np.array(few[int(np.argmin(np.median(turns, axis=1)))])
     middle[:3, 3] = place
@@ -109,8 +97,7 @@ def _middle(T: Array) -> Array:
 def _near(xi: Array) -> NDArray[np.bool_]:
     """Which frames are no outliers: at least half of them, since few frames say little of their spread."""
     off = np.abs(xi - np.median(xi, axis=0))
-    deviation = np.maximum(_MAD * np.median(off, axis=0), _FRAME_FLOOR)
-    worst = (off / deviation).max(axis=1)
+    worst = (off / np.maximum(_MAD * np.median(off, axis=0), _FRAME_FLOOR)).max(axis=1)
     return np.asarray(worst <= max(_FAR, float(np.median(worst))))
 
 

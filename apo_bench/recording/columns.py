@@ -1,13 +1,13 @@
 """Columns of numbers become poses: positions, quaternions, rotation vectors, Euler angles, matrices."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple
 
 import numpy as np
 
-from apo_bench.errors import InputError, one_line, unknown
+from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
-from apo_bench.recording.camera_file import ANGLE_UNITS, LENGTH_UNITS, TIME_UNITS, Conventions
+from apo_bench.recording.setup_files import ANGLE_UNITS, LENGTH_UNITS, TIME_UNITS, Conventions
 
 _UNITS = {**LENGTH_UNITS, **ANGLE_UNITS, **TIME_UNITS}
 _SAME = {
@@ -54,24 +54,6 @@ def column(name: str) -> LogColumn | None:
         unit = ""
     meaning = _SAME.get(stem, stem)
     return LogColumn(meaning, unit) if meaning in _KNOWN else None
-
-
-def check_renamed(names: Sequence[str], renamed: Mapping[str, str], known: Callable[[str], bool], file: str) -> None:
-    """Refuse names that the camera file gives to columns that are not there, or that nothing is called.
-
-    Args:
-        names: Of the columns of the file.
-        known: Whether a name means something.
-    """
-    there = {name.strip().lower() for name in names}
-    for theirs, ours in renamed.items():
-        if theirs not in there:
-            raise InputError(f"{file}: the camera file, log.columns, {ours}: {unknown('column', theirs, there)}")
-        if not known(ours):
-            raise InputError(
-                f"{file}: the camera file, log.columns: '{one_line(ours, 40)}' means nothing here; allowed are names "
-                "of columns such as id, t_s, x_mm, qw."
-            )
 
 
 def row_times(cells: Mapping[str, Array], units: Mapping[str, str], how: Conventions, file: str) -> Array:
@@ -125,29 +107,25 @@ def _one_unit(
     names: Sequence[str], units: Mapping[str, str], stated: str | None, kind: Literal["length", "angle"], file: str
 ) -> str:
     """The unit that all of these columns have."""
-    different = {_unit(name, units, stated, kind, file) for name in names}
-    if len(different) > 1:
-        each = (
-            "positions are in {}; give all three in one unit"
-            if kind == "length"
-            else "angles are in {}; give all in one unit"
-        )
-        raise InputError(f"{file}: {each.format(' and '.join(sorted(different)))}.")
-    return different.pop()
-
-
-def _unit(name: str, units: Mapping[str, str], stated: str | None, kind: str, file: str) -> str:
-    unit = units.get(name, "") or stated
-    allowed = LENGTH_UNITS if kind == "length" else ANGLE_UNITS
-    if unit is None:
-        example = " or ".join(f"{name}_{unit}" for unit in ("mm", "m")) if kind == "length" else f"{name}_deg"
-        raise InputError(
-            f"{file}: the unit of the column '{name}' is not known; name it {example}, or state `{kind}` in the camera "
-            "file."
-        )
-    if unit not in allowed:
-        raise InputError(f"{file}: the unit of '{name}_{unit}' is none of a {kind}; {', '.join(allowed)} are allowed.")
-    return unit
+    allowed, examples, are = {
+        "length": (LENGTH_UNITS, ("mm", "m"), "positions are in {}; give all three in one unit"),
+        "angle": (ANGLE_UNITS, ("deg",), "angles are in {}; give all in one unit"),
+    }[kind]
+    different = {name: units.get(name, "") or stated for name in names}
+    for name, unit in different.items():
+        if unit is None:
+            raise InputError(
+                f"{file}: the unit of the column '{name}' is not known; name it "
+                f"{' or '.join(f'{name}_{example}' for example in examples)}, or state `{kind}` in the camera file."
+            )
+        if unit not in allowed:
+            raise InputError(
+                f"{file}: the unit of '{name}_{unit}' is none of a {kind}; {', '.join(allowed)} are allowed."
+            )
+    first, *others = sorted({str(unit) for unit in different.values()})
+    if others:
+        raise InputError(f"{file}: {are.format(' and '.join([first, *others]))}.")
+    return first
 
 
 def _rotations(
@@ -155,14 +133,18 @@ def _rotations(
 ) -> tuple[Array, str]:
     from scipy.spatial.transform import Rotation
 
-    kinds = [kind for kind, names in _ROTATIONS.items() if all(name in cells for name in names)]
-    if len(kinds) != 1:
-        there = f"{len(kinds)} ({' and '.join(kinds)}) are there" if kinds else _lacking(cells)
+    kind, *others = [kind for kind, names in _ROTATIONS.items() if all(name in cells for name in names)] or [""]
+    if others or not kind:
+        # Of none: what is missing of the rotation of which most columns are there.
+        names = max(_ROTATIONS.values(), key=lambda names: sum(name in cells for name in names) / len(names))
+        some, missing = (", ".join(name for name in names if (name in cells) is has) for has in (True, False))
+        there = f"{missing} is missing beside {some}" if some else "none is there"
+        if others:
+            there = f"{1 + len(others)} ({' and '.join([kind, *others])}) are there"
         raise InputError(
             f"{file}: columns of one rotation are needed, {there}; allowed are qw to qz, q0 to q3, rx to rz, ax to az "
             "with angle, roll, pitch and yaw, e1 to e3, or r11 to r33, or other names by `columns` of the camera file."
         )
-    kind = kinds[0]
     numbers = np.column_stack([cells[name] for name in _ROTATIONS[kind]])
     if kind.startswith("quaternion"):
         order = "wxyz" if kind == "quaternion" else how.quaternion
@@ -177,7 +159,7 @@ def _rotations(
         return _matrices(numbers.reshape(-1, 3, 3), places), "rotation matrices, row by row"
     angular = ("angle",) if kind == "axis and angle" else _ROTATIONS[kind]
     unit = _one_unit(angular, units, how.angle, "angle", file)
-    largest = float(np.abs(np.column_stack([cells[name] for name in angular])).max(initial=0.0))
+    largest = max(float(np.abs(cells[name]).max(initial=0.0)) for name in angular)
     if unit == "rad" and largest > _MOST_RAD:
         raise InputError(
             f"{file}: angles of up to {largest:.4g} rad were given, so these seem to be degrees that were read as "
@@ -185,22 +167,15 @@ def _rotations(
         )
     if kind == "axis and angle":
         check_length(numbers[:, :3], "an axis", places)
-        vectors = numbers[:, :3] * numbers[:, 3:] * ANGLE_UNITS[unit]
-        return Rotation.from_rotvec(vectors).as_matrix(), f"axis and angle in {unit}"
-    if kind == "rotation vector":
-        return Rotation.from_rotvec(numbers * ANGLE_UNITS[unit]).as_matrix(), f"rotation vectors in {unit}"
+        numbers = numbers[:, :3] * numbers[:, 3:]
+    if not kind.startswith("Euler"):
+        words = "rotation vectors" if kind == "rotation vector" else kind
+        return Rotation.from_rotvec(numbers * ANGLE_UNITS[unit]).as_matrix(), f"{words} in {unit}"
     if how.euler is None:
         raise InputError(f'{file}: Euler angles do not say their order; state `euler = "xyz"` in the camera file.')
     about = "fixed" if how.euler.islower() else "moving"
-    R = Rotation.from_euler(how.euler, numbers * ANGLE_UNITS[unit]).as_matrix()
-    return R, f"Euler angles in {unit}, {how.euler} about {about} axes, as stated"
-
-
-def _lacking(cells: Mapping[str, Array]) -> str:
-    """What is missing of the rotation of which most columns are there."""
-    names = max(_ROTATIONS.values(), key=lambda names: sum(name in cells for name in names) / len(names))
-    there, missing = ([name for name in names if (name in cells) is has] for has in (True, False))
-    return f"{', '.join(missing)} is missing beside {', '.join(there)}" if there else "none is there"
+    turned = Rotation.from_euler(how.euler, numbers * ANGLE_UNITS[unit])
+    return turned.as_matrix(), f"Euler angles in {unit}, {how.euler} about {about} axes, as stated"
 
 
 def _matrices(R: Array, places: Sequence[str]) -> Array:

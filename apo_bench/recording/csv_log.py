@@ -1,25 +1,35 @@
-"""Logs as comma-separated values: one row per pose, columns known by their names; or as exported from ROS bags."""
+"""Logs of one line per pose: columns known by their names, as exported from ROS bags, and as TUM has them."""
 
 import csv
+import re
 from array import array
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from itertools import chain
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.errors import InputError, one_line
-from apo_bench.geometry import Array
+from apo_bench.errors import InputError, one_line, unknown
+from apo_bench.geometry import Array, pose
 from apo_bench.io.ordinary_files import opened
 from apo_bench.io.strict_csv import check_separator
-from apo_bench.recording.camera_file import Conventions
-from apo_bench.recording.columns import LogColumn, check_renamed, column, poses, row_times
+from apo_bench.recording.columns import LogColumn, check_length, column, poses, row_times
 from apo_bench.recording.log import LARGEST_LOG_BYTES, MOST_POSES, LogRows
+from apo_bench.recording.setup_files import Conventions
 
 _LONGEST_LINE = 16384
 _LARGEST = 1e20
+_FIELDS = {
+    **{f"{kind}.{axis}": LogColumn(axis, "m") for kind in ("position", "translation") for axis in "xyz"},
+    **{f"{kind}.{axis}": LogColumn(f"q{axis}", "") for kind in ("orientation", "rotation") for axis in "wxyz"},
+    **{name: LogColumn("seconds", "s") for name in ("stamp.sec", "stamp.secs")},
+    **{name: LogColumn("nanoseconds", "ns") for name in ("stamp.nanosec", "stamp.nsecs")},
+    "stamp": LogColumn("stamp", "ns"),
+    "time": LogColumn("time", ""),
+    "child_frame_id": LogColumn("id", ""),
+}
+ROS_NOTES = ["lengths in m, as in ROS", "quaternions by the names of the fields, as in ROS"]
 
 
 class Numbers(NamedTuple):
@@ -28,15 +38,53 @@ class Numbers(NamedTuple):
     cells: Mapping[str, Array]
     units: Mapping[str, str]
     ids: Sequence[str]
-    lines: Sequence[int]
+    places: Sequence[str]
+    """`file, line 3` of each row."""
 
 
-def read_csv_log(path: Path, how: Conventions) -> tuple[LogRows, list[str]]:
+def read_csv_log(path: Path, how: Conventions) -> LogRows:
     """The rows of a file whose columns name what they are; without a column of ids, its name is the id of all."""
-    table = read_numbers(path, column, how.columns)
-    places = [f"{path}, line {line}" for line in table.lines]
-    T, notes = poses(table.cells, table.units, how, str(path), places)
-    return LogRows(table.ids, row_times(table.cells, table.units, how, str(path)), T, places), notes
+    cells, units, ids, places = read_numbers(path, column, how.columns)
+    T, notes = poses(cells, units, how, str(path), places)
+    return LogRows(ids, row_times(cells, units, how, str(path)), T, places, notes)
+
+
+def read_ros_csv(path: Path, how: Conventions) -> LogRows:
+    """Columns such as `field.header.stamp`, `pose.position.x`; without child_frame_id one file is one object.
+
+    A stamp in one column is in nanoseconds if it is whole, as ROS writes it, else in seconds.
+    """
+    cells, units, ids, places = read_numbers(path, _field, how.columns)
+    if "seconds" in cells:
+        t = cells["seconds"] + 1e-9 * cells.get("nanoseconds", np.zeros(len(cells["seconds"])))
+    elif "stamp" in cells or "time" in cells:
+        t = cells["stamp"] if "stamp" in cells else cells["time"]
+        t = t * 1e-9 if (t == np.round(t)).all() else t
+    else:
+        raise InputError(f"{path}: the column of the time is missing, such as header.stamp.sec; export the header too.")
+    return LogRows(ids, t, poses(cells, units, how, str(path), places)[0], places, ROS_NOTES)
+
+
+def read_tum(path: Path, how: Conventions) -> LogRows:
+    """`timestamp tx ty tz qx qy qz qw` with spaces between, m; the name of the file is the id."""
+    numbers = dict[str, list[float]]()
+    for line, words in text_lines(path, separator=None):
+        place = f"{path}, line {line}"
+        if len(words) != 8 and not words[0].startswith("#"):
+            raise InputError(f"{place}: timestamp tx ty tz qx qy qz qw are needed, {len(words)} words were given.")
+        if not words[0].startswith("#"):
+            numbers[place] = [finite_number(word, place) for word in words]
+    if not numbers:
+        raise InputError(f"{path}: no pose stands in the file; lines of timestamp tx ty tz qx qy qz qw are needed.")
+    cells = np.array([*numbers.values()])
+    check_length(cells[:, 4:], "a quaternion", [*numbers])
+    return LogRows(
+        ids=[path.stem] * len(cells),
+        t=cells[:, 0],
+        T=pose.unpack(cells[:, [1, 2, 3, 7, 4, 5, 6]]),
+        places=[*numbers],
+        notes=["lengths in m, as in TUM", "quaternions x, y, z, w, as in TUM"],
+    )
 
 
 def read_numbers(path: Path, meaning: Callable[[str], LogColumn | None], renamed: Mapping[str, str]) -> Numbers:
@@ -51,7 +99,15 @@ def read_numbers(path: Path, meaning: Callable[[str], LogColumn | None], renamed
         raise InputError(f"{path}: the file is empty; its first line names the columns, such as t_s,id,x_mm,y_mm,z_mm.")
     place = f"{path}, line {first}"
     check_separator(place, names)
-    check_renamed(names, renamed, lambda name: meaning(name) is not None, str(path))
+    there = {name.strip().lower() for name in names}
+    for theirs, ours in renamed.items():
+        if theirs not in there:
+            raise InputError(f"{path}: the camera file, log.columns, {ours}: {unknown('column', theirs, there)}")
+        if meaning(ours) is None:
+            raise InputError(
+                f"{path}: the camera file, log.columns: '{one_line(ours, 40)}' means nothing here; allowed are names "
+                "of columns such as id, t_s, x_mm, qw."
+            )
     known = [meaning(renamed.get(name.strip().lower(), name)) for name in names]
     columns = {i: each for i, each in enumerate(known) if each is not None}
     for name, count in Counter(each.meaning for each in columns.values()).items():
@@ -60,22 +116,28 @@ def read_numbers(path: Path, meaning: Callable[[str], LogColumn | None], renamed
     of_id = next((i for i, each in columns.items() if each.meaning == "id"), None)
     cells = {i: array("d") for i in columns if i != of_id}
     ids = list[str]()
-    at = array("q")
+    places = list[str]()
     for line, texts in lines:
+        places.append(f"{path}, line {line}")
         if len(texts) != len(names):
-            raise InputError(f"{path}, line {line}: {len(names)} cells are needed, {len(texts)} were given.")
-        if len(at) == MOST_POSES:
-            raise InputError(f"{path}, line {line}: a log of at most {MOST_POSES:,} rows is needed; cut it.")
+            raise InputError(f"{places[-1]}: {len(names)} cells are needed, {len(texts)} were given.")
+        if len(places) > MOST_POSES:
+            raise InputError(f"{places[-1]}: a log of at most {MOST_POSES:,} rows is needed; cut it.")
         for i, column_cells in cells.items():
-            column_cells.append(finite_number(texts[i], f"{path}, line {line}, column {one_line(names[i], 40)}"))
+            column_cells.append(finite_number(texts[i], f"{places[-1]}, column {one_line(names[i], 40)}"))
         ids.append(path.stem if of_id is None else texts[of_id])
-        at.append(line)
     return Numbers(
         {columns[i].meaning: np.array(column_cells) for i, column_cells in cells.items()},
         {each.meaning: each.unit for each in columns.values()},
         ids,
-        at,
+        places,
     )
+
+
+def _field(name: str) -> LogColumn | None:
+    """What a column is, by the last names in it: `field.pose.position.x`, `/vision/pose/position/x`."""
+    words = re.split(r"[./]", name.strip().lower().lstrip("%"))
+    return _FIELDS.get(".".join(words[-2:])) or _FIELDS.get(words[-1])
 
 
 def finite_number(text: str, place: str) -> float:
@@ -92,7 +154,6 @@ def finite_number(text: str, place: str) -> float:
 def text_lines(path: Path, separator: str | None = ",") -> Iterator[tuple[int, list[str]]]:
     """Number and cells of every line that is not empty; None separates by spaces."""
     size = 0
-    line = 0
     with opened(path, "log") as stream:
         for line, raw in enumerate(iter(lambda: stream.readline(_LONGEST_LINE + 1), b""), start=1):
             size += len(raw)
@@ -105,26 +166,6 @@ def text_lines(path: Path, separator: str | None = ",") -> Iterator[tuple[int, l
             except UnicodeDecodeError as error:
                 raise InputError(f"{path}, line {line}: this is not UTF-8 text; give a log as text.") from error
             if text.strip():
-                yield line, text.split() if separator is None else _cells(text)
-
-
-def _cells(text: str) -> list[str]:
-    if '"' not in text:
-        return [cell.strip() for cell in text.split(",")]
-    return [cell.strip() for cell in next(csv.reader([text]))]
-
-
-def rows_of_files(
-    path: Path, endings: Iterable[str], read: Callable[[Path], tuple[LogRows, list[str]]]
-) -> tuple[LogRows, list[str]]:
-    """The rows of a file, or of all files of a folder, one an object."""
-    if not path.is_dir():
-        return read(path)
-    files = sorted(file for ending in endings for file in path.glob(f"*{ending}"))
-    if not files:
-        raise InputError(
-            f"{path}: the folder holds no file that ends in {' or '.join(endings)}; give a folder of logs."
-        )
-    parts = [read(file) for file in files]
-    ids, t, T, places = zip(*(rows for rows, _ in parts), strict=True)
-    return LogRows([*chain(*ids)], np.concatenate(t), np.concatenate(T), [*chain(*places)]), parts[0][1]
+                quoted = separator and '"' in text
+                words = next(csv.reader([text])) if quoted else text.split(separator)
+                yield line, [word.strip() for word in words]

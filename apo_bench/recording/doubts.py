@@ -12,10 +12,10 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import Array
 from apo_bench.recording.arranging import Arrange, Arrangement
 from apo_bench.recording.averaging import per_axis
-from apo_bench.recording.camera_file import CameraFile
 from apo_bench.recording.mistakes import mistakes, reversed_in_time
 from apo_bench.recording.operations import SeenOperation
 from apo_bench.recording.ordering import NoOrder, moves_text
+from apo_bench.recording.setup_files import CameraFile
 from apo_bench.recording.stays import Stays
 
 _FITS_MM = 20.0
@@ -64,11 +64,12 @@ def check_arrangement(
             best = wrong
             remedy = f"{sentence}; then all is within {wrong:.1f} mm"
     fit = arrangement.fit
-    how = f"they are open by up to {1e3 * fit.gap_m:.0f} mm and {np.degrees(fit.angle_rad):.0f} deg"
     pose = arrangement.camera
-    if pose.residuals:
-        how += f", known places are missed by up to {pose.off_mm:.0f} mm and {pose.off_deg:.0f} deg"
-    raise InputError(f"{file}: no contact fits as it is stated ({how}); {remedy}.")
+    missed = f", known places are missed by up to {pose.off_mm:.0f} mm and {pose.off_deg:.0f} deg"
+    raise InputError(
+        f"{file}: no contact fits as it is stated (they are open by up to {1e3 * fit.gap_m:.0f} mm and "
+        f"{np.degrees(fit.angle_rad):.0f} deg{missed if pose.residuals else ''}); {remedy}."
+    )
 
 
 def check_direction(arrange: Arrange, stays: Stays, file: str) -> None:
@@ -115,8 +116,8 @@ def unclear(
 
 
 def _rivals(arrangement: Arrangement) -> Iterator[str]:
-    order = arrangement.order
-    for k, (mine, other) in enumerate(zip(order.stays, order.rival or order.stays, strict=True)):
+    chosen, rival = arrangement.order
+    for k, (mine, other) in enumerate(zip(chosen, rival or chosen, strict=True)):
         if mine is not None and other is not None and mine is not other:
             yield (
                 f"operation {k + 1} ({mine.part}) ended at {mine.begins:.2f} s, or at {other.begins:.2f} s: both "
@@ -126,9 +127,7 @@ def _rivals(arrangement: Arrangement) -> Iterator[str]:
 
 def _open(arrangement: Arrangement, covariance: Array, assembly: Assembly) -> Iterator[str]:
     for k, fit in arrangement.fits.items():
-        m, rad = per_axis(covariance[k])
-        mm = 1e3 * m
-        deg = np.degrees(rad)
+        mm, deg = np.multiply(per_axis(covariance[k]), (1e3, np.degrees(1.0)))
         if fit.wrong_mm > _OPEN_MM + _OPEN * (mm + deg):
             yield (
                 f"operation {k + 1} ({assembly.operations[k].main}) leaves a contact open by {1e3 * fit.gap_m:.1f} mm "
@@ -149,16 +148,14 @@ def _moved_too(stays: Stays, operations: Sequence[SeenOperation]) -> Iterator[st
 
 
 def _pauses(stays: Stays, arrangement: Arrangement, assembly: Assembly) -> Iterator[str]:
-    used = {id(stay) for stay in arrangement.order.stays}
     mains = {operation.main for operation in assembly.operations}
     carried = {part for operation in assembly.operations for part in operation.carries}
     for part, known in stays.items():
-        if part in carried:
+        pauses = [f"{stay.begins:.2f} s" for stay in known[1:] if stay not in arrangement.order.stays]
+        if part in carried or not pauses:
             continue
         if part in mains:
-            pauses = [f"{stay.begins:.2f} s" for stay in known[1:] if id(stay) not in used]
-            if pauses:
-                at = ", ".join(pauses)
-                yield f"'{part}' also rested at {at}, on its way: taken as a pause; state --ends if it was put down"
-        elif len(known) > 1:
-            yield f"'{part}' moved at {known[1].begins:.2f} s, although no operation of the scenario moves it"
+            at = ", ".join(pauses)
+            yield f"'{part}' also rested at {at}, on its way: taken as a pause; state --ends if it was put down"
+        else:
+            yield f"'{part}' moved at {pauses[0]}, although no operation of the scenario moves it"

@@ -1,21 +1,24 @@
 """The formats of logs, and the one that reads them all."""
 
-from collections.abc import Callable, Mapping
+import json
+from collections.abc import Callable, Iterator, Mapping
+from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import InputError, one_line, unknown
 from apo_bench.files.bop import read_results
 from apo_bench.geometry import pose
-from apo_bench.recording.camera_file import Conventions
+from apo_bench.io.ordinary_files import decoded, read_bytes
 from apo_bench.recording.columns import check_length, oriented
-from apo_bench.recording.csv_log import finite_number, read_csv_log, rows_of_files, text_lines
-from apo_bench.recording.log import Log, LogRows, checked_log
-from apo_bench.recording.ros_log import read_ros_csv, read_ros_json
+from apo_bench.recording.csv_log import ROS_NOTES, read_csv_log, read_ros_csv, read_tum
+from apo_bench.recording.log import LARGEST_LOG_BYTES, MOST_POSES, Log, LogRows, checked_log
+from apo_bench.recording.setup_files import Conventions
 
-Reader = Callable[[Path, Conventions], tuple[LogRows, list[str]]]
+Reader = Callable[[Path, Conventions], LogRows]
 
 
 def read_log(path: str | Path, form: str, how: Conventions) -> Log:
@@ -30,20 +33,27 @@ def read_log(path: str | Path, form: str, how: Conventions) -> Log:
     read, endings = FORMATS[form]
     if path.is_dir() and not endings:
         raise InputError(f"{path}: a folder was given; a log of the format {form} is one file.")
-    rows, notes = rows_of_files(path, endings, lambda file: read(file, how))
-    T, more = oriented(rows.T, how)
-    return checked_log(str(path), rows._replace(T=T), [*notes, *more])
+    # Of a folder each file is one object.
+    files = sorted(file for ending in endings for file in path.glob(f"*{ending}")) if path.is_dir() else [path]
+    if not files:
+        raise InputError(
+            f"{path}: the folder holds no file that ends in {' or '.join(endings)}; give a folder of logs."
+        )
+    ids, t, T, places, notes = zip(*(read(file, how) for file in files), strict=True)
+    poses, more = oriented(np.concatenate(T), how)
+    rows = LogRows([*chain(*ids)], np.concatenate(t), poses, [*chain(*places)], [*notes[0], *more])
+    return checked_log(str(path), rows)
 
 
-def _bop(path: Path, how: Conventions) -> tuple[LogRows, list[str]]:
+def _bop(path: Path, how: Conventions) -> LogRows:
     """BOP results: mm, rotation matrices, images by number; of several estimates of one object the best score."""
     results = read_results(path)
     scenes = np.unique(results.where[:, 0])
     scene = scenes[0] if how.scene is None and len(scenes) == 1 else how.scene
     if scene is None or scene not in scenes:
-        first_few = ", ".join(map(str, scenes[:6].tolist()))
         raise InputError(
-            f"{path}: a recording is one scene, and the file holds {first_few}; state `scene` in the camera file."
+            f"{path}: a recording is one scene, and the file holds {', '.join(map(str, scenes[:6].tolist()))}; state "
+            "`scene` in the camera file."
         )
     if how.rate_hz is None:
         raise InputError(f"{path}: images are numbered and have no time; state `rate_hz` in the camera file.")
@@ -55,42 +65,104 @@ def _bop(path: Path, how: Conventions) -> tuple[LogRows, list[str]]:
     T = np.tile(np.eye(4), (len(at), 1, 1))
     T[:, :3, :3] = pose.nearest_rotations(results.R[at])
     T[:, :3, 3] = results.t_mm[at] * 1e-3
-    ids = [str(k) for k in results.where[at, 2]]
     left = f"; {int(again.sum())} estimates of lower score left out" if again.any() else ""
-    notes = ["lengths in mm, as in BOP", f"rotation matrices, row by row, at {how.rate_hz:g} images a second{left}"]
-    return LogRows(ids, results.where[at, 1] / how.rate_hz, T, [results.spot(int(i)) for i in at]), notes
+    return LogRows(
+        ids=[str(k) for k in results.where[at, 2]],
+        t=results.where[at, 1] / how.rate_hz,
+        T=T,
+        places=[results.spot(int(i)) for i in at],
+        notes=["lengths in mm, as in BOP", f"rotation matrices, row by row, at {how.rate_hz:g} images a second{left}"],
+    )
 
 
-def _tum(path: Path, how: Conventions) -> tuple[LogRows, list[str]]:
-    """`timestamp tx ty tz qx qy qz qw` with spaces between, m; the name of the file is the id."""
-    numbers = list[list[float]]()
+def _ros_json(path: Path, how: Conventions) -> LogRows:
+    """A list of messages, or one message per line; a topic names the object where there is no child_frame_id."""
+    ids = list[str]()
+    t = list[float]()
+    packed = list[list[float]]()
     places = list[str]()
-    for line, words in text_lines(path, separator=None):
-        if words[0].startswith("#"):
+    for place, message in _messages(path):
+        for stamped in _stamped(message):
+            if len(ids) == MOST_POSES:
+                raise InputError(f"{place}: a log of at most {MOST_POSES:,} poses is needed; cut it.")
+            ids.append(str(stamped.get("child_frame_id") or message.get("topic") or path.stem).strip("/"))
+            t.append(_stamp(stamped, place))
+            packed.append(_pose(stamped, place))
+            places.append(place)
+    numbers = np.array(packed).reshape(-1, 7)
+    check_length(numbers[:, 3:], "a quaternion", places)
+    return LogRows(ids, np.array(t), pose.unpack(numbers), places, ROS_NOTES)
+
+
+def _messages(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
+    text = decoded(read_bytes(path, "log", LARGEST_LOG_BYTES), str(path), "log")
+    if not text.strip():
+        raise InputError(f"{path}: the file is empty; a list of messages is needed, or one message per line.")
+    by_line = not text.lstrip().startswith("[")
+    for line, part in enumerate(text.splitlines() if by_line else [text], start=1):
+        if not part.strip():
             continue
-        place = f"{path}, line {line}"
-        if len(words) != 8:
-            raise InputError(f"{place}: timestamp tx ty tz qx qy qz qw are needed, {len(words)} words were given.")
-        numbers.append([finite_number(word, place) for word in words])
-        places.append(place)
-    if not numbers:
-        raise InputError(f"{path}: no pose stands in the file; lines of timestamp tx ty tz qx qy qz qw are needed.")
-    cells = np.array(numbers)
-    check_length(cells[:, 4:], "a quaternion", places)
-    T = pose.unpack(np.concatenate([cells[:, 1:4], cells[:, 7:], cells[:, 4:7]], axis=1))
-    return LogRows([path.stem] * len(cells), cells[:, 0], T, places), [
-        "lengths in m, as in TUM",
-        "quaternions x, y, z, w, as in TUM",
-    ]
+        try:
+            document = json.loads(part)
+        except (ValueError, RecursionError) as error:
+            raise InputError(f"{path}, line {line}: this is not JSON ({str(error)[:80]}).") from error
+        for i, message in enumerate(document if isinstance(document, list) else [document], start=1):
+            place = f"{path}, line {line}" if by_line else f"{path}, message {i}"
+            if not isinstance(message, dict):
+                raise InputError(f"{place}: a message with named fields is needed.")
+            yield place, message
+
+
+def _stamped(message: dict[str, Any]) -> list[dict[str, Any]]:
+    """The poses in a message: its own, those of a TFMessage, or those of what it wraps."""
+    wrapped = _inner(message, "msg", "message", "data")
+    if wrapped:
+        return _stamped(wrapped)
+    transforms = message.get("transforms")
+    return [each for each in transforms if isinstance(each, dict)] if isinstance(transforms, list) else [message]
+
+
+def _inner(message: dict[str, Any], *keys: str) -> dict[str, Any]:
+    """The first of some fields that has fields itself; else none."""
+    return next((message[key] for key in keys if isinstance(message.get(key), dict)), {})
+
+
+def _stamp(message: dict[str, Any], place: str) -> float:
+    stamp = _inner(message, "header").get("stamp")
+    if isinstance(stamp, dict):
+        whole = stamp.get("sec", stamp.get("secs"))
+        part = stamp.get("nanosec", stamp.get("nsecs", 0))
+        return _finite(whole, f"{place}, header.stamp.sec") + 1e-9 * _finite(part, f"{place}, header.stamp.nanosec")
+    x = _finite(stamp, f"{place}, header.stamp")
+    return x * 1e-9 if x.is_integer() else x
+
+
+def _pose(message: dict[str, Any], place: str) -> list[float]:
+    """(x, y, z, qw, qx, qy, qz), [m]."""
+    inside = _inner(message, "pose", "transform")
+    if not inside:
+        raise InputError(f"{place}: a field `pose` or `transform` is needed.")
+    inside = _inner(inside, "pose") or inside
+    at = _inner(inside, "position", "translation")
+    turn = _inner(inside, "orientation", "rotation")
+    if not at or not turn:
+        raise InputError(f"{place}: a position with an orientation is needed, or a translation with a rotation.")
+    return [_finite(fields.get(k), f"{place}, {k}") for fields, keys in ((at, "xyz"), (turn, "wxyz")) for k in keys]
+
+
+def _finite(x: Any, place: str) -> float:
+    if isinstance(x, int | float) and not isinstance(x, bool) and abs(x) < 1e20:
+        return float(x)
+    raise InputError(f"{place}: a finite number is needed, '{one_line(str(x), 40)}' was given.")
 
 
 FORMATS: Mapping[str, tuple[Reader, tuple[str, ...]]] = MappingProxyType(
     {
         "csv": (read_csv_log, (".csv",)),
         "bop": (_bop, ()),
-        "tum": (_tum, (".txt", ".tum")),
+        "tum": (read_tum, (".txt", ".tum")),
         "ros-csv": (read_ros_csv, (".csv",)),
-        "ros-json": (read_ros_json, (".json", ".jsonl")),
+        "ros-json": (_ros_json, (".json", ".jsonl")),
     }
 )
 """Name -> its reader, and how the files of a folder end that holds one for each object."""

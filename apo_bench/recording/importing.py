@@ -12,16 +12,14 @@ from apo_bench.errors import InputError, unknown
 from apo_bench.geometry import Array
 from apo_bench.observation.models.isotropic import floored, with_shared
 from apo_bench.observation.models.outliers import UNSEEN_DEVIATION, last_seen
-from apo_bench.recording.arranging import Arrangement, arrangement_of, staying
-from apo_bench.recording.camera_file import CameraFile
-from apo_bench.recording.camera_pose import CameraPose
-from apo_bench.recording.contact_fit import ContactFit
+from apo_bench.recording.arranging import CameraPose, arrangement_of, staying
 from apo_bench.recording.doubts import check_arrangement, check_direction, unclear
 from apo_bench.recording.log import PoseTrack
 from apo_bench.recording.operations import SeenOperation, seen_operation
-from apo_bench.recording.ordering import NoOrder, Stated
-from apo_bench.recording.rests import RestSpan, least_rest_s
-from apo_bench.recording.stays import Stay, Stays, all_stays
+from apo_bench.recording.ordering import ContactFit, NoOrder, Stated
+from apo_bench.recording.rests import least_rest_s
+from apo_bench.recording.setup_files import CameraFile
+from apo_bench.recording.stays import Stay, all_stays
 from apo_bench.scenario import Scenario, layout_at
 
 _SLOW_S = 0.5
@@ -66,28 +64,6 @@ def import_recording(
         InputError: A part is not of the scenario or is missing, the moves are not its operations, or no contact fits.
     """
     assembly = scenario.assembly
-    _check_parts(tracks, assembly, file)
-    stays = all_stays(tracks)
-    _check_rests(tracks, stays, file)
-    arrange = partial(arrangement_of, camera=camera, assembly=assembly, planned=planned_starts(scenario), stated=stated)
-    try:
-        arrangement = arrange(stays)
-    except NoOrder as error:
-        check_direction(arrange, stays, file)
-        least = max(map(least_rest_s, tracks.values()))
-        slow = f" At this rate of frames a rest is seen from {least:.1f} s on." if least > _SLOW_S else ""
-        raise InputError(f"{file}: {error}{slow}") from error
-    check_arrangement(arrangement, arrange, stays, models or {}, camera, file)
-    return _imported(tracks, stays, arrangement, camera, scenario)
-
-
-def planned_starts(scenario: Scenario) -> Poses:
-    """Where the scenario starts every part, world, [m]."""
-    return layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start
-
-
-def _check_parts(tracks: Mapping[str, PoseTrack], assembly: Assembly, file: str) -> None:
-    """Refuse parts that the scenario does not have, and operations of parts that were not tracked."""
     for part in tracks:
         if part not in assembly.solids:
             raise InputError(f"{file}: {unknown('part', part, assembly.solids)}")
@@ -97,10 +73,7 @@ def _check_parts(tracks: Mapping[str, PoseTrack], assembly: Assembly, file: str)
                 f"{file}: '{operation.main}', which operation {k + 1} moves, is not tracked; name its id in the "
                 "objects file."
             )
-
-
-def _check_rests(tracks: Mapping[str, PoseTrack], stays: Stays, file: str) -> None:
-    """Refuse parts that never rest."""
+    stays = all_stays(tracks)
     for part, track in tracks.items():
         if not stays[part]:
             raise InputError(
@@ -108,20 +81,27 @@ def _check_rests(tracks: Mapping[str, PoseTrack], stays: Stays, file: str) -> No
                 f"{track.t[-1] - track.t[0]:.2f} s); give a log in which it lies still for "
                 f"{least_rest_s(track):.1f} s and more."
             )
-
-
-def _imported(
-    tracks: Mapping[str, PoseTrack], stays: Stays, arrangement: Arrangement, camera: CameraFile, scenario: Scenario
-) -> ImportedRecording:
-    assembly = scenario.assembly
-    solved = arrangement.camera
+    arrange = partial(arrangement_of, camera=camera, assembly=assembly, planned=planned_starts(scenario), stated=stated)
+    try:
+        arrangement = arrange(stays)
+    except NoOrder as error:
+        check_direction(arrange, stays, file)
+        least = max(map(least_rest_s, tracks.values()))
+        slow = f" At this rate of frames a rest is seen from {least:.1f} s on." if least > _SLOW_S else ""
+        raise InputError(f"{file}: {error}{slow}") from error
+    check_arrangement(arrangement, arrange, stays, models or {}, camera, file)
+    solved, order, start, whence, _ = arrangement
     X = solved.T_world_camera
-    start = arrangement.start
-    chosen = arrangement.order.stays
-    operations = tuple(seen_operation(tracks, stays, chosen, assembly, X, k) for k in range(len(assembly)))
+    operations = tuple(seen_operation(tracks, stays, order.stays, assembly, X, k) for k in range(len(assembly)))
     seen = np.array([operation.rest is not None for operation in operations])
     goals = np.array([np.eye(4) if operation.rest is None else X @ operation.rest.T for operation in operations])
-    covariance = np.array([_covariance(operation.rest, camera) for operation in operations])
+    # What frames differ by averages out, what stays does not.
+    covariance = np.array(
+        [
+            np.diag(UNSEEN_DEVIATION**2) if rest is None else rest.mean.covariance + staying(camera, rest.mean)
+            for rest in (operation.rest for operation in operations)
+        ]
+    )
     observation = Observation(
         assembly=assembly,
         start=start,
@@ -141,18 +121,16 @@ def _imported(
         camera=solved,
         stays=stays,
         operations=operations,
-        stood=arrangement.whence,
+        stood=whence,
         fit=arrangement.fit,
         stays_stated=camera.stays is not None,
         unclear=unclear(stays, arrangement, operations, covariance, assembly),
     )
 
 
-def _covariance(rest: RestSpan | None, camera: CameraFile) -> Array:
-    """(6, 6), of the goal that a rest shows: what frames differ by averages out, what stays does not."""
-    if rest is None:
-        return np.diag(UNSEEN_DEVIATION**2)
-    return rest.mean.covariance + staying(camera, rest.mean)
+def planned_starts(scenario: Scenario) -> Poses:
+    """Where the scenario starts every part, world, [m]."""
+    return layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start
 
 
 def _adjustments(operations: Sequence[SeenOperation], assembly: Assembly) -> Array:

@@ -40,10 +40,6 @@ class Log:
     notes: tuple[str, ...]
     """How its numbers were read: units, order of the quaternion, direction."""
 
-    @property
-    def seconds(self) -> float:
-        return max(float(track.t[-1]) for track in self.tracks.values())
-
 
 class LogRows(NamedTuple):
     """Poses as they stand in a file, in its order."""
@@ -55,9 +51,11 @@ class LogRows(NamedTuple):
     """(n, 4, 4), [m]."""
     places: Sequence[str]
     """Where each stands: `file, line 3`."""
+    notes: Sequence[str]
+    """How they were read."""
 
 
-def checked_log(file: str, rows: LogRows, notes: Sequence[str]) -> Log:
+def checked_log(file: str, rows: LogRows) -> Log:
     """The tracks of a log, each with increasing times.
 
     Raises:
@@ -65,52 +63,40 @@ def checked_log(file: str, rows: LogRows, notes: Sequence[str]) -> Log:
     """
     if not len(rows.t):
         raise InputError(f"{file}: no pose stands in the file; give a log with one row per pose.")
-    first = float(rows.t.min())
     names, which = np.unique(np.array(rows.ids, dtype=object).astype(str), return_inverse=True)
     tracks = {}
     for i, name in enumerate(names.tolist()):
         at = np.flatnonzero(which == i)
         _check_times(rows, name, at)
-        tracks[name] = PoseTrack(rows.t[at] - first, rows.T[at])
-    _check_unit(file, rows.T)
-    _check_rate(file, tracks)
-    return Log(file, MappingProxyType(tracks), tuple(notes))
+        tracks[name] = PoseTrack(rows.t[at] - rows.t.min(), rows.T[at])
+    # Metres are not to be read as millimetres, nor milliseconds as seconds, nor the other way round.
+    distance = float(np.median(np.linalg.norm(rows.T[:, :3, 3], axis=1)))
+    if not _NEAR_M <= distance <= _FAR_M:
+        fault = "metres that were read as mm" if distance < _NEAR_M else "mm that were read as metres"
+        raise InputError(
+            f"{file}: the median distance to the camera is {distance * 1e3:.3g} mm, so these seem to be {fault}; "
+            "state the unit: columns such as x_mm or x_m, or `length` in the camera file."
+        )
+    steps = np.concatenate([np.diff(track.t) for track in tracks.values()])
+    if len(steps) and not _FAST_S <= np.median(steps) <= _SLOW_S:
+        raise InputError(
+            f"{file}: the median time between two frames of a track is {np.median(steps):.3g} s, so its times seem "
+            "to be in another unit; state it: a column such as t_ms or t_s, or `time` in the camera file."
+        )
+    return Log(file, MappingProxyType(tracks), tuple(rows.notes))
 
 
 def _check_times(rows: LogRows, name: str, at: NDArray[np.intp]) -> None:
     steps = np.diff(rows.t[at])
-    if len(steps) and (steps < 0.0).all():
-        raise InputError(
-            f"{rows.places[at[1]]}: the times of '{one_line(name, 60)}' run backwards from the first row to the last; "
-            "give the log in the order in which it was recorded."
-        )
-    if (steps <= 0.0).any():
-        k = int(np.argmax(steps <= 0.0))
-        what = "stands twice" if steps[k] == 0.0 else f"is {-steps[k]:.6g} s before the one above it"
-        raise InputError(
-            f"{rows.places[at[k + 1]]}: a time of '{one_line(name, 60)}' {what}; give one pose for each time, sorted."
-        )
-
-
-def _check_unit(file: str, T: Array) -> None:
-    """Refuse metres read as millimetres, and the other way round."""
-    distance = float(np.median(np.linalg.norm(T[:, :3, 3], axis=1)))
-    if _NEAR_M <= distance <= _FAR_M:
+    wrong = np.flatnonzero(steps <= 0.0)
+    if not len(wrong):
         return
-    fault = "metres that were read as mm" if distance < _NEAR_M else "mm that were read as metres"
-    raise InputError(
-        f"{file}: the median distance to the camera is {distance * 1e3:.3g} mm, so these seem to be {fault}; "
-        "state the unit: columns such as x_mm or x_m, or `length` in the camera file."
-    )
-
-
-def _check_rate(file: str, tracks: Mapping[str, PoseTrack]) -> None:
-    """Refuse milliseconds read as seconds, and the other way round."""
-    steps = np.concatenate([np.diff(track.t) for track in tracks.values()])
-    usual = float(np.median(steps)) if len(steps) else _SLOW_S
-    if _FAST_S <= usual <= _SLOW_S:
-        return
-    raise InputError(
-        f"{file}: the median time between two frames of a track is {usual:.3g} s, so its times seem "
-        "to be in another unit; state it: a column such as t_ms or t_s, or `time` in the camera file."
-    )
+    k = int(wrong[0])
+    fault = "stands twice" if steps[k] == 0.0 else f"is {-steps[k]:.6g} s before the one above it"
+    sentence = f"a time of '{one_line(name, 60)}' {fault}; give one pose for each time, sorted"
+    if (steps < 0.0).all():
+        sentence = (
+            f"the times of '{one_line(name, 60)}' run backwards from the first row to the last; give the log in the "
+            "order in which it was recorded"
+        )
+    raise InputError(f"{rows.places[at[k + 1]]}: {sentence}.")

@@ -9,12 +9,10 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import Array, pose
-from apo_bench.recording.camera_file import CameraFile
 from apo_bench.recording.rests import RestSpan
+from apo_bench.recording.setup_files import CameraFile
 from apo_bench.recording.stays import Stay, Stays
 
-_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
-_SAME = np.eye(4)
 _EULER_AXES = tuple("".join(axes) for each in ("xyz", "XYZ") for axes in permutations(each))
 """About three different axes, fixed or moving."""
 
@@ -28,40 +26,56 @@ def mistakes(stays: Stays, models: Mapping[str, Array], camera: CameraFile) -> I
         yield sentence, _changed(stays, models, partial(_of_model, undone=undone))
     yield "its time seems to run backwards: give the log as it was recorded", reversed_in_time(stays)
     if models:
-        sentence = "the frames in the objects file seem to be those of the models in the parts: state them inverted"
-        yield sentence, _changed(stays, models, lambda T, M: T @ pose.inverse(M @ M))
+        yield (
+            "the frames in the objects file seem to be those of the models in the parts: state them inverted",
+            _changed(stays, models, lambda T, M: T @ pose.inverse(M @ M)),
+        )
 
 
 def _in_the_log(camera: CameraFile) -> Iterator[tuple[str, Callable[[Array], Array]]]:
     """What to do about each mistake in poses (4, 4) of models, and what makes the right ones of them."""
     for order, shift in (("xyzw", 1), ("wxyz", -1)):
-        sentence = f"its quaternions seem to be in the order {order}: name their columns so"
-        yield f"{sentence}, or state it in the camera file", partial(_reordered, shift=shift)
+        yield (
+            f"its quaternions seem to be in the order {order}: name their columns so, or state it in the camera file",
+            partial(_reordered, shift=shift),
+        )
     for axis in "xyz":
         flip = np.where(np.array(list("xyz1")) == axis, -1.0, 1.0)
-        sentence = f'its axes seem to be mirrored (left-handed): state `mirror = "{axis}"` in the camera file'
-        yield sentence, partial(np.multiply, np.outer(flip, flip))
-    sentence = "its poses seem to be those of the camera in the model: state `inverted = true` in the camera file"
-    yield sentence, pose.inverse
+        yield (
+            f'its axes seem to be mirrored (left-handed): state `mirror = "{axis}"` in the camera file',
+            partial(np.multiply, np.outer(flip, flip)),
+        )
+    yield (
+        "its poses seem to be those of the camera in the model: state `inverted = true` in the camera file",
+        pose.inverse,
+    )
     X = camera.T_world_camera
     if X is not None:
         # World from part was taken for X T where it is X^-1 T: so X^-2 T in place of T.
-        sentence = "the pose in the camera file seems to be that of the world in the camera: state it inverted"
-        yield sentence, partial(np.matmul, pose.inverse(X @ X))
-    sentence = "its axes seem to be those of OpenGL: turn the pose of the camera by 180 deg about x"
-    yield sentence, partial(np.matmul, _OPENGL)
+        yield (
+            "the pose in the camera file seems to be that of the world in the camera: state it inverted",
+            partial(np.matmul, pose.inverse(X @ X)),
+        )
+    yield (
+        "its axes seem to be those of OpenGL: turn the pose of the camera by 180 deg about x",
+        partial(np.matmul, np.diag([1.0, -1.0, -1.0, 1.0])),
+    )
     for factor in (10.0, 0.1, 1e3, 1e-3):
         times = f"{factor:g} times" if factor > 1.0 else f"1/{1.0 / factor:g} of"
         scale = np.ones((4, 4))
         scale[:3, 3] = factor
         yield f"its lengths seem to be {times} those that were read: state their unit", partial(np.multiply, scale)
     euler = camera.conventions.euler
-    sentence = "its angles seem to be radians that were read as degrees: name their columns so, or state `angle`"
-    yield sentence, partial(_turned, change=partial(_turned_more, euler=euler))
+    yield (
+        "its angles seem to be radians that were read as degrees: name their columns so, or state `angle`",
+        partial(_turned, change=partial(_turned_more, euler=euler)),
+    )
     for order in _EULER_AXES:
         if euler and order != euler:
-            sentence = f'its Euler angles seem to be about other axes: state `euler = "{order}"` in the camera file'
-            yield sentence, partial(_turned, change=partial(_about_other_axes, stated=euler, order=order))
+            yield (
+                f'its Euler angles seem to be about other axes: state `euler = "{order}"` in the camera file',
+                partial(_turned, change=partial(_about_other_axes, stated=euler, order=order)),
+            )
 
 
 def reversed_in_time(stays: Stays) -> Stays:
@@ -81,7 +95,7 @@ def _changed(stays: Stays, models: Mapping[str, Array], change: Callable[[Array,
     """The stays of the same parts at other poses, which change says from a pose and the frame of its part, (4, 4)."""
 
     def other(part: str, rest: RestSpan) -> RestSpan:
-        return replace(rest, mean=replace(rest.mean, T=change(rest.T, models.get(part, _SAME))))
+        return replace(rest, mean=replace(rest.mean, T=change(rest.T, models.get(part, np.eye(4)))))
 
     return {
         part: tuple(replace(stay, rests=tuple(other(part, rest) for rest in stay.rests)) for stay in known)

@@ -5,8 +5,8 @@ there.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from typing import NamedTuple, final
+from operator import itemgetter
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,13 +25,9 @@ _LEAST_M = 5e-3
 _FEWEST = 4
 _SPIKE_M = 0.015
 """A frame that is so far from the median of its neighbours is wrong: no hand turns off so fast."""
-_ALIKE_DEG = 20.0
-"""Directions within this are the same."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class SeenOperation:
+class SeenOperation(NamedTuple):
     """One operation as the log shows it."""
 
     stay: Stay | None
@@ -66,10 +62,6 @@ class Approach(NamedTuple):
     off_deg: float
     """Between the two."""
 
-    @property
-    def alike(self) -> bool:
-        return self.off_deg <= _ALIKE_DEG
-
 
 def seen_operation(
     tracks: Mapping[str, PoseTrack],
@@ -99,16 +91,13 @@ def seen_operation(
     after = poses_at(stays, over)
     # What the main part did, as a displacement in the frame of the camera, takes along what stands fast in the hand.
     displacement = after[operation.main] @ pose.inverse(before[operation.main])
-    carried = {}
-    adjusted = {}
-    for part in stays:
-        if part == operation.main:
-            continue
-        twist = pose.log(pose.inverse(before[part]) @ after[part])
-        if part in operation.carries:
-            carried[part] = pose.log(pose.inverse(displacement @ before[part]) @ after[part])
-        elif np.abs(twist).max() > 0.0:
-            adjusted[part] = twist
+    twists = {
+        part: pose.log(pose.inverse(displacement @ T if part in operation.carries else T) @ after[part])
+        for part, T in before.items()
+        if part != operation.main
+    }
+    carried = {part: twist for part, twist in twists.items() if part in operation.carries}
+    adjusted = {part: twist for part, twist in twists.items() if part not in carried and twist.any()}
     return SeenOperation(stay, rest, path, carried, adjusted)
 
 
@@ -118,17 +107,15 @@ def approaches(scenario: Scenario, operations: Sequence[SeenOperation], T_world_
         if operation.path is None or operation.rest is None:
             continue
         end = last_straight(operation.path, T_world_camera @ operation.rest.T)
-        if end is None:
-            yield Approach(k, None, "", 0.0)
-            continue
         arrival = nominal.after
         ways: dict[str, Array] = {macro.name: arrival.own(macro.direction) for macro in arrival.macros}
         ways.setdefault("put down", arrival.line.direction)
-        angles = {
-            name: float(np.degrees(np.arccos(np.clip(end.direction @ way, -1.0, 1.0)))) for name, way in ways.items()
-        }
-        nearest = min(angles, key=lambda name: angles[name])
-        yield Approach(k, end, nearest, angles[nearest])
+        cosine, macro = max(
+            ((float(end.direction @ way), name) for name, way in ways.items() if end),
+            default=(1.0, ""),
+            key=itemgetter(0),
+        )
+        yield Approach(k, end, macro, float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))))
 
 
 def last_straight(path: PoseTrack, goal: Array) -> StraightEnd | None:
@@ -147,23 +134,22 @@ def last_straight(path: PoseTrack, goal: Array) -> StraightEnd | None:
     # are hardly anything.
     jerks = np.diff(points, 3, axis=0)
     noise = max(2e-4, 1.4826 * float(np.median(np.abs(jerks))) / np.sqrt(20.0)) if len(jerks) else 2e-4
-    goal_point = np.zeros(3)
     longest = None
     for first in range(len(points) - _FEWEST, -1, -1):
         piece = points[first:]
-        away = np.linalg.norm(piece[:1] - goal_point)
-        # The line of least squares through the piece and the goal: the first right singular vector about their middle.
-        centre = piece.mean(axis=0)
-        _, _, Vt = np.linalg.svd(np.concatenate([piece, goal_point[None]]) - centre, full_matrices=False)
-        off = np.linalg.norm((piece - centre) - np.outer((piece - centre) @ Vt[0], Vt[0]), axis=1)
+        away = np.linalg.norm(piece[0])
+        # The line of least squares through the piece and the goal, which is the origin: the first right singular vector
+        # about the middle of the piece.
+        centred = piece - piece.mean(axis=0)
+        _, _, (line, *_) = np.linalg.svd(np.vstack([centred, -piece.mean(axis=0)]), full_matrices=False)
+        off = np.linalg.norm(centred - np.outer(centred @ line, line), axis=1)
         # It bends where the 90 % quantile of the distances is too large, or the point that is farthest from the goal.
         if away > _LEAST_M and (
             np.sort(off)[int(0.9 * (len(off) - 1))] > _STRAIGHT * noise or off[0] > 2.0 * _STRAIGHT * noise
         ):
             break
         if away > max(_LEAST_M, 3.0 * noise):
-            way = goal_point - piece[0]
-            longest = StraightEnd(Vt[0] if Vt[0] @ way > 0.0 else -Vt[0], float(away))
+            longest = StraightEnd(line if line @ piece[0] < 0.0 else -line, float(away))
     return longest
 
 

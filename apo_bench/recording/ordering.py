@@ -4,18 +4,16 @@ The last operation that moves a part ends with its last stay. Before, a hand may
 choices in the order of the operations, the one is taken whose stays are long and whose contacts are nearly closed.
 """
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from functools import cache
-from typing import NamedTuple, final
+from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Poses
+from apo_bench.assembly import Assembly, Contact, Poses, height, measure_round
 from apo_bench.errors import InputError
-from apo_bench.geometry import Array
-from apo_bench.recording.contact_fit import contact_fit
-from apo_bench.recording.stays import Stay, poses_at
+from apo_bench.geometry import Array, RoundFace, beside, face_area
+from apo_bench.recording.stays import Stay, Stays, poses_at
 
 _LONG_S = 1.0
 _WIDE_MM = 50.0
@@ -37,27 +35,56 @@ class Stated(NamedTuple):
     """Operations that the log does not show, counted from 0."""
 
 
-_Choice = tuple[int | None, ...]
-"""The number of the stay of each of the first operations; None of one that was not seen."""
+Chosen = tuple[Stay | None, ...]
+"""The stay with which each of the first operations ends; None of one that was not seen."""
 
 
 class NoOrder(InputError):
     """The moves of a log are not those of the scenario."""
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Order:
-    """The stay with which each operation ends; None of one that was not seen."""
+class ContactFit(NamedTuple):
+    """The worst of some contacts."""
 
-    stays: tuple[Stay | None, ...]
-    rival: tuple[Stay | None, ...] | None
+    gap_m: float
+    """From the middle of the smaller face to the plane of the other one and from beside it to it, or between axes."""
+    angle_rad: float
+    """Between the normal of one and the opposite of the other, or between axes."""
+
+    @property
+    def wrong_mm(self) -> float:
+        """A degree counts like a millimetre."""
+        return 1e3 * self.gap_m + float(np.degrees(self.angle_rad))
+
+
+def contact_fit(assembly: Assembly, k: int, poses: Poses) -> ContactFit:
+    """How far the contacts that operation k makes are open, if it ended with these poses, world, [m]."""
+    fits = [ContactFit(0.0, 0.0), *(_fit(assembly, contact, poses) for contact in assembly.operations[k].contacts)]
+    return ContactFit(max(fit.gap_m for fit in fits), max(fit.angle_rad for fit in fits))
+
+
+def _fit(assembly: Assembly, contact: Contact, poses: Poses) -> ContactFit:
+    (a, T_a), (b, T_b) = ((assembly.face_of(of), poses[of.part]) for of in contact)
+    if isinstance(a, RoundFace) or isinstance(b, RoundFace):
+        measured = measure_round(a, T_a, b, T_b)
+        return ContactFit(abs(measured.gap_m), measured.angle_rad)
+    # The middle of the smaller face is held against the larger one: how high above its plane, how far beside it.
+    if face_area(a) > face_area(b):
+        (a, T_a), (b, T_b) = (b, T_b), (a, T_a)
+    cosine = float((T_a[:3, :3] @ a.normal) @ (T_b[:3, :3] @ b.normal))
+    apart = float(np.hypot(height(a, T_a, b, T_b), beside(a, T_a, b, T_b)))
+    return ContactFit(apart, float(np.arccos(np.clip(-cosine, -1.0, 1.0))))
+
+
+class Order(NamedTuple):
+    """What ends which operation."""
+
+    stays: Chosen
+    rival: Chosen | None
     """Another choice that is nearly as good."""
 
 
-def order_of(
-    assembly: Assembly, stays: Mapping[str, Sequence[Stay]], start: Poses, T_world_camera: Array, unseen: Sequence[int]
-) -> Order:
+def order_of(assembly: Assembly, stays: Stays, start: Poses, T_world_camera: Array, unseen: Sequence[int]) -> Order:
     """The best choice.
 
     Args:
@@ -71,23 +98,26 @@ def order_of(
     last = {operation.main: k for k, operation in enumerate(assembly.operations) if k not in unseen}
 
     @cache
-    def worth(k: int, i: int) -> float:
-        stay = stays[assembly.operations[k].main][i]
+    def worth(k: int, stay: Stay) -> float:
+        known = stays[stay.part]
         wrong_mm = contact_fit(assembly, k, world_poses(stays, stay.ends, start, T_world_camera)).wrong_mm
-        part = assembly.operations[k].main
-        carried_on = any(part in other.carries for other in assembly.operations[k + 1 :])
-        left = 0 if carried_on or last[part] != k else len(stays[part]) - 1 - i
+        carried_on = any(stay.part in other.carries for other in assembly.operations[k + 1 :])
+        left = 0 if carried_on or last[stay.part] != k else len(known) - 1 - known.index(stay)
         return min(stay.seconds, _LONG_S) - min(wrong_mm, _WIDE_MM) / 10.0 - _LEFT_OVER * left
 
     best = _choices(assembly, stays, worth, unseen)
     if not best:
-        raise NoOrder(_no_order(assembly, stays))
-    picked = [_picked(assembly, stays, choice) for _, choice in best]
+        raise NoOrder(
+            f"the moves of the log ({moves_text(stays)}) are not the operations of the scenario "
+            f"({', '.join(operation.main for operation in assembly.operations)}); check the ids in the objects file "
+            "and that the log begins before the first part is taken, or state --ends, or --unseen for operations that "
+            "the log does not show."
+        )
     close = len(best) > 1 and best[0][0] - best[1][0] < _CLOSE
-    return Order(picked[0], picked[1] if close else None)
+    return Order(best[0][1], best[1][1] if close else None)
 
 
-def stated_order(assembly: Assembly, stays: Mapping[str, Sequence[Stay]], ends: Sequence[float]) -> Order:
+def stated_order(assembly: Assembly, stays: Stays, ends: Sequence[float]) -> Order:
     """The stays at times that a person stated, one for each operation.
 
     Raises:
@@ -101,18 +131,20 @@ def stated_order(assembly: Assembly, stays: Mapping[str, Sequence[Stay]], ends: 
         if there is None:
             raise InputError(
                 f"--ends: '{operation.main}' does not rest at {t:g} s, where operation {k + 1} is to have ended; "
-                f"it rests {_spans(stays[operation.main])}."
+                "it rests "
+                + (", ".join(f"{stay.begins:.2f} to {stay.ends:.2f}" for stay in stays[operation.main][:12]) or "never")
+                + "."
             )
         chosen.append(there)
     return Order(tuple(chosen), None)
 
 
-def world_poses(stays: Mapping[str, Sequence[Stay]], t: float, start: Poses, T_world_camera: Array) -> Poses:
+def world_poses(stays: Stays, t: float, start: Poses, T_world_camera: Array) -> Poses:
     """Where every part is at a time, in the world."""
     return {**start, **{part: T_world_camera @ T for part, T in poses_at(stays, t).items()}}
 
 
-def moves_text(stays: Mapping[str, Sequence[Stay]]) -> str:
+def moves_text(stays: Stays) -> str:
     """What moved when, in a sentence."""
     arrivals = sorted((stay.begins, part) for part, known in stays.items() for stay in known[1:])
     first_few = [f"{part} {t:.1f} s" for t, part in arrivals[:12]]
@@ -120,41 +152,30 @@ def moves_text(stays: Mapping[str, Sequence[Stay]]) -> str:
 
 
 def _choices(
-    assembly: Assembly,
-    stays: Mapping[str, Sequence[Stay]],
-    worth: Callable[[int, int], float],
-    unseen: Sequence[int],
-) -> list[tuple[float, _Choice]]:
+    assembly: Assembly, stays: Stays, worth: Callable[[int, Stay], float], unseen: Sequence[int]
+) -> list[tuple[float, Chosen]]:
     """The two best choices of stays whose arrivals have the order of the operations, with their worth, the best first.
 
     Dynamic programming over operations: what follows depends on a choice so far by its last stay only, but for what was
     carried; so of the choices that end with the same stay the two best are followed.
     """
-    followed: list[tuple[float, float, _Choice]] = [(0.0, -np.inf, ())]
+    followed: list[tuple[float, float, Chosen]] = [(0.0, -np.inf, ())]
     for k, operation in enumerate(assembly.operations):
         if k in unseen:
             followed = [(value, t, (*choice, None)) for value, t, choice in followed]
             continue
-        by_end: dict[int, list[tuple[float, float, _Choice]]] = {}
+        by_end: dict[Stay, list[tuple[float, float, Chosen]]] = {}
         for value, t, choice in followed:
-            for i, stay in enumerate(stays[operation.main]):
-                moved_on = _between(assembly, stays, choice, i) if i and stay.begins > t else None
+            for stay in stays[operation.main][1:]:
+                moved_on = _between(assembly, stays, choice, stay) if stay.begins > t else None
                 if moved_on is not None:
-                    longer = (value + worth(k, i) - _LEFT_OVER * moved_on, stay.begins, (*choice, i))
-                    by_end.setdefault(i, []).append(longer)
+                    longer = (value + worth(k, stay) - _LEFT_OVER * moved_on, stay.begins, (*choice, stay))
+                    by_end.setdefault(stay, []).append(longer)
         followed = [each for ending in by_end.values() for each in sorted(ending, key=lambda x: -x[0])[:2]]
     return sorted(((value, choice) for value, _, choice in followed), key=lambda x: -x[0])[:2]
 
 
-def _picked(assembly: Assembly, stays: Mapping[str, Sequence[Stay]], choice: _Choice) -> tuple[Stay | None, ...]:
-    """The stays that a choice numbers, of the first operations."""
-    return tuple(
-        None if i is None else stays[operation.main][i]
-        for operation, i in zip(assembly.operations, choice, strict=False)
-    )
-
-
-def taken(assembly: Assembly, stays: Mapping[str, Sequence[Stay]], before: Sequence[Stay | None], stay: Stay) -> float:
+def taken(assembly: Assembly, stays: Stays, before: Sequence[Stay | None], stay: Stay) -> float:
     """When the part of an operation was taken: at the end of where an earlier operation had left it, else of its start.
 
     Args:
@@ -162,18 +183,16 @@ def taken(assembly: Assembly, stays: Mapping[str, Sequence[Stay]], before: Seque
         stay: Where it was put.
     """
     part = stay.part
-    own = [k for k, earlier in enumerate(before) if earlier is not None and assembly.operations[k].main == part]
-    since = own[-1] + 1 if own else 0
+    own = [(k, earlier) for k, earlier in enumerate(before) if earlier is not None and earlier.part == part]
+    since = own[-1][0] + 1 if own else 0
     carried = any(part in operation.carries for operation in assembly.operations[since : len(before)])
     if own and not carried:
-        left = before[own[-1]]
-        assert left is not None
-        return left.ends
+        return own[-1][1].ends
     earlier = [other for other in stays[part] if other.begins < stay.begins]
     return earlier[-1 if carried else 0].ends if earlier else 0.0
 
 
-def quiet(assembly: Assembly, stays: Mapping[str, Sequence[Stay]], chosen: Sequence[Stay | None], k: int) -> float:
+def quiet(assembly: Assembly, stays: Stays, chosen: Sequence[Stay | None], k: int) -> float:
     """When operation k, which was seen, was over: when the next one took its part, else the end of its stay, [s]."""
     stay = chosen[k]
     assert stay is not None
@@ -183,30 +202,15 @@ def quiet(assembly: Assembly, stays: Mapping[str, Sequence[Stay]], chosen: Seque
     return stay.ends
 
 
-def _between(assembly: Assembly, stays: Mapping[str, Sequence[Stay]], choice: _Choice, i: int) -> int | None:
-    """How often the part of the last chosen operation still moved before the next part was taken, which goes to stay i.
+def _between(assembly: Assembly, stays: Stays, before: Chosen, stay: Stay) -> int | None:
+    """How often the part of the last chosen operation still moved before the next part was taken, which goes to a stay.
 
     None if that was taken before the other was there: what is carried arrives with what carries it.
     """
-    k = len(choice)
-    before = _picked(assembly, stays, choice)
     last = before[-1] if before else None
     if last is None:
         return 0
-    t = taken(assembly, stays, before, stays[assembly.operations[k].main][i])
+    t = taken(assembly, stays, before, stay)
     if last.begins > t + _OVERLAP_S:
         return None
     return sum(last.begins < other.begins < t - _OVERLAP_S for other in stays[last.part])
-
-
-def _no_order(assembly: Assembly, stays: Mapping[str, Sequence[Stay]]) -> str:
-    wanted = ", ".join(operation.main for operation in assembly.operations)
-    return (
-        f"the moves of the log ({moves_text(stays)}) are not the operations of the scenario ({wanted}); check the ids "
-        "in the objects file and that the log begins before the first part is taken, or state --ends, or --unseen for "
-        "operations that the log does not show."
-    )
-
-
-def _spans(stays: Sequence[Stay]) -> str:
-    return ", ".join(f"{stay.begins:.2f} to {stay.ends:.2f}" for stay in stays[:12]) or "never"

@@ -5,11 +5,11 @@ a stretch of still frames is a rest. Small shifts that no such window shows, suc
 two millimetres, split a rest in two where its two sides differ by more than chance.
 """
 
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import final
+from typing import TypeVar, final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from apo_bench.geometry import Array, frozen, pose
 from apo_bench.recording.averaging import Mean, average, common_scatter, pooled_mean
@@ -36,6 +36,7 @@ _EDGE = 16.8
 """The 99 % quantile of chi-square with 6 degrees of freedom: frames at the ends of a rest that are farther off move."""
 
 
+_Item = TypeVar("_Item")
 _Span = tuple[int, int]
 """First and last frame."""
 
@@ -76,8 +77,10 @@ def rests_of(track: PoseTrack) -> tuple[RestSpan, ...]:
         a, b = _trimmed(T, *span, noise)
         if b - a + 1 >= _FEWEST and t[b] - t[a] >= 0.5 * LEAST_REST_S:
             spans += _split(T, a, b, noise)
-    merged = [(a, b) for a, b in _merged(T, spans, noise, half_window) if t[b] - t[a] >= 0.5 * LEAST_REST_S]
-    spans = [(stride * a, stride * b) for a, b in merged]
+    # Neighbouring stretches of one pose become one, unless the part went away and came back.
+    groups = grouped(spans, lambda group, span: _one_rest(T, (group[0][0], group[-1][1]), span, noise, half_window))
+    ends = [(group[0][0], group[-1][1]) for group in groups]
+    spans = [(stride * a, stride * b) for a, b in ends if t[b] - t[a] >= 0.5 * LEAST_REST_S]
     means = [average(track.T[a : b + 1]) for a, b in spans]
     common = common_scatter(means)
     return tuple(
@@ -124,35 +127,23 @@ def _still_spans(T: Array, noise: Array, m: int) -> list[_Span]:
     xi = pose.log(pose.inverse(T[m : n - m])[:, None] @ T[window])
     change = np.median(xi[:, m + 1 :], axis=1) - np.median(xi[:, :m], axis=1)
     still = np.linalg.norm(change / noise, axis=1) < _STILL * _MEDIAN / np.sqrt(m)
-    spans: list[_Span] = []
-    for a, b in _runs(still):
-        begin = a
-        if spans and begin <= spans[-1][1]:
-            # The half windows of two stretches overlap: each gets half of what they share.
-            first, last = spans.pop()
-            half = (begin + last) // 2
-            spans.append((first, half))
-            begin = half + 1
-        spans.append((begin, b + 2 * m))
-    return spans
-
-
-def _runs(flags: NDArray[np.bool_]) -> list[_Span]:
-    """First and last index of each run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(np.int8)))
-    return [(int(a), int(b) - 1) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+    # First and last index of each run; where the half windows of two overlap, each gets half of what they share.
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(np.int8)))
+    first, last = np.add(edges.reshape(-1, 2), (0, 2 * m - 1)).T
+    shared = first[1:] <= last[:-1]
+    half = (first[1:] + last[:-1]) // 2
+    last[:-1] = np.where(shared, half, last[:-1])
+    first[1:] = np.where(shared, half + 1, first[1:])
+    return list(zip(first.tolist(), last.tolist(), strict=True))
 
 
 def _trimmed(T: Array, a: int, b: int, noise: Array) -> tuple[int, int]:
     """Without frames at the ends that still move: three in a row of them belong to the rest."""
     quarter = (b - a + 1) // 4
-    core = average(T[a + quarter : b + 1 - quarter])
-    off = pose.log(pose.inverse(core.T) @ T[a : b + 1])
+    off = pose.log(pose.inverse(average(T[a + quarter : b + 1 - quarter]).T) @ T[a : b + 1])
     near = ((off / noise) ** 2).sum(axis=1) < _EDGE
-    good = np.convolve(near, np.ones(3), "valid") == 3
-    if not good.any():
-        return a + quarter, b - quarter
-    return a + int(np.argmax(good)), b - int(np.argmax(good[::-1]))
+    good = np.flatnonzero(np.convolve(near, np.ones(3), "valid") == 3)
+    return (a + int(good[0]), a + int(good[-1]) + 2) if len(good) else (a + quarter, b - quarter)
 
 
 def _split(T: Array, a: int, b: int, noise: Array) -> list[_Span]:
@@ -160,8 +151,7 @@ def _split(T: Array, a: int, b: int, noise: Array) -> list[_Span]:
     n = b - a + 1
     if n < 2 * _FEWEST:
         return [(a, b)]
-    mean = average(T[a : b + 1])
-    xi = np.clip(pose.log(pose.inverse(mean.T) @ T[a : b + 1]) / noise, -4.0, 4.0)
+    xi = np.clip(pose.log(pose.inverse(average(T[a : b + 1]).T) @ T[a : b + 1]) / noise, -4.0, 4.0)
     sums = np.cumsum(xi, axis=0)
     # With the frame before which it is cut after k of n: the squared difference of the two means in units of its
     # variance 1/k + 1/(n - k) is chi-square with 6 degrees of freedom if there is no shift.
@@ -191,15 +181,15 @@ def _alike(xi: Array) -> float:
     return (1.0 + r) / (1.0 - min(r, 0.99))
 
 
-def _merged(T: Array, spans: list[_Span], noise: Array, m: int) -> list[_Span]:
-    """Neighbouring stretches of one pose become one, unless the part went away and came back."""
-    merged: list[_Span] = []
-    for first, last in spans:
-        if merged and _one_rest(T, merged[-1], (first, last), noise, m):
-            merged[-1] = (merged[-1][0], last)
+def grouped(items: Iterable[_Item], belongs: Callable[[Sequence[_Item], _Item], bool]) -> list[list[_Item]]:
+    """Items in their order, in groups: each with those just before it, if it belongs to them."""
+    groups: list[list[_Item]] = []
+    for item in items:
+        if groups and belongs(groups[-1], item):
+            groups[-1].append(item)
         else:
-            merged.append((first, last))
-    return merged
+            groups.append([item])
+    return groups
 
 
 def _one_rest(T: Array, before: _Span, after: _Span, noise: Array, m: int) -> bool:
@@ -209,8 +199,5 @@ def _one_rest(T: Array, before: _Span, after: _Span, noise: Array, m: int) -> bo
     chi = float(((off / deviation) ** 2).sum())
     if chi > _SHIFTED and (np.abs(off[:3]).max() > _SAME_M or np.abs(off[3:]).max() > _SAME_RAD):
         return False
-    between = T[before[1] + 1 : after[0]]
-    if len(between) <= m:
-        return True
-    away = np.abs(np.median(pose.log(pose.inverse(mean.T) @ between), axis=0) / noise)
-    return bool((away < 3.0).all())
+    between = pose.log(pose.inverse(mean.T) @ T[before[1] + 1 : after[0]]) / noise
+    return len(between) <= m or bool((np.abs(np.median(between, axis=0)) < 3.0).all())

@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.geometry import Array, pose
 from apo_bench.recording.log import PoseTrack
-from apo_bench.recording.rests import RestSpan, rests_of
+from apo_bench.recording.rests import RestSpan, grouped, rests_of
 
 _ADJUSTED_M = 0.01
 _ADJUSTED_RAD = np.radians(10.0)
@@ -53,23 +53,17 @@ def all_stays(tracks: Mapping[str, PoseTrack]) -> Stays:
 
 def stays_of(part: str, rests: Sequence[RestSpan]) -> tuple[Stay, ...]:
     """The stays of a part, in order of time."""
-    groups: list[list[RestSpan]] = []
-    for rest in rests:
-        if groups and _is_adjusted(groups[-1][-1], rest):
-            groups[-1].append(rest)
-        else:
-            groups.append([rest])
+    groups = grouped(rests, lambda before, rest: _is_adjusted(before[-1], rest))
     return tuple(Stay(part, tuple(together)) for together in groups)
 
 
-def poses_at(stays: Mapping[str, Sequence[Stay]], t: float) -> Mapping[str, Array]:
+def poses_at(stays: Stays, t: float) -> Mapping[str, Array]:
     """Where every part is at a time, in the frame of the camera: of one that moves, where it was last; (4, 4), [m]."""
-    latest = {
-        part: next((stay for stay in reversed(known) if stay.begins <= t), known[0])
+    return {
+        part: next((stay for stay in reversed(known) if stay.begins <= t), known[0]).at(t).T
         for part, known in stays.items()
         if known
     }
-    return {part: stay.at(t).T for part, stay in latest.items()}
 
 
 def _is_adjusted(before: RestSpan, after: RestSpan) -> bool:

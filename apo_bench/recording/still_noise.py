@@ -28,7 +28,9 @@ def still_residuals(log: Log) -> Residuals:
     for part, track in enumerate(log.tracks.values()):
         for rest in rests_of(track):
             seen = _errors(camera, track, rest)
-            missing = _missing(track.t[rest.first : rest.last + 1])
+            # Frames that are missing between others, by the usual time between two.
+            steps = np.diff(track.t[rest.first : rest.last + 1])
+            missing = int(np.sum(np.round(steps[steps > _MOST_GAP * np.median(steps)] / np.median(steps)) - 1.0))
             errors += [seen, np.full((missing, 6), np.nan)]
             distance += [1e3 * float(np.linalg.norm(rest.T[:3, 3]))] * len(seen)
             parts += [part] * (len(seen) + missing)
@@ -59,9 +61,3 @@ def _errors(camera: Camera, track: PoseTrack, rest: RestSpan) -> Array:
     shift = (T[:, :3, 3] - rest.T[:3, 3]) @ F
     turn = pose.log(pose.inverse(rest.T) @ T)[:, 3:] @ rest.T[:3, :3].T @ F
     return np.concatenate([shift, turn], axis=1) * np.sqrt(n / max(n - 1.0, 1.0))
-
-
-def _missing(t: Array) -> int:
-    """How many frames are missing between others, by the usual time between two."""
-    steps = np.diff(t) / float(np.median(np.diff(t)))
-    return int(np.sum(np.round(steps[steps > _MOST_GAP]) - 1.0))

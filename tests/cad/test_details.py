@@ -16,7 +16,7 @@ from apo_bench.cad.import_report import import_lines, unit_line
 from apo_bench.cad.importing import _why_not, import_part, raw_solids
 from apo_bench.cad.pieces.corners import corners_of, without_near
 from apo_bench.cad.step.from_brep import raw_of
-from apo_bench.cad.step.open_cascade import BrepFace, BrepSolid
+from apo_bench.cad.step.surfaces import BrepFace, BrepSolid
 from apo_bench.geometry import Face
 from apo_bench.parts import load_part
 from tests.cad.made import block, disc, prism, rod, write_stl, write_triangles

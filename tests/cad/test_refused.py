@@ -18,7 +18,7 @@ from scipy.spatial import ConvexHull
 from apo_bench import InputError
 from apo_bench.cad.importing import import_part, raw_solids
 from apo_bench.cad.step.from_brep import raw_of
-from apo_bench.cad.step.open_cascade import BrepFace, BrepSolid
+from apo_bench.cad.step.surfaces import BrepFace, BrepSolid
 from apo_bench.cad.time_limit import time_limit
 from apo_bench.cli.app import main
 from tests.cad.made import block, rod, write_stl, write_triangles

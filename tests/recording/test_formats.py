@@ -12,9 +12,8 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.geometry import pose
-from apo_bench.recording.camera_file import Conventions, read_camera
 from apo_bench.recording.formats import FORMATS, read_log
-from apo_bench.recording.objects_file import part_tracks, read_objects
+from apo_bench.recording.setup_files import Conventions, part_tracks, read_camera, read_objects
 from benchmarks.recording_forms import FORMS, Tracked
 from tests.recorded import CAMERA, RATE_HZ, motion
 

@@ -7,9 +7,9 @@ import pytest
 
 from apo_bench import load_scenario
 from apo_bench.geometry import Array, pose
+from apo_bench.recording.arranging import CameraPose, solve_camera
 from apo_bench.recording.averaging import Mean
-from apo_bench.recording.camera_pose import CameraPose, solve_camera
-from apo_bench.recording.contact_fit import contact_fit
+from apo_bench.recording.ordering import contact_fit
 from apo_bench.scenario.layout import layout_at
 from tests.recorded import CAMERA
 

@@ -42,8 +42,7 @@ def facets_of(mesh: Mesh) -> Facets:
     i, k = mesh.neighbours.T
     # Small angles from |n_i x n_k|, as rounding makes arccos (n_i . n_k) coarse near 1.
     angle = np.arccos(np.clip((normals[i] * normals[k]).sum(axis=1), -1.0, 1.0))
-    fine = np.linalg.norm(np.cross(normals[i], normals[k]), axis=1)
-    angle = np.where(angle < 0.1, fine, angle)
+    angle = np.where(angle < 0.1, np.linalg.norm(np.cross(normals[i], normals[k]), axis=1), angle)
     # Two triangles are of one piece if they look the same way, or nearly so and neither leaves the plane of the other.
     off = np.maximum(_height(mesh, normals, i, k), _height(mesh, normals, k, i))
     flat = (angle < _SAME_RAD) | ((angle < _NEAR_RAD) & (off < FLAT * mesh.extent))

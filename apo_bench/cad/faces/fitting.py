@@ -60,16 +60,20 @@ def circle_through(points: Array, axis: Array) -> Round | None:
     solution, _, rank, _ = np.linalg.lstsq(A, (u * u + v * v) / size**2, rcond=1e-9)
     if rank < 3 or not np.isfinite(solution).all():
         return None
-    a = solution[0] / 2.0
-    b = solution[1] / 2.0
+    a, b = solution[:2] / 2.0
     radius = float(np.sqrt(max(solution[2] + a * a + b * b, 0.0)))
     return Round(middle + size * (a * x + b * y), axis, size * radius, 0.0)
 
 
-def refined(start: Round, points: Array, cone: bool) -> Round | None:
-    """The nearest to points in the sense of least squares: distances square to the wall, Levenberg-Marquardt."""
+def refined(start: Round | None, points: Array, cone: bool) -> Round | None:
+    """The nearest to points in the sense of least squares: distances square to the wall, Levenberg-Marquardt.
+
+    None: there is no start, there are too few points, or nothing fits.
+    """
     from scipy.optimize import least_squares
 
+    if start is None:
+        return None
     points = points[:: -(-len(points) // _MOST_POINTS)]
     middle = points.mean(axis=0)
     height, distance, _ = start.polar(points)
@@ -89,9 +93,7 @@ def refined(start: Round, points: Array, cone: bool) -> Round | None:
         return Round(at + size * (p[2] * x + p[3] * y), axis, size * p[4], p[5] if cone else 0.0)
 
     def off(p: Array) -> Array:
-        each = moved(p)
-        h, d, _ = each.polar(points)
-        return np.asarray((d - each.radius - each.slope * h) / size / np.hypot(1.0, each.slope))
+        return np.asarray(moved(p).off(points) / size)
 
     first = [0.0, 0.0, 0.0, 0.0, radius / size, *([slope] if cone else [])]
     if len(points) < len(first):
@@ -116,8 +118,7 @@ def on_it(mesh: Mesh, facets: Facets, among: Any, wall: Round, tolerance: float)
     starts = np.cumsum([0, *counts[:-1]])
     rows = np.repeat(first - starts, counts) + np.arange(counts.sum())
     owner = np.repeat(np.arange(len(among)), counts)
-    points = mesh.corners[facets.corner[rows]]
-    height, distance, out = wall.polar(points)
+    height, distance, out = wall.polar(mesh.corners[facets.corner[rows]])
     _, _, outward = wall.polar(facets.centers[among])
     facing = (facets.normals[among] * wall.normals(outward)).sum(axis=1)
     # The angle of each corner about the axis from the middle of its piece; a corner on the axis has none.
@@ -182,8 +183,7 @@ def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: f
     if slope:
         radii = [0.0 if r < ON_WALL * mesh.extent else r for r in radii]
     # How far corners of the border are from the nearer end: of a square wall all of them are on one of the two.
-    on_border = np.isin(every, border_of(mesh, triangles))
-    ends = np.minimum(height - low, high - height)[on_border]
+    ends = np.minimum(height - low, high - height)[np.isin(every, border_of(mesh, triangles))]
     off = (distance - radii[0] - slope * (height - low)) / np.hypot(1.0, slope)
     on = off > -ON_WALL * mesh.extent
     return Region(

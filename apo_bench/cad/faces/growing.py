@@ -1,6 +1,6 @@
 """Cylinders and cones in a mesh: grown from smooth parts of its surface, or from single edges in them."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,7 +37,10 @@ def walls_of(mesh: Mesh, facets: Facets) -> list[FoundWall]:
             continue
         inside = np.isin(facets.smooth[:, 0], group)
         # Most smooth surfaces are one wall, such as a hole: then one fit to all of it is enough.
-        whole = _grown(mesh, facets, group, inside, _whole_starts(mesh, facets, group, inside))
+        points = mesh.corners[np.unique(facets.along[inside])]
+        axes = ((axis_of(facets.normals[group], cone), cone) for cone in (False, True))
+        starts = ((refined(circle_through(points, axis), points, cone), cone) for axis, cone in axes)
+        whole = _grown(mesh, facets, group, inside, starts)
         work -= 2 * len(group)
         if whole is not None and len(whole.members) == len(group):
             walls.append(whole)
@@ -50,7 +53,10 @@ def _add_from_edges(mesh: Mesh, facets: Facets, group: Any, inside: Any, walls: 
     """Look for round surfaces in part of a smooth surface, the longest edges first; returns what work is left."""
     taken = np.zeros(len(facets.areas), dtype=bool)
     rows = np.flatnonzero(inside)
-    around = _edges_of_pieces(facets, rows)
+    around: dict[int, list[int]] = {}  # the smooth edges of each flat piece
+    for row, pieces in zip(rows.tolist(), facets.smooth[rows].tolist(), strict=True):
+        for piece in pieces:
+            around.setdefault(piece, []).append(row)
     ends = mesh.corners[facets.along[rows]]
     length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
     failed = 0
@@ -80,24 +86,6 @@ def _add_from_edges(mesh: Mesh, facets: Facets, group: Any, inside: Any, walls: 
     return work
 
 
-def _edges_of_pieces(facets: Facets, rows: Any) -> dict[int, list[int]]:
-    """The smooth edges of each flat piece."""
-    edges: dict[int, list[int]] = {}
-    for row in rows.tolist():
-        for piece in facets.smooth[row].tolist():
-            edges.setdefault(piece, []).append(row)
-    return edges
-
-
-def _whole_starts(mesh: Mesh, facets: Facets, group: Any, inside: Any) -> Iterator[tuple[Round | None, bool]]:
-    """What all of a smooth surface may be: a cylinder, a cone."""
-    points = mesh.corners[np.unique(facets.along[inside])]
-    for cone in (False, True):
-        first = circle_through(points, axis_of(facets.normals[group], cone))
-        if first is not None:
-            yield refined(first, points, cone), cone
-
-
 def _seed_cylinder(
     mesh: Mesh, facets: Facets, row: int, around: dict[int, list[int]], taken: Any
 ) -> tuple[Round | None, Any]:
@@ -106,16 +94,13 @@ def _seed_cylinder(
     length = np.linalg.norm(b - a)
     rows = np.array([r for f in facets.smooth[row].tolist() for r in around[f] if not taken[facets.smooth[r]].any()])
     near = np.unique(facets.smooth[rows])
-    if length < 1e-9 * mesh.extent:
-        return None, near
     # Edges of a cylinder's strips are parallel to its axis, so all ends of those beside this one lie on the cylinder.
-    axis = (b - a) / length
+    axis = (b - a) / max(length, 1e-300)
     ends = mesh.corners[facets.along[rows]]
     along = ends[:, 1] - ends[:, 0]
     straight = np.linalg.norm(np.cross(along, axis), axis=1) < 0.02 * np.linalg.norm(along, axis=1)
-    if straight.sum() < 2:
-        return None, near
-    return circle_through(ends[straight].reshape(-1, 3), axis), near
+    are_enough = length >= 1e-9 * mesh.extent and straight.sum() >= 2
+    return circle_through(ends[straight].reshape(-1, 3), axis) if are_enough else None, near
 
 
 def _seed_cone(
@@ -138,8 +123,7 @@ def _seed_cone(
     if len(members) < 5:
         return None, near
     points = mesh.corners[np.unique(facets.along[sorted(rows)])]
-    first = circle_through(points, axis_of(facets.normals[near], True))
-    return (None if first is None else refined(first, points, True)), near
+    return refined(circle_through(points, axis_of(facets.normals[near], True)), points, True), near
 
 
 def _grown(
@@ -205,5 +189,4 @@ def smooth_groups(facets: Facets, members: Any) -> list[Any]:
 
 def _smoothly_connected(smooth: Any, members: Any) -> tuple[int, Any]:
     """How many groups members, ascending, are by the pairs among them, and the group of each."""
-    pairs = smooth[np.isin(smooth, members).all(axis=1)]
-    return connected(np.searchsorted(members, pairs), len(members))
+    return connected(np.searchsorted(members, smooth[np.isin(smooth, members).all(axis=1)]), len(members))

@@ -43,17 +43,17 @@ def regions_of(mesh: Mesh) -> tuple[tuple[Region, ...], Any]:
     """The faces of a closed mesh in an order that its triangles give, and the flat piece of each triangle."""
     facets = facets_of(mesh)
     walls = _without_bands(mesh, facets, walls_of(mesh, facets))
-    regions = []
-    for wall in walls:
-        triangles = np.flatnonzero(np.isin(facets.of, wall.members))
-        regions.append(round_region(mesh, triangles, wall.surface, wall.hole, _turn(facets, wall)))
+    triangles = [np.flatnonzero(np.isin(facets.of, wall.members)) for wall in walls]
+    regions = [
+        round_region(mesh, mine, wall.surface, wall.hole, _turn(facets, wall))
+        for wall, mine in zip(walls, triangles, strict=True)
+    ]
     left = _wall_of_pieces(facets, walls) < 0
     thin = facets.areas < (FLAT * mesh.extent) ** 2
     free = _free(facets, left) | (thin & left)
-    for f in np.flatnonzero(left & ~free):
-        regions.append(fitted_plane(mesh, np.flatnonzero(facets.of == f)))
-    for group in smooth_groups(facets, np.flatnonzero(free)):
-        regions.append(Region("other", np.flatnonzero(np.isin(facets.of, group))))
+    regions += [fitted_plane(mesh, np.flatnonzero(facets.of == f)) for f in np.flatnonzero(left & ~free)]
+    groups = smooth_groups(facets, np.flatnonzero(free))
+    regions += [Region("other", np.flatnonzero(np.isin(facets.of, group))) for group in groups]
     return tuple(sorted(regions, key=lambda region: int(region.triangles[0]))), facets.of
 
 
@@ -74,8 +74,7 @@ def _free(facets: Facets, left: Any) -> Any:
     owner, other = np.concatenate([pairs, pairs[:, ::-1]]).T
     order = np.lexsort((facets.areas[other], owner))
     pieces, first, count = np.unique(owner[order], return_index=True, return_counts=True)
-    beside = facets.areas[other[order]]
-    free[pieces] = facets.areas[pieces] < _LARGER * beside[first + 3 * count // 4]
+    free[pieces] = facets.areas[pieces] < _LARGER * facets.areas[other[order]][first + 3 * count // 4]
     return free
 
 
@@ -138,7 +137,6 @@ def _turn(facets: Facets, wall: FoundWall) -> float:
     x, y = square_to(wall.surface.axis)
     _, _, out = wall.surface.polar(facets.centers[wall.members])
     middle = np.sort(np.arctan2(out @ y, out @ x))
-    gaps = np.diff(np.append(middle, middle[0] + WHOLE_TURN))
-    widest = float(gaps.max())
+    widest = float(np.diff(middle, append=middle[0] + WHOLE_TURN).max())
     strip = float(wall.spans.max())
     return WHOLE_TURN if widest < _GAP * strip else WHOLE_TURN - widest + strip

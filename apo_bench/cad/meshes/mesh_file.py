@@ -63,21 +63,21 @@ def read_meshes(path: Path, unit: str | None = None) -> tuple[CadFile, list[tupl
     if unit is not None and unit not in _UNITS_MM:
         raise InputError(f"--unit {unit} was given; {', '.join(_UNITS_MM)} are allowed.")
     raw = read_cad_bytes(path, suffix[1:].upper())
-    stated: str | None = None
-    if suffix == ".3mf":
-        stated, meshes = read_3mf(path, raw, MOST_CAD_TRIANGLES)
-    else:
-        meshes = [(path.stem, _by_trimesh(path, raw, suffix[1:]))]
+    stated, meshes = (
+        read_3mf(path, raw, MOST_CAD_TRIANGLES)
+        if suffix == ".3mf"
+        else (None, [(path.stem, _by_trimesh(path, raw, suffix[1:]))])
+    )
     count = sum(len(mesh.triangles) for _, mesh in meshes)
-    if not count:
-        raise InputError(f"{path}: the file holds no triangles; save the part as a mesh.")
-    if count > MOST_CAD_TRIANGLES:
-        raise InputError(
-            f"{path}: the file has {count:,} triangles; {MOST_CAD_TRIANGLES:,} are the most, so save it with a coarser "
-            "one."
-        )
-    if not all(np.isfinite(mesh.corners).all() for _, mesh in meshes):
-        raise InputError(f"{path}: a corner is no finite number; save the part again.")
+    is_finite = all(np.isfinite(mesh.corners).all() for _, mesh in meshes)
+    most = f"{MOST_CAD_TRIANGLES:,} are the most, so save it with a coarser one"
+    for is_wrong, sentence in (
+        (count == 0, "the file holds no triangles; save the part as a mesh"),
+        (count > MOST_CAD_TRIANGLES, f"the file has {count:,} triangles; {most}"),
+        (not is_finite, "a corner is no finite number; save the part again"),
+    ):
+        if is_wrong:
+            raise InputError(f"{path}: {sentence}.")
     size = np.ptp(np.concatenate([mesh.corners[mesh.triangles.ravel()] for _, mesh in meshes]), axis=0).max()
     file = _with_unit(path, unit, stated, float(size))
     scale = _UNITS_MM[file.unit]
@@ -114,12 +114,13 @@ def _by_trimesh(path: Path, raw: bytes, kind: str) -> Mesh:
     try:
         options: dict[str, Any] = {"skip_materials": True} if kind == "obj" else {}
         mesh: Any = trimesh.load(BytesIO(raw), file_type=kind, force="mesh", process=False, **options)
-        corners = np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3)
-        triangles = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
+        return Mesh(
+            np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3),
+            np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3),
+        )
     except MemoryError:
         raise
     except Exception as error:
         raise InputError(f"{path}: this is no {kind.upper()} file that can be read; save the part again.") from error
     finally:
         log.setLevel(before)
-    return Mesh(corners, triangles)

@@ -1,4 +1,4 @@
-"""Meshes become closed solids that are the right way round: corners joined, shells told apart."""
+"""Meshes become closed solids that are the right way round: corners joined, shells told apart, none crosses itself."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.meshes.crossing import crossing
 from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, SolidPlace, connected, put_together
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
@@ -39,16 +38,16 @@ def closed_solids(path: Path, name: str, mesh: Mesh) -> Iterator[RawSolid]:
 def _joined(mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
     """With corners in one place as one, and without triangles that are none then."""
     corners, index = np.unique(mesh.corners, axis=0, return_inverse=True)
-    exact = without_slivers(corners, index.ravel()[mesh.triangles])
+    exact = _without_slivers(corners, index.ravel()[mesh.triangles])
     if _is_closed(exact):
         return exact, ()
     grid = max(_SAME_CORNER * mesh.extent, 1e-9)
     rounded, index = np.unique(np.round(mesh.corners / grid), axis=0, return_inverse=True)
-    near = without_slivers(rounded * grid, index.ravel()[mesh.triangles])
+    near = _without_slivers(rounded * grid, index.ravel()[mesh.triangles])
     return (near, (f"corners within {grid:.1g} mm were joined",)) if _is_closed(near) else (exact, ())
 
 
-def without_slivers(corners: Array, triangles: Any) -> Mesh:
+def _without_slivers(corners: Array, triangles: Any) -> Mesh:
     """A mesh without triangles that have one corner twice."""
     return Mesh(corners, triangles[has_three(triangles)])
 
@@ -93,10 +92,8 @@ def check_uncrossed(path: Path, mesh: Mesh, off: Array | None = None) -> None:
     """
     where = crossing(mesh, off)
     if where is not None:
-        x, y, z = where
-        raise InputError(
-            f"{path}: the surface crosses itself at ({x:.4g}, {y:.4g}, {z:.4g}) mm; mend it where it was drawn."
-        )
+        at = ", ".join(f"{x:.4g}" for x in where)
+        raise InputError(f"{path}: the surface crosses itself at ({at}) mm; mend it where it was drawn.")
 
 
 def _alike(path: Path, mesh: Mesh) -> Mesh:
@@ -110,8 +107,7 @@ def _alike(path: Path, mesh: Mesh) -> Mesh:
     # Each triangle twice, as it is (t) and turned (t + count): what looks the same way hangs together. A shell is two
     # groups then, one the other one turned; they are one group if the surface has one side only.
     other = np.where(opposed, k, k + count)
-    turned_other = np.where(opposed, k + count, k)
-    pairs = np.column_stack([np.append(i, i + count), np.append(other, turned_other)])
+    pairs = np.column_stack([np.append(i, i + count), np.append(other, np.where(opposed, k + count, k))])
     _, group = connected(pairs, 2 * count)
     as_is, turned = group.reshape(2, count)
     if (as_is == turned).any():
@@ -127,18 +123,14 @@ def _apart(path: Path, mesh: Mesh) -> list[tuple[Mesh, bool]]:
         raise InputError(f"{path}: the file holds {count} shells; {_MOST_SHELLS} are the most, so split it.")
     shells = [mesh.part(np.flatnonzero(owner == shell)) for shell in range(count)]
     around = [{i for i, outer in enumerate(shells) if i != k and _contains(outer, shells[k])} for k in range(count)]
+    # In an even number of others a shell is the outside of a solid, and looks outwards; those just inside of it are its
+    # cavities, in an odd number.
+    right = [s if (s.volume > 0.0) == (len(of) % 2 == 0) else s.flipped() for s, of in zip(shells, around, strict=True)]
     solids = []
-    for k, shell in enumerate(shells):
-        # In an even number of others a shell is the outside of a solid; those just inside of it are its cavities.
-        if len(around[k]) % 2 == 0:
-            cavities = [m for m in range(count) if k in around[m] and len(around[m]) == len(around[k]) + 1]
-            whole = [_facing(shell, True), *(_facing(shells[m], False) for m in cavities)]
-            solids.append((put_together(whole), shell.volume < 0.0))
+    for k in (k for k in range(count) if len(around[k]) % 2 == 0):
+        cavities = [right[m] for m in range(count) if k in around[m] and len(around[m]) == len(around[k]) + 1]
+        solids.append((put_together([right[k], *cavities]), shells[k].volume < 0.0))
     return solids
-
-
-def _facing(mesh: Mesh, outwards: bool) -> Mesh:
-    return mesh if (mesh.volume > 0.0) == outwards else mesh.flipped()
 
 
 def _contains(shell: Mesh, inner: Mesh) -> bool:
@@ -146,11 +138,9 @@ def _contains(shell: Mesh, inner: Mesh) -> bool:
 
     At a corner on the surface, where solids touch, it is anything, so several are looked at.
     """
-    low = shell.corners.min(axis=0)
-    high = shell.corners.max(axis=0)
-    if (inner.corners < low).any() or (inner.corners > high).any():
-        return False
-    return all(_is_inside(shell, point) for point in inner.corners[:: max(1, len(inner.corners) // _PROBES)])
+    beside = (inner.corners < shell.corners.min(axis=0)) | (inner.corners > shell.corners.max(axis=0))
+    probes = inner.corners[:: max(1, len(inner.corners) // _PROBES)]
+    return not beside.any() and all(_is_inside(shell, point) for point in probes)
 
 
 def _is_inside(shell: Mesh, point: Array) -> bool:
@@ -161,3 +151,90 @@ def _is_inside(shell: Mesh, point: Array) -> bool:
     above = (a * np.cross(b, c)).sum(axis=1)
     below = x * y * z + (a * b).sum(axis=1) * z + (b * c).sum(axis=1) * x + (c * a).sum(axis=1) * y
     return bool(abs(np.arctan2(above, below).sum()) > np.pi)
+
+
+_AT_ONCE = 200_000
+_OF_TWO = np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
+_INSIDE = 1e-6
+"""Crossings nearer to an edge than this part of a triangle are touches."""
+
+
+def crossing(mesh: Mesh, off: Array | None = None) -> Array | None:
+    """A point, (3,), at which two triangles without a common corner cross; None if none do.
+
+    Args:
+        off: How far each triangle may be from the surface that it stands for, (t,): triangles that cross by no more
+            than that of both say nothing of the surfaces.
+    """
+    tolerance = 1e-6 * mesh.extent
+    for pairs in _near(mesh):
+        a, b = mesh.triangles[pairs.T]
+        apart = (a[:, :, None] != b[:, None, :]).all(axis=(1, 2))
+        least = np.full(int(apart.sum()), tolerance) + (0.0 if off is None else off[pairs[apart]].sum(axis=1))
+        for edges, sheets in ((a[apart], b[apart]), (b[apart], a[apart])):
+            where = _through(mesh.corners[edges], mesh.corners[sheets], least)
+            if where is not None:
+                return where
+    return None
+
+
+def _near(mesh: Mesh) -> Iterator[Any]:
+    """Pairs of triangles whose boxes overlap, (p, 2), some at a time."""
+    from scipy.spatial import cKDTree
+
+    points = mesh.corners[mesh.triangles]
+    low = points.min(axis=1)
+    high = points.max(axis=1)
+    order = cKDTree((low + high) / 2.0, leafsize=1).indices  # that keeps neighbours together
+    # A box is its lowest corner and minus its highest one, (6,), so the box around two boxes is their minimum.
+    levels = int(np.ceil(np.log2(max(len(order), 2))))
+    leaves = np.full((1 << levels, 6), np.inf)
+    leaves[: len(order)] = np.hstack([low, -high])[order]
+    tree = [leaves]
+    for _ in range(levels):
+        tree.append(np.minimum(tree[-1][::2], tree[-1][1::2]))
+    # From the root down, each pair of boxes that overlap is opened into the four pairs of what is in them.
+    open_pairs = [(levels, np.zeros((1, 2), dtype=np.int64))]
+    while open_pairs:
+        level, pairs = open_pairs.pop()
+        if level == 0:
+            yield order[pairs[pairs[:, 0] < pairs[:, 1]]]
+            continue
+        every = np.concatenate([2 * pairs + off for off in _OF_TWO])
+        every = every[every[:, 0] <= every[:, 1]]
+        i, k = tree[level - 1][every.T]
+        every = every[((i[:, :3] <= -k[:, 3:]) & (k[:, :3] <= -i[:, 3:])).all(axis=1)]
+        open_pairs += [(level - 1, every[first : first + _AT_ONCE]) for first in range(0, len(every), _AT_ONCE)]
+
+
+def _through(a: Array, b: Array, tolerance: Array) -> Array | None:
+    """Where an edge of a triangle goes through the inside of another one; both (p, 3, 3).
+
+    Args:
+        tolerance: What is nearer only touches, (p,).
+    """
+    # Heights of the corners of a over the plane of b; an edge goes through where they have different signs.
+    n = np.cross(b[:, 1] - b[:, 0], b[:, 2] - b[:, 0])
+    size = np.linalg.norm(n, axis=1)
+    n = n / np.maximum(size, 1e-300)[:, None]
+    height = ((a - b[:, :1]) * n[:, None]).sum(axis=2)
+    above = height > tolerance[:, None]
+    below = height < -tolerance[:, None]
+    for i in range(3):
+        k = (i + 1) % 3
+        through = ((above[:, i] & below[:, k]) | (below[:, i] & above[:, k])) & (size > tolerance**2)
+        if not through.any():
+            continue
+        start = a[through, i]
+        share = height[through, i] / (height[through, i] - height[through, k])
+        x = start + share[:, None] * (a[through, k] - start)
+        # x is inside of b if it is left of each of its edges, seen against n: (edge x (x - corner)) . n is the length
+        # of the edge times the distance from it.
+        corners = b[through]
+        edges = np.roll(corners, -1, axis=1) - corners
+        left = (np.cross(edges, x[:, None] - corners) * n[through][:, None]).sum(axis=2)
+        margin = tolerance[through][:, None] * np.linalg.norm(edges, axis=2)
+        inside = (left > _INSIDE * size[through][:, None] + margin).all(axis=1)
+        if inside.any():
+            return np.asarray(x[inside][0])
+    return None

@@ -8,8 +8,9 @@ from array import array
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from io import BytesIO
+from operator import add
 from pathlib import Path
-from typing import NamedTuple, NoReturn, final
+from typing import NoReturn, final
 from xml.parsers.expat import ExpatError, ParserCreate
 
 import numpy as np
@@ -35,11 +36,10 @@ _PLACES = ((*_OBJECT, "components", "component"), ("model", "build", "item"))
 _NO_NUMBER = "a number in the 3MF file cannot be read"
 
 
-class _PlacedObject(NamedTuple):
-    """An object at a place, in another object or in the build."""
-
-    number: str
-    transform: str
+_PlacedObject = tuple[str, str]
+"""The number of an object at a place, in another object or in the build; and its transform."""
+_Size = tuple[int, int, int, int]
+"""What objects are made of, with all that is in them: places, triangles, corners; and how deep they are nested."""
 
 
 @final
@@ -74,10 +74,9 @@ class _Model:
         if len(self.within) > _DEEPEST_ELEMENT:
             _refuse(self.path, f"its elements are nested deeper than {_DEEPEST_ELEMENT}")
         where = tuple(self.within)
-        if where == _OBJECT or where in _PLACES:
-            self._count += 1
-            if self._count > _MOST_OBJECTS:
-                _refuse(self.path, f"it names more than {_MOST_OBJECTS:,} objects and places")
+        self._count += where == _OBJECT or where in _PLACES
+        if self._count > _MOST_OBJECTS:
+            _refuse(self.path, f"it names more than {_MOST_OBJECTS:,} objects and places")
         if where == (*_OBJECT, "mesh", "vertices", "vertex"):
             self._open.coordinates.extend([float(values[axis]) for axis in "xyz"])
         elif where == (*_OBJECT, "mesh", "triangles", "triangle"):
@@ -88,18 +87,9 @@ class _Model:
             self.objects[number] = self._open
         elif where in _PLACES:
             owner = self.items if where[1] == "build" else self._open.components
-            owner.append(_PlacedObject(values.get("objectid", ""), values.get("transform", "")))
+            owner.append((values.get("objectid", ""), values.get("transform", "")))
         elif where == ("model",):
             self.unit = values.get("unit", self.unit)
-
-
-class _Size(NamedTuple):
-    """What objects are made of, with all that is in them."""
-
-    places: int
-    triangles: int
-    corners: int
-    depth: int
 
 
 def read_3mf(path: Path, raw: bytes, most_triangles: int) -> tuple[str, list[tuple[str, Mesh]]]:
@@ -109,17 +99,16 @@ def read_3mf(path: Path, raw: bytes, most_triangles: int) -> tuple[str, list[tup
         InputError: It is no such file, or larger than allowed when it is unpacked and its objects are placed.
     """
     model = _read_model(path, raw)
-    unit = _UNITS.get(model.unit)
-    if unit is None:
+    if model.unit not in _UNITS:
         _refuse(path, f"unit '{model.unit[:40]}' is not one of {', '.join(_UNITS)}")
     size = _total(model, model.items, {}, ())
     limits = {"objects": _MOST_PLACES, "triangles": most_triangles, "corners": 3 * most_triangles}
-    for (what, most), count in zip(limits.items(), size[:3], strict=True):
+    for (what, most), count in zip(limits.items(), size, strict=False):
         if count > most:
             number = f"{count:,}" if count < 10**12 else "very many"
             _refuse(path, f"it places {number} {what}, {most:,} are the most")
     try:
-        return unit, [(each.name, _mesh(each, T)) for each, T in _placed(model, model.items, np.eye(4))]
+        return _UNITS[model.unit], [(each.name, _mesh(each, T)) for each, T in _placed(model, model.items, np.eye(4))]
     except ValueError as error:
         raise InputError(f"{path}: {_NO_NUMBER}; save the part again.") from error
 
@@ -196,18 +185,15 @@ def _total(
         if number in within:
             _refuse(model.path, f"object '{number[:40]}' is in itself")
         if number not in known:
+            own = (1, len(each.corners) // 3, len(each.coordinates) // 3, 1)
             inner = _total(model, each.components, known, (*within, number))
-            known[number] = _Size(
-                1 + inner.places,
-                len(each.corners) // 3 + inner.triangles,
-                len(each.coordinates) // 3 + inner.corners,
-                1 + inner.depth,
-            )
-        if len(within) + known[number].depth > _DEEPEST_OBJECT:
+            places, triangles, corners, depth = map(add, own, inner)
+            known[number] = (places, triangles, corners, depth)
+        if len(within) + known[number][3] > _DEEPEST_OBJECT:
             _refuse(model.path, f"its objects are nested deeper than {_DEEPEST_OBJECT}")
     sizes = [known[number] for number, _ in components]
-    places, triangles, corners = (sum(size[k] for size in sizes) for k in range(3))
-    return _Size(places, triangles, corners, max((size.depth for size in sizes), default=0))
+    places, triangles, corners, _ = map(sum, zip((0, 0, 0, 0), *sizes, strict=True))
+    return places, triangles, corners, max((depth for *_, depth in sizes), default=0)
 
 
 def _placed(model: _Model, components: Sequence[_PlacedObject], T: Array) -> Iterator[tuple[_Object, Array]]:

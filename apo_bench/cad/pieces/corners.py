@@ -1,10 +1,11 @@
 """Corners of convex pieces: each once, and not more of them than a piece may have, [mm]."""
 
+from itertools import product
 from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.solids.raw_solid import Mesh, square_to
+from apo_bench.cad.solids.raw_solid import SAME_CORNER_MM, Mesh, square_to
 from apo_bench.geometry import Array, Hull
 
 _MOST_CORNERS = 600
@@ -16,8 +17,6 @@ _IN_PLANE = (16, 8, 4)
 """In how many directions: in space; in each flat face."""
 _INSIDE_M = 5e-8
 """Corners so far inside of a piece are none of it."""
-SAME_CORNER_MM = 2e-4
-"""Corners of a piece nearer to each other than this are one."""
 _THIN_MM = 0.02
 """Pieces thinner than this across are left out."""
 _ON_MM = 2e-4
@@ -60,13 +59,10 @@ def extremes(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
         hull = Hull("", 1e-3 * corners)
     if _is_simple(hull):
         return np.asarray(corners)
-    for planes in (np.concatenate([flats, cuts]), flats, _NO_PLANES):
-        for many in _IN_PLANE:
-            on_planes = _on_flats(corners, planes, many)
-            for farthest in _FARTHEST:
-                kept = np.union1d(on_planes, _farthest(corners, farthest))
-                if len(kept) >= 4 and is_thick(corners[kept]) and _is_simple(Hull("", 1e-3 * corners[kept])):
-                    return np.asarray(corners[kept])
+    for planes, many, farthest in product((np.concatenate([flats, cuts]), flats, _NO_PLANES), _IN_PLANE, _FARTHEST):
+        kept = np.union1d(_on_flats(corners, planes, many), _farthest(corners, farthest))
+        if len(kept) >= 4 and is_thick(corners[kept]) and _is_simple(Hull("", 1e-3 * corners[kept])):
+            return np.asarray(corners[kept])
     return np.asarray(corners[_farthest(corners, _FARTHEST[-2])])
 
 

@@ -1,13 +1,13 @@
 """Solids cut into convex pieces: along the planes of reflex edges, then around round holes, [mm]."""
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from apo_bench.cad.pieces.corners import corners_of, extremes, is_thick, without_near
 from apo_bench.cad.pieces.halving import at_shoulders, convex_parts, settled
-from apo_bench.cad.pieces.round_walls import as_cylinders, bored, filling, least_pieces, with_round_shafts
-from apo_bench.cad.solids.raw_solid import Mesh, RawSolid
+from apo_bench.cad.pieces.round_walls import as_cylinders, bored, least_pieces, with_round_shafts
+from apo_bench.cad.solids.raw_solid import RawSolid
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Hull
 from apo_bench.parts.allowed import MOST_PIECES
@@ -34,22 +34,26 @@ def cut(raw: RawSolid) -> Cut:
     Raises:
         InputError: The mesh makes no solid, or there are more pieces than a part may have.
     """
+    import manifold3d
     from scipy.spatial import ConvexHull
 
     size = raw.mesh.extent
-    body = _manifold_of(raw.mesh)
+    corners = np.ascontiguousarray(raw.mesh.corners)
+    triangles = np.ascontiguousarray(raw.mesh.triangles, dtype=np.uint64)
+    body = manifold3d.Manifold(manifold3d.Mesh64(corners, triangles))
+    if body.status() != manifold3d.Error.NoError or body.is_empty():
+        raise InputError("the mesh makes no solid; mend it where it was drawn, and save it again.")
     bores = [r for r in raw.regions if r.is_round and r.hole and r.square]
     if least_pieces(bores) > MOST_PIECES:
         raise InputError(
             f"its {len(bores)} round holes take {least_pieces(bores):,} convex pieces; {MOST_PIECES:,} are the most "
             "in a part, so leave out small ones."
         )
-    for bore in bores:
-        body = body + filling(raw.mesh, bore)
+    for bore in bores:  # is filled with what was taken away, as the mesh has it
+        body = body + manifold3d.Manifold.hull_points(raw.mesh.corners[np.unique(raw.mesh.triangles[bore.triangles])])
     if body.num_tri() > _MOST_TRIANGLES:
         body = body.simplify(1e-3 * size)
-    grown = 0.0
-    hulls = 0
+    grown = list[float]()
     flats = np.array([(*r.direction, r.direction @ r.point) for r in raw.regions if r.kind == "plane"]).reshape(-1, 4)
     outlines: list[Array] = []
     shafts = [r for r in raw.regions if r.is_round and not r.hole and r.square]
@@ -64,8 +68,7 @@ def cut(raw: RawSolid) -> Cut:
         coarse_volume, fine_volume, kept_volume = (ConvexHull(each).volume for each in (coarse, fine, corners))
         more = coarse_volume - true + kept_volume - fine_volume
         if abs(more) > _LOSS * true:
-            grown += more
-            hulls += 1
+            grown.append(more)
         outlines.append(corners)
     pieces: list[Hull] = []
     for corners in outlines:
@@ -75,15 +78,4 @@ def cut(raw: RawSolid) -> Cut:
                 f"the part takes more than {MOST_PIECES:,} convex pieces, which are the most; leave out small holes "
                 "and fillets."
             )
-    return Cut(tuple(as_cylinders(pieces, shafts)), grown, hulls)
-
-
-def _manifold_of(mesh: Mesh) -> Any:
-    """The mesh as manifold3d has it."""
-    import manifold3d
-
-    corners = np.ascontiguousarray(mesh.corners)
-    body = manifold3d.Manifold(manifold3d.Mesh64(corners, np.ascontiguousarray(mesh.triangles, dtype=np.uint64)))
-    if body.status() != manifold3d.Error.NoError or body.is_empty():
-        raise InputError("the mesh makes no solid; mend it where it was drawn, and save it again.")
-    return body
+    return Cut(tuple(as_cylinders(pieces, shafts)), sum(grown, 0.0), len(grown))

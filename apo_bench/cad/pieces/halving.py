@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.cad.pieces.corners import SAME_CORNER_MM, corners_of, mesh_of
+from apo_bench.cad.pieces.corners import corners_of, mesh_of
 from apo_bench.cad.solids.raw_solid import Region
 from apo_bench.geometry import Array
 
@@ -48,7 +48,7 @@ def convex_parts(solid: Any, size: float, flats: Array) -> Iterator[CutPart]:
     volume = solid.volume()
     for part in _cut(CutPart(solid, np.zeros((0, 4))), size, flats, True, cuts, volume):
         planes = _reflex_planes(part.body, size)
-        if not len(planes) or (part.body.num_tri() > _FINE_TRIANGLES and _is_nearly_convex(part.body)):
+        if not len(planes) or (part.body.num_tri() > _FINE_TRIANGLES and _spare(part) < 1e-3 * part.body.volume()):
             yield part
         elif len(planes) <= _MOST_FREE_PLANES:
             yield from _cut(part, size, flats, False, cuts, volume)
@@ -64,7 +64,9 @@ def _cut(
     least = 1e-7 * volume
     while to_cut:
         whole, along = to_cut.pop()
-        for body in _without_cavities(whole, least):
+        # The bodies that one consists of; the whole, if there is a cavity in one of them: a smaller one is rounding.
+        bodies = whole.decompose()
+        for body in [whole] if any(each.volume() < -least for each in bodies) else bodies:
             if body.volume() < least:
                 continue
             each = CutPart(body, along)
@@ -79,16 +81,6 @@ def _cut(
                     break
             else:
                 yield each
-
-
-def _without_cavities(body: Any, least: float) -> list[Any]:
-    """The bodies that one consists of; the whole, if there is a cavity in one of them.
-
-    Args:
-        least: A cavity that is smaller is rounding.
-    """
-    bodies = body.decompose()
-    return [body] if any(each.volume() < -least for each in bodies) else bodies
 
 
 def _through_cavity(body: Any, least: float) -> Iterator[tuple[Array, float]]:
@@ -107,14 +99,8 @@ def _planes_to_cut(body: Any, size: float, flats: Array, only_flats: bool) -> li
         # The side of a body is rounded by the cuts before; the plane of the face that it lies on is not.
         cosine = flats[:, :3] @ plane[:3]
         same = (np.abs(cosine) > 1.0 - 1e-6) & (np.abs(flats[:, 3] * np.sign(cosine) - plane[3]) < _HAIR * size)
-        if same.any() or not only_flats:
-            n_d = flats[same][0] if same.any() else plane
-            planes.append((n_d[:3], float(n_d[3])))
-    return planes
-
-
-def _is_nearly_convex(body: Any) -> bool:
-    return bool(body.hull().volume() < 1.001 * body.volume())
+        planes += [*flats[same], *([] if only_flats else [plane])][:1]
+    return [(plane[:3], float(plane[3])) for plane in planes]
 
 
 def _spare(part: CutPart) -> float:
@@ -154,8 +140,9 @@ def _best_halves(part: CutPart) -> list[CutPart]:
 def at_shoulders(parts: Iterator[CutPart], shafts: Sequence[Region], size: float) -> Iterator[CutPart]:
     """Parts cut where one round wall goes over into another one: a cylinder and its chamfer are two pieces."""
     for part in parts:
+        # So many corners of a part are on the wall of a shaft that it is one.
         corners = corners_of(part.body)
-        mine = [shaft for shaft in shafts if _touches(corners, shaft)]
+        mine = [shaft for shaft in shafts if shaft.is_on_wall(corners, 1e-3).sum() >= 6]
         slices = [part]
         if len(mine) > 1:
             for n, d in ((s.direction, float(s.point @ s.direction) + end) for s in mine for end in s.span):
@@ -168,13 +155,6 @@ def _across(part: CutPart, n: Array, d: float, hair: float) -> Sequence[CutPart]
     height = corners_of(part.body) @ n - d
     is_beside = height.min() > -10.0 * hair or height.max() < 10.0 * hair
     return (part,) if is_beside else part.halves(n, d, hair)
-
-
-def _touches(corners: Array, shaft: Region) -> bool:
-    """Whether so many corners of a part are on the wall of a shaft that it is one."""
-    height, distance, _ = shaft.polar(corners)
-    within = (height > shaft.span[0] - SAME_CORNER_MM) & (height < shaft.span[1] + SAME_CORNER_MM)
-    return int((within & (np.abs(distance - shaft.radius_at(height)) < 1e-3)).sum()) >= 6
 
 
 def settled(corners: Array, planes: Array, size: float) -> Array:
@@ -208,8 +188,7 @@ def _reflex_planes(body: Any, size: float) -> Array:
     planes = np.column_stack([n, (n * mesh.corners[mesh.triangles[sides, 0]]).sum(axis=1)])
     # Each plane once, up to rounding; the score of a plane is the length of all reflex edges in it, planes along the
     # frame before others of the same score.
-    keys = np.round(planes * [1e5, 1e5, 1e5, 1e5 / size])
-    _, first = np.unique(keys, axis=0, return_index=True)
+    _, first = np.unique(np.round(planes * [1e5, 1e5, 1e5, 1e5 / size]), axis=0, return_index=True)
     planes = planes[np.sort(first)][:400]
     inside = (np.abs(ends @ planes[:, :3].T - planes[:, 3]) < 2e-6 * size).all(axis=1)
     score = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1) @ inside

@@ -10,20 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.pieces.corners import SAME_CORNER_MM, corners_of, extremes, is_thick, without_near
-from apo_bench.cad.solids.raw_solid import Mesh, Region
+from apo_bench.cad.pieces.corners import corners_of, extremes, is_thick, without_near
+from apo_bench.cad.solids.raw_solid import SAME_CORNER_MM, Region
 from apo_bench.geometry import Array, Cylinder, Hull, cylinder_hull, sides_of
 from apo_bench.parts.allowed import THINNEST_M, WIDEST_M
 
 _WIDER = 1.6
 """A gap between corners of a ring that is so much wider than most belongs to no wall."""
-
-
-def filling(mesh: Mesh, bore: Region) -> Any:
-    """What was taken away by a round hole, as the mesh has it."""
-    import manifold3d
-
-    return manifold3d.Manifold.hull_points(mesh.corners[np.unique(mesh.triangles[bore.triangles])])
 
 
 def least_pieces(bores: Sequence[Region]) -> int:
@@ -47,7 +40,11 @@ def bored(corners: Array, bores: Sequence[Region], flats: Array, most: int) -> l
     for a, b in combinations(bores, 2):
         plane = _between(a, b)
         if plane is not None:
-            parts = [half for part in parts for half in _halves(part, a, b, plane)]
+            parts = [
+                half
+                for part in parts
+                for half in (part.split_by_plane(*plane) if _meets(part, a) and _meets(part, b) else (part,))
+            ]
     for bore in bores:
         if len(parts) > most:
             break
@@ -56,13 +53,8 @@ def bored(corners: Array, bores: Sequence[Region], flats: Array, most: int) -> l
     return [extremes(each, flats) for each in points if len(each) >= 4 and is_thick(each)]
 
 
-def _halves(part: Any, a: Region, b: Region, plane: Array) -> Sequence[Any]:
-    """A part cut along a plane if both holes are in it."""
-    return part.split_by_plane(plane[:3], float(plane[3])) if _meets(part, a) and _meets(part, b) else (part,)
-
-
-def _between(a: Region, b: Region) -> Array | None:
-    """The plane between two holes side by side, (4,)."""
+def _between(a: Region, b: Region) -> tuple[Array, float] | None:
+    """The plane n . x = d between two holes side by side."""
     if np.linalg.norm(np.cross(a.direction, b.direction)) > 1e-6:
         return None
     off = b.point - a.point
@@ -70,10 +62,7 @@ def _between(a: Region, b: Region) -> Array | None:
     gap = float(np.linalg.norm(off))
     # Parallel axes: the plane is square to the shortest way between them, in the middle of what is left between walls.
     room = gap - max(a.radii) - max(b.radii)
-    if room <= 0.0:
-        return None
-    n = off / gap
-    return np.append(n, n @ a.point + max(a.radii) + room / 2.0)
+    return (off / gap, float(off / gap @ a.point + max(a.radii) + room / 2.0)) if room > 0.0 else None
 
 
 def _meets(part: Any, bore: Region) -> bool:
@@ -146,10 +135,8 @@ def with_round_shafts(corners: Array, shafts: Sequence[Region]) -> Array:
 
 
 def _on_wall(corners: Array, shaft: Region) -> Any:
-    height, distance, _ = shaft.polar(corners)
-    on = np.abs(distance - shaft.radius_at(height)) < max(1e-5 * max(shaft.radii), SAME_CORNER_MM)
-    within = (height > shaft.span[0] - SAME_CORNER_MM) & (height < shaft.span[1] + SAME_CORNER_MM)
-    return on & within & (distance > SAME_CORNER_MM)
+    on = shaft.is_on_wall(corners, max(1e-5 * max(shaft.radii), SAME_CORNER_MM))
+    return on & (shaft.polar(corners)[1] > SAME_CORNER_MM)
 
 
 def _around_axis(ring: Array, count: int) -> tuple[Array, bool]:
@@ -161,12 +148,9 @@ def _around_axis(ring: Array, count: int) -> tuple[Array, bool]:
     if len(ring) >= 6 and gaps.max() < _WIDER * usual:
         return 2.0 * np.pi * (np.arange(count) + 0.5) / count, True
     # A wall that is part of a circle: each of its gaps is cut into equal ones, none wider than a side may be.
-    added = [ring[:0]]
-    for a, gap in zip(ring, gaps, strict=True):
-        n = int(np.ceil(gap / (2.0 * np.pi / count) - 1e-9))
-        if gap < _WIDER * usual and n > 1:
-            added.append(a + gap * np.arange(1, n) / n)
-    return np.concatenate(added), False
+    many = np.ceil(gaps / (2.0 * np.pi / count) - 1e-9).astype(int)
+    near = zip(*(each[gaps < _WIDER * usual] for each in (ring, gaps, many)), strict=True)
+    return np.concatenate([ring[:0], *(a + gap * np.arange(1, n) / n for a, gap, n in near)]), False
 
 
 def as_cylinders(pieces: list[Hull], shafts: Sequence[Region]) -> Iterator[Hull]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
+from itertools import chain, count
 
 import numpy as np
 
@@ -38,7 +39,8 @@ def renamed(raw: RawSolid, names: Mapping[str, str]) -> RawSolid:
     Raises:
         InputError: No face has the name, or two would have one.
     """
-    new_names = {_plain(old): new for old, new in names.items()}
+    signs = {"+": "p", "-": "n"}
+    new_names = {signs.get(old[:1], old[:1]) + old[1:]: new for old, new in names.items()}
     have = list(raw.named())
     for old, new in new_names.items():
         if old not in have:
@@ -64,30 +66,17 @@ def part_name(text: str) -> str:
 
 def free_name(name: str, used: Container[str]) -> str:
     """The name, or with a number behind it that makes it one that nothing else has."""
-    free = name
-    n = 2
-    while free in used:
-        free = f"{name}_{n}"
-        n = n + 1
-    return free
-
-
-def _plain(name: str) -> str:
-    return {"+": "p", "-": "n"}.get(name[:1], name[:1]) + name[1:]
+    return next(free for free in chain([name], (f"{name}_{n}" for n in count(2))) if free not in used)
 
 
 def _stem(region: Region) -> str:
     """What a name begins with; empty for what has none."""
     if region.kind == "plane":
         axis = int(np.abs(region.direction).argmax())
-        if abs(region.direction[axis]) < 1.0 - 1e-9:
-            return "flat"
-        return ("p" if region.direction[axis] > 0.0 else "n") + "xyz"[axis]
-    if not region.is_whole:
-        return ""
-    if region.kind == "cone":
-        return "cone"
-    return "hole" if region.hole else "shaft"
+        side = ("p" if region.direction[axis] > 0.0 else "n") + "xyz"[axis]
+        return "flat" if abs(region.direction[axis]) < 1.0 - 1e-9 else side
+    whole = "cone" if region.kind == "cone" else "hole" if region.hole else "shaft"
+    return whole if region.is_whole else ""
 
 
 def _order(mesh: Mesh, region: Region) -> tuple[float, ...]:

@@ -13,6 +13,8 @@ from apo_bench.parts.making.moments import Moments
 RegionKind = Literal["plane", "cylinder", "cone", "other"]
 Rgb = tuple[float, float, float]
 """0 to 1."""
+SAME_CORNER_MM = 2e-4
+"""Corners of a piece nearer to each other than this are one."""
 _SAME_SHAPE = 2e-6
 """Solids are the same if their corners are, within this part of their size."""
 
@@ -99,10 +101,6 @@ def square_to(direction: Array) -> tuple[Array, Array]:
     return x, np.cross(direction, x)
 
 
-def _no_vector() -> Array:
-    return np.zeros(3)
-
-
 @final
 @dataclass(frozen=True, eq=False)
 class Region:
@@ -114,9 +112,9 @@ class Region:
     residual: float = 0.0
     """How far its corners are from it at most, but for the sagitta of the tessellation, [mm]."""
     name: str = ""
-    direction: Array = field(default_factory=_no_vector)
+    direction: Array = field(default_factory=lambda: np.zeros(3))
     """The outward normal of a plane, the axis of a round one."""
-    point: Array = field(default_factory=_no_vector)
+    point: Array = field(default_factory=lambda: np.zeros(3))
     """Of a plane; of an axis, the foot of the origin."""
     span: tuple[float, float] = (0.0, 0.0)
     """Of a round one, along the axis from `point`."""
@@ -167,6 +165,12 @@ class Region:
 
     def radius_at(self, height: Any) -> Any:
         return self.radii[0] + self.slope * (height - self.span[0])
+
+    def is_on_wall(self, points: Array, near: float) -> Any:
+        """Which points, (k, 3), are this near to the wall, between its ends."""
+        height, distance, _ = self.polar(points)
+        within = (height > self.span[0] - SAME_CORNER_MM) & (height < self.span[1] + SAME_CORNER_MM)
+        return within & (np.abs(distance - self.radius_at(height)) < near)
 
     def around(self, height: float, radius: float, angle: Array) -> Array:
         """Points at angles around the axis, (k, 3)."""
@@ -222,9 +226,8 @@ def without_copies(solids: Iterable[RawSolid]) -> list[RawSolid]:
 
 def _moved_onto(a: Mesh, b: Mesh) -> Array | None:
     """How the first one is moved onto the second, which has the same triangles in the same order; else None."""
-    if len(a.corners) != len(b.corners) or len(a.triangles) != len(b.triangles):
-        return None
-    if abs(a.volume - b.volume) > 1e-4 * abs(a.volume):
+    are_many = len(a.corners) == len(b.corners) and len(a.triangles) == len(b.triangles)
+    if not are_many or abs(a.volume - b.volume) > 1e-4 * abs(a.volume):
         return None
     p = a.corners[a.triangles].reshape(-1, 3)
     q = b.corners[b.triangles].reshape(-1, 3)

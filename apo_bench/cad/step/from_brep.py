@@ -7,20 +7,22 @@ from typing import Any
 import numpy as np
 
 from apo_bench.cad.faces.facets import facets_of
-from apo_bench.cad.faces.fitting import plane_region, round_region
+from apo_bench.cad.faces.fitting import Round, border_of, plane_region, round_region
 from apo_bench.cad.meshes.shells import INSIDE_OUT, check_closed, check_uncrossed, has_three
 from apo_bench.cad.solids.naming import with_names
 from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, Region, connected, put_together, square_to
-from apo_bench.cad.step.open_cascade import TRIANGLES_RAD, BrepFace, BrepSolid
-from apo_bench.cad.step.strips import wall_strips
-from apo_bench.cad.step.surfaces import Flat, Wall, is_same, surface_of
+from apo_bench.cad.step.surfaces import TRIANGLES_RAD, BrepFace, BrepSolid, Flat, Wall, is_same, surface_of
 from apo_bench.errors import InputError
-from apo_bench.geometry import WHOLE_TURN
+from apo_bench.geometry import WHOLE_TURN, Array
 from apo_bench.parts.making.moments import Moments
 
 _SAME_CORNER = 1e-7
 """Corners nearer to each other than this part of the size are one."""
 _FULL_RAD = 1e-6
+_LEVEL = 1e-6
+_SAME_RAD = 1e-5
+_FEWEST = 6
+"""Corners of an end are level within this part of the size, and lie at one angle with those of the other end."""
 
 
 def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
@@ -36,11 +38,12 @@ def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
     surfaces = [surface_of(face) for face in solid.faces]
     off = np.array([_sagitta(face, surface) for face, surface in zip(solid.faces, surfaces, strict=True)])
     check_uncrossed(path, mesh, off[owner])
-    is_inside_out = mesh.volume < 0.0
-    if is_inside_out:
-        mesh = mesh.flipped()
+    mended = (INSIDE_OUT,) if mesh.volume < 0.0 else ()
+    mesh = mesh.flipped() if mended else mesh
     # Faces that touch on one surface are one region; from here on `owner` is the region of each triangle.
-    group = _joined(mesh, owner, surfaces)
+    beside = np.unique(np.sort(owner[mesh.neighbours], axis=1), axis=0)
+    pairs = [(i, k) for i, k in beside.tolist() if i != k and is_same(surfaces[i], surfaces[k], mesh.extent)]
+    _, group = connected(np.array(pairs, dtype=np.int64).reshape(-1, 2), len(surfaces))
     mesh, owner = _in_strips(mesh, group[owner], [surfaces[int(k)] for k in np.unique(group, return_index=True)[1]])
     regions = []
     for g in np.unique(owner):
@@ -49,19 +52,15 @@ def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
         region = _region(mesh, np.flatnonzero(owner == g), members[0])
         regions.append(replace(region, residual=max(region.residual, residual)))
     named = with_names(mesh, sorted(regions, key=lambda region: int(region.triangles[0])))
-    mended = (INSIDE_OUT,) if is_inside_out else ()
     return RawSolid(solid.name, mesh, solid.places, mended, named, facets_of(mesh).of, _moments(solid))
 
 
 def _sagitta(face: BrepFace, surface: Flat | Wall | None) -> float:
     """How far triangles of a face may be from it, [mm]: the sagitta of the angle between neighbours."""
-    if isinstance(surface, Flat):
-        return 0.0
-    size = float(np.ptp(face.corners, axis=0).max())
-    radius = size
+    radius = float(np.ptp(face.corners, axis=0).max())
     if isinstance(surface, Wall):
-        radius = surface.surface.radius + abs(surface.surface.slope) * size
-    return float((1.0 - np.cos(TRIANGLES_RAD / 2.0)) * radius)
+        radius = surface.surface.radius + abs(surface.surface.slope) * radius
+    return 0.0 if isinstance(surface, Flat) else float((1.0 - np.cos(TRIANGLES_RAD / 2.0)) * radius)
 
 
 def _moments(solid: BrepSolid) -> Moments:
@@ -88,13 +87,6 @@ def _mesh(faces: tuple[BrepFace, ...]) -> tuple[Mesh, Any]:
     return Mesh(whole.corners[first], triangles[sound]), owner[sound]
 
 
-def _joined(mesh: Mesh, owner: Any, surfaces: list[Flat | Wall | None]) -> Any:
-    """The group of each face, (f,): of those that touch, on one surface."""
-    beside = np.unique(np.sort(owner[mesh.neighbours], axis=1), axis=0)
-    pairs = [(i, k) for i, k in beside.tolist() if i != k and is_same(surfaces[i], surfaces[k], mesh.extent)]
-    return connected(np.array(pairs, dtype=np.int64).reshape(-1, 2), len(surfaces))[1]
-
-
 def _in_strips(mesh: Mesh, owner: Any, surfaces: list[Flat | Wall | None]) -> tuple[Mesh, Any]:
     """With walls between two circles as strips from end to end.
 
@@ -108,7 +100,7 @@ def _in_strips(mesh: Mesh, owner: Any, surfaces: list[Flat | Wall | None]) -> tu
         triangles = np.flatnonzero(owner == k)
         if not isinstance(wall, Wall) or not len(triangles) or _turn(mesh, triangles, wall) < WHOLE_TURN:
             continue
-        strips = wall_strips(mesh, triangles, wall.surface)
+        strips = _wall_strips(mesh, triangles, wall.surface)
         if strips is not None:
             kept[triangles] = False
             added.append(strips)
@@ -147,3 +139,58 @@ def _turn(mesh: Mesh, triangles: Any, wall: Wall) -> float:
     gaps = np.append(low[1:], low[0] + WHOLE_TURN) - np.maximum(reach, reach[-1] - WHOLE_TURN)
     widest = float(gaps.max())
     return WHOLE_TURN if widest < _FULL_RAD else WHOLE_TURN - widest
+
+
+def _wall_strips(mesh: Mesh, triangles: Any, surface: Round) -> Any:
+    """Other triangles, (s, 3), for some of a mesh, with the same border and no corner inside of it.
+
+    None: its ends are not two level circles with corners at the same angles, nor one and a tip.
+    """
+    near = _LEVEL * mesh.extent
+    x, y = square_to(surface.axis)
+    every = np.unique(mesh.triangles[triangles])
+    height, distance, out = surface.polar(mesh.corners[every])
+    angle = np.arctan2(out @ y, out @ x)
+    tip = distance < near
+    # Corners of the border, and a tip, at either end, in their order around the axis.
+    left = np.isin(every, border_of(mesh, triangles)) | tip
+    ends = []
+    for end in (height.min(), height.max()):
+        mine = np.flatnonzero(left & (np.abs(height - end) < near))
+        left[mine] = False
+        ends.append(mine[np.argsort(angle[mine])])
+    low, high = ends
+    if tip.any():
+        are_ends = (len(low) == 1) != (len(high) == 1)
+    else:
+        are_ends = len(low) == len(high) >= _FEWEST and _are_at_one_angle(angle[low], angle[high])
+    if left.any() or not are_ends:
+        return None
+    strips = _between(every[low], every[high])
+    # They look the way that the triangles did: outwards, or towards the axis for a hole.
+    points = mesh.corners[strips]
+    normals = np.cross(points[:, 1] - points[:, 0], points[:, 2] - points[:, 0])
+    outward = (normals * _out(surface, points)).sum()
+    before = (mesh.across[triangles] * _out(surface, mesh.corners[mesh.triangles[triangles]])).sum()
+    return strips if outward * before > 0.0 else strips[:, ::-1]
+
+
+def _are_at_one_angle(a: Array, b: Array) -> bool:
+    off = np.abs(a - b)
+    return bool(np.minimum(off, 2.0 * np.pi - off).max() < _SAME_RAD)
+
+
+def _between(low: Any, high: Any) -> Any:
+    """Triangles between two rings of corners, or a ring and a tip."""
+    low_next = np.roll(low, -1)
+    high_next = np.roll(high, -1)
+    if len(high) == 1:
+        return np.column_stack([low, low_next, np.full(len(low), high[0])])
+    if len(low) == 1:
+        return np.column_stack([np.full(len(high), low[0]), high_next, high])
+    return np.concatenate([np.column_stack([low, low_next, high_next]), np.column_stack([low, high_next, high])])
+
+
+def _out(surface: Round, points: Array) -> Array:
+    """The way from the axis at the middle of each triangle (t, 3, 3)."""
+    return surface.polar(points.mean(axis=1))[2]

@@ -19,7 +19,7 @@ from apo_bench.cad.meshes.mesh_file import (
 )
 from apo_bench.cad.solids.raw_solid import RawSolid, without_copies
 from apo_bench.cad.step.from_brep import raw_of
-from apo_bench.cad.step.open_cascade import READER_BYTES, READER_S, BrepSolid
+from apo_bench.cad.step.surfaces import READER_BYTES, READER_S, BrepSolid
 from apo_bench.errors import InputError
 
 STEP_SUFFIXES = (".step", ".stp")
@@ -64,9 +64,16 @@ def read_step(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
             f"{path}: the file has {len(solids)} solids with {count:,} triangles; {_MOST_SOLIDS} and "
             f"{MOST_CAD_TRIANGLES:,} are the most, so save less of it."
         )
-    _check_size(path, solids, own_unit)
-    raws: list[RawSolid] = []
-    left_out: list[str] = []
+    sizes = [np.ptp(np.concatenate([face.corners for face in solid.faces]), axis=0).max() for solid in solids]
+    for size in (min(sizes), max(sizes)):
+        if not SMALLEST_PART_MM <= size <= LARGEST_PART_MM:
+            raise InputError(
+                f"{path}: a solid in it is {size:.4g} mm long (unit {own_unit}, stated in the file); parts of "
+                f"{SMALLEST_PART_MM:g} mm to {LARGEST_PART_MM / 1000:g} m are allowed, so save it in its true unit, or "
+                "scale it."
+            )
+    raws = list[RawSolid]()
+    left_out = list[str]()
     for solid in solids:
         try:
             raws.append(raw_of(path, solid))
@@ -88,13 +95,14 @@ def _read_apart(path: Path) -> list[BrepSolid]:
         )
     except subprocess.TimeoutExpired as error:
         raise InputError(f"{path}: reading the file takes more than {_WALL_S} s; save less of it.") from error
-    if done.returncode == _ENDS_CPU:
-        raise InputError(f"{path}: reading the file takes more than {READER_S} s; save less of it.")
     if done.returncode:
-        words = done.stderr.decode(errors="replace").strip().splitlines() or [""]
-        if "MemoryError" in words[-1] or "bad_alloc" in words[-1]:
-            raise InputError(f"{path}: reading the file takes more than {READER_BYTES / 1e9:g} GB; save less of it.")
-        raise InputError(f"{path}: the file cannot be read as STEP; save the part again from where it was drawn.")
+        *_, last_words = ["", *done.stderr.decode(errors="replace").strip().splitlines()]
+        fault = "the file cannot be read as STEP; save the part again from where it was drawn"
+        if done.returncode == _ENDS_CPU:
+            fault = f"reading the file takes more than {READER_S} s; save less of it"
+        elif "MemoryError" in last_words or "bad_alloc" in last_words:
+            fault = f"reading the file takes more than {READER_BYTES / 1e9:g} GB; save less of it"
+        raise InputError(f"{path}: {fault}.")
     solids: list[BrepSolid] = pickle.loads(done.stdout)
     return solids
 
@@ -102,21 +110,9 @@ def _read_apart(path: Path) -> list[BrepSolid]:
 def _unit(raw: bytes) -> str:
     """The unit of lengths, as the file names it."""
     text = raw.decode("latin-1")
-    for entity in re.findall(r"=\s*\(([^;]*?LENGTH_UNIT[^;]*?)\)\s*;", text):
-        named = re.search(r"CONVERSION_BASED_UNIT\s*\(\s*'([^']*)'", entity)
-        if named:
-            return _UNIT_NAMES.get(named[1].strip().upper(), named[1].strip().lower())
+    lengths = re.findall(r"=\s*\(([^;]*?LENGTH_UNIT[^;]*?)\)\s*;", text)
+    named = re.findall(r"CONVERSION_BASED_UNIT\s*\(\s*'([^']*)'", ";".join(lengths))
+    if named:
+        return _UNIT_NAMES.get(named[0].strip().upper(), named[0].strip().lower())
     si = re.search(r"LENGTH_UNIT[^;]*?SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.", text)
     return _PREFIXES.get(si[1] or "", f"{si[1]}metre".lower()) if si else "mm"
-
-
-def _check_size(path: Path, solids: list[BrepSolid], unit: str) -> None:
-    """Parts are neither too small nor too large."""
-    sizes = [np.ptp(np.concatenate([f.corners for f in solid.faces]), axis=0).max() for solid in solids]
-    for size in (min(sizes), max(sizes)):
-        if not SMALLEST_PART_MM <= size <= LARGEST_PART_MM:
-            raise InputError(
-                f"{path}: a solid in it is {size:.4g} mm long (unit {unit}, stated in the file); parts of "
-                f"{SMALLEST_PART_MM:g} mm to {LARGEST_PART_MM / 1000:g} m are allowed, so save it in its true unit, or "
-                "scale it."
-            )

@@ -1,13 +1,17 @@
-"""Surfaces of faces of a B-rep: as the file says, or fitted to points where it says a spline."""
+"""Faces of a B-rep as a reader gives them, and their surfaces: as the file says, or fitted to points of a spline."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from apo_bench.cad.faces.fitting import Round, axis_of, circle_through, refined
-from apo_bench.cad.step.open_cascade import BrepFace
+from apo_bench.cad.solids.raw_solid import SolidPlace
 from apo_bench.geometry import Array
 
+READER_BYTES = 2_000_000_000
+READER_S = 20
+TRIANGLES_RAD = 0.2
+"""The angle between neighbours on round walls, the same on walls around one axis."""
 _SPLINE_MM = 5e-4
 """A spline whose points are this near to a plane, a cylinder or a cone is one."""
 _SPLINE_RAD = 0.02
@@ -18,6 +22,38 @@ _SAME_RAD = 1e-6
 """Faces on surfaces that differ by less, in parts of the size of the solid, are on one."""
 _FLATTEST = 1e3
 """No round face of a spline is this many times as wide as the face."""
+
+
+class BrepFace(NamedTuple):
+    """A face of a solid."""
+
+    kind: str
+    """`plane`, `cylinder`, `cone`, `sphere`, `torus`, `free` for what is stored as a spline; `none`: no triangles."""
+    point: Array
+    """Of the plane or the axis, [mm]; of a free one, points on it, (k, 3)."""
+    direction: Array
+    """Normal or axis; of a free one, its normals there, (k, 3)."""
+    radius: float
+    """At the point."""
+    slope: float
+    """By how much the radius grows along the axis."""
+    corners: Array
+    """(c, 3)."""
+    triangles: Any
+    """(t, 3), counter-clockwise seen from outside."""
+
+
+class BrepSolid(NamedTuple):
+    """A solid, or a shell that may be one."""
+
+    name: str
+    faces: tuple[BrepFace, ...]
+    size: float
+    """Volume, [mm^3]."""
+    centroid: Array
+    inertia: Array
+    """About the centroid, [mm^5]."""
+    places: tuple[SolidPlace, ...]
 
 
 class Flat(NamedTuple):
@@ -43,9 +79,8 @@ def surface_of(face: BrepFace) -> Flat | Wall | None:
         return Wall(Round(face.point, face.direction, face.radius, face.slope), 0.0)
     if face.kind != "free" or len(face.point) < _FEWEST:
         return None
-    points = face.point
-    normals = face.direction
-    return _flat(points, normals) or _wall(points, normals, False) or _wall(points, normals, True)
+    free = (face.point, face.direction)
+    return _flat(*free) or _wall(*free, False) or _wall(*free, True)
 
 
 def _flat(points: Array, normals: Array) -> Flat | None:
@@ -58,8 +93,7 @@ def _flat(points: Array, normals: Array) -> Flat | None:
 
 
 def _wall(points: Array, normals: Array, cone: bool) -> Wall | None:
-    first = circle_through(points, axis_of(normals, cone))
-    wall = None if first is None else refined(first, points, cone)
+    wall = refined(circle_through(points, axis_of(normals, cone)), points, cone)
     if wall is None or wall.radius > _FLATTEST * np.ptp(points, axis=0).max():
         return None
     residual = float(np.abs(wall.off(points)).max())

@@ -1,22 +1,22 @@
 """A recording drawn, whether it fits, is refused or has no scenario: frames of camera and parts, paths, and rests."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
-from itertools import combinations, product
+from itertools import combinations, cycle, product
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly import Poses
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Solid, pose
 from apo_bench.io.figures import default_looks, save_figure
 from apo_bench.recording.arranging import camera_pose
-from apo_bench.recording.camera_file import CameraFile
 from apo_bench.recording.importing import ImportedRecording, planned_starts
 from apo_bench.recording.log import Log, PoseTrack
 from apo_bench.recording.operations import approaches
+from apo_bench.recording.setup_files import CameraFile
 from apo_bench.recording.stays import Stays, all_stays
 from apo_bench.recording.without_scenario import UnplannedRecording
 from apo_bench.scenario.scenario import Scenario
@@ -31,9 +31,8 @@ class DrawnEnd(NamedTuple):
 
     part: str
     label: str
-    begin: Array
-    """(3,), world, [m]."""
-    end: Array
+    ends: Array
+    """(2, 3), world, [m]."""
 
 
 @final
@@ -72,7 +71,7 @@ def drawing_of(
             if seen.rest is not None
         ],
         solids=recording.scenario.assembly.solids,
-        places=_places(camera, planned_starts(recording.scenario)),
+        places=camera.places(planned_starts(recording.scenario)),
         path_ends=_path_ends(recording),
     )
 
@@ -83,14 +82,16 @@ def unfit_drawing(
     """Of a recording that is refused: as it was read, with the camera where it fits best."""
     stays = all_stays(tracks)
     planned = planned_starts(scenario)
-    X = _camera(stays, camera, planned)
+    X = None
+    with suppress(InputError, LookupError, np.linalg.LinAlgError):
+        X = camera_pose(stays, camera, planned).T_world_camera
     return RecordingDrawing(
         title=f"{_title(log, scenario)}; it does not fit",
         tracks=tracks,
         stays=stays,
         T_world_camera=X,
         solids=scenario.assembly.solids,
-        places={} if X is None else _places(camera, planned),
+        places={} if X is None else camera.places(planned),
     )
 
 
@@ -109,40 +110,24 @@ def _title(log: Log, scenario: Scenario | None) -> str:
     return f"{log.file}{f', {scenario.name}' if scenario else ''}\n{'; '.join(log.notes)}"
 
 
-def _places(camera: CameraFile, planned: Poses) -> Poses:
-    """Known places, world, [m]."""
-    return {part: planned[part] if T is None else T for part, T in camera.known.items()}
-
-
-def _camera(stays: Stays, camera: CameraFile, planned: Poses) -> Array | None:
-    try:
-        return camera_pose(stays, camera, planned).T_world_camera
-    except (InputError, LookupError, np.linalg.LinAlgError):
-        return None
-
-
 def _path_ends(recording: ImportedRecording) -> Sequence[DrawnEnd]:
     drawn = []
     X = recording.camera.T_world_camera
-    for approach in approaches(recording.scenario, recording.operations, X):
-        rest = recording.operations[approach.operation].rest
-        if approach.end is not None and rest is not None:
-            goal = X @ rest.T
-            way = approach.end.length_m * goal[:3, :3] @ approach.end.direction
-            part = recording.scenario.assembly.operations[approach.operation].main
-            label = f"{approach.operation + 1}: {approach.macro}, {approach.off_deg:.0f} deg off"
-            drawn.append(DrawnEnd(part, label, goal[:3, 3] - way, goal[:3, 3]))
+    for k, end, macro, off_deg in approaches(recording.scenario, recording.operations, X):
+        if end is not None:
+            goal = recording.observation.goals[k]
+            ends = np.array([goal[:3, 3] - end.length_m * goal[:3, :3] @ end.direction, goal[:3, 3]])
+            part = recording.scenario.assembly.operations[k].main
+            drawn.append(DrawnEnd(part, f"{k + 1}: {macro}, {off_deg:.0f} deg off", ends))
     return drawn
 
 
 @default_looks()
 def draw_recording(drawing: RecordingDrawing, out: Path) -> None:
     """Write the picture as PNG: all frames, the parts from near, and when each part rested."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(17.0, 6.4), layout="constrained")
-    FigureCanvasAgg(figure)
     grid = figure.add_gridspec(1, 3, width_ratios=[1.0, 1.35, 1.15])
     room, near = (figure.add_subplot(grid[i], projection="3d") for i in (0, 1))
     X = np.eye(4) if drawing.T_world_camera is None else drawing.T_world_camera
@@ -165,8 +150,7 @@ def draw_recording(drawing: RecordingDrawing, out: Path) -> None:
 
 
 def _draw_parts(axes: Any, drawing: RecordingDrawing, X: Array, reach: float, close: bool) -> None:
-    for i, (part, track) in enumerate(drawing.tracks.items()):
-        color = _color(i)
+    for color, (part, track) in zip(cycle(_PARTS), drawing.tracks.items(), strict=False):
         axes.plot(*(X @ track.T)[:, :3, 3].T, color=color, linewidth=0.8, alpha=0.7, label=part)
         known = drawing.stays[part]
         for stay, name in zip((known[0], known[-1]) if known else (), (part, ""), strict=False):
@@ -178,22 +162,19 @@ def _draw_parts(axes: Any, drawing: RecordingDrawing, X: Array, reach: float, cl
             _draw_box(axes, drawing.solids[part], drawing.places[part], "black", ":")
         for piece in drawing.path_ends if close else ():
             if piece.part == part:
-                ends = np.array([piece.begin, piece.end])
-                axes.plot(*ends.T, color=color, linewidth=4.0, alpha=0.6, label=piece.label)
+                axes.plot(*piece.ends.T, color=color, linewidth=4.0, alpha=0.6, label=piece.label)
 
 
 def _draw_times(axis: Any, drawing: RecordingDrawing) -> None:
     rows = {part: i for i, part in enumerate(drawing.tracks)}
-    for part, row in rows.items():
-        color = _color(row)
-        track = drawing.tracks[part]
+    for color, (part, track) in zip(cycle(_PARTS), drawing.tracks.items(), strict=False):
+        row = rows[part]
         stays = drawing.stays[part]
         first = stays[0].rests[0].T if stays else track.T[0]
         far = np.linalg.norm((pose.inverse(first) @ track.T)[:, :3, 3], axis=1)
         axis.plot(track.t, row - 0.4 + 0.8 * far / max(float(far.max()), 1e-6), color=color, linewidth=0.8)
-        for stay in stays:
-            for rest in stay.rests:
-                axis.barh(row, rest.ends - rest.begins, left=rest.begins, height=0.8, color=color, alpha=0.25)
+        for rest in (rest for stay in stays for rest in stay.rests):
+            axis.barh(row, rest.seconds, left=rest.begins, height=0.8, color=color, alpha=0.25)
     for k, (part, t) in enumerate(drawing.ended, 1):
         axis.text(t, rows[part] + 0.42, f"{k}", fontsize=10, ha="left", va="bottom", fontweight="bold")
         axis.plot([t, t], [rows[part] - 0.4, rows[part] + 0.5], color="black", linewidth=0.8)
@@ -205,8 +186,7 @@ def _draw_times(axis: Any, drawing: RecordingDrawing) -> None:
 
 def _draw_frame(axis: Any, T: Array, size: float, name: str) -> None:
     for i, color in enumerate(_AXES):
-        ends = np.array([T[:3, 3], T[:3, 3] + size * T[:3, i]])
-        axis.plot(*ends.T, color=color, linewidth=1.6)
+        axis.plot(*np.column_stack([T[:3, 3], T[:3, 3] + size * T[:3, i]]), color=color, linewidth=1.6)
     if name:
         axis.text(*T[:3, 3], f" {name}", fontsize=9)
 
@@ -231,7 +211,3 @@ def _level(axis: Any, points: Array, least: float) -> None:
         each.set_major_locator(MaxNLocator(5))
         each.set_major_formatter(lambda x, _: f"{1e3 * x:.0f}")
     axis.view_init(elev=28.0, azim=-60.0)
-
-
-def _color(i: int) -> str:
-    return _PARTS[i % len(_PARTS)]

@@ -8,30 +8,49 @@ import numpy as np
 
 from apo_bench.geometry import Array, frozen, pose
 from apo_bench.io.words import columns, direction
+from apo_bench.recording.arranging import CameraPose
 from apo_bench.recording.averaging import per_axis
-from apo_bench.recording.camera_pose import CameraPose
 from apo_bench.recording.importing import ImportedRecording
 from apo_bench.recording.log import Log
-from apo_bench.recording.objects_file import ObjectsFile
 from apo_bench.recording.operations import approaches
 from apo_bench.recording.rests import RestSpan
+from apo_bench.recording.setup_files import ObjectsFile
 from apo_bench.recording.without_scenario import UnplannedRecording
 
-_HEADS = ("", "part", "rests from", "until s", "frames", "outliers", "x mm", "y mm", "z mm", "a frame is off by")
+_HEADS: tuple[str, ...] = (
+    "",
+    "part",
+    "rests from",
+    "until s",
+    "frames",
+    "outliers",
+    "x mm",
+    "y mm",
+    "z mm",
+    "a frame is off by",
+)
 _MOST_TIMES = 5
+_ALIKE_DEG = 20.0
+"""Directions within this are the same."""
 _POSE_UNITS = frozen([1e3, 1e3, 1e3, 1.0, 1.0, 1.0, 1.0], 7)
 """mm for m of a packed pose."""
 
 
 def reading_lines(log: Log, objects: ObjectsFile) -> list[tuple[str, str]]:
     """Frames, units and orders, before anything is trusted."""
-    frames = sum(len(track.t) for track in log.tracks.values())
-    lines = [("log", f"{log.file}: {len(log.tracks)} ids, {frames} poses, {log.seconds:.1f} s")]
-    lines += [("read as", "; ".join(log.notes))]
-    for part, tracked in objects.parts.items():
-        frame = _pose_text(tracked.T_model_part)
-        lines.append(("frame", f"{part} is id {tracked.id}, its frame {frame}, in the tracker's model"))
-    return lines
+    times = [track.t for track in log.tracks.values()]
+    seconds = max(float(t[-1]) for t in times)
+    return [
+        ("log", f"{log.file}: {len(log.tracks)} ids, {sum(map(len, times))} poses, {seconds:.1f} s"),
+        ("read as", "; ".join(log.notes)),
+        *(
+            (
+                "frame",
+                f"{part} is id {tracked.id}, its frame {_pose_text(tracked.T_model_part)}, in the tracker's model",
+            )
+            for part, tracked in objects.parts.items()
+        ),
+    ]
 
 
 def camera_lines(camera: CameraPose) -> list[tuple[str, str]]:
@@ -46,46 +65,33 @@ def camera_lines(camera: CameraPose) -> list[tuple[str, str]]:
 def imported_lines(recording: ImportedRecording) -> list[tuple[str, str]]:
     """What is known of starts, contacts, paths, and what stays unclear."""
     fit = recording.fit
-    lines = [
-        ("starts", _starts(recording.stood)),
-        (
-            "contacts",
-            f"open by up to {1e3 * fit.gap_m:.2f} mm and {np.degrees(fit.angle_rad):.2f} deg as seen",
-        ),
-    ]
-    if not recording.stays_stated:
-        lines.append(
-            (
-                "noise",
-                "an error that stays while a part rests cannot be seen: taken as large as that of one frame; "
-                "state [noise] in the camera file",
-            )
-        )
-    lines += [("path", text) for text in _paths(recording)]
-    for k, operation in enumerate(recording.operations, 1):
-        if operation.rest is None:
-            lines.append(("not seen", f"operation {k}, as stated"))
-        for moved, how in (
-            (operation.carried, f"in the hand during operation {k}"),
-            (operation.adjusted, f"during operation {k}, which does not move it: counted into its error"),
-        ):
-            lines += [
-                ("moved", f"{part} by {_mm(twist):.1f} mm and {_deg(twist):.1f} deg {how}")
-                for part, twist in moved.items()
-                if np.linalg.norm(twist[:3]) > 1e-3
-            ]
-    return lines + [("unclear", text) for text in recording.unclear]
-
-
-def _starts(stood: Mapping[str, str]) -> str:
-    """Which parts start where, by how that is known; those that stood otherwise are unclear, and stand there."""
     how = {
         "known": "on known places",
         "seen": "where they were seen, standing as in the scenario",
         "scenario": "as in the scenario",
     }
-    parts = {whence: [part for part, each in stood.items() if each == whence] for whence in how}
-    return "; ".join(f"{', '.join(parts[whence])} {how[whence]}" for whence in how if parts[whence])
+    # Which parts start where, by how that is known; those that stood otherwise are unclear, and stand there.
+    stood = {whence: [part for part, each in recording.stood.items() if each == whence] for whence in how}
+    lines = [
+        ("starts", "; ".join(f"{', '.join(parts)} {how[whence]}" for whence, parts in stood.items() if parts)),
+        ("contacts", f"open by up to {1e3 * fit.gap_m:.2f} mm and {np.degrees(fit.angle_rad):.2f} deg as seen"),
+    ]
+    if not recording.stays_stated:
+        error = "an error that stays while a part rests cannot be seen: taken as large as that of one frame"
+        lines.append(("noise", f"{error}; state [noise] in the camera file"))
+    lines += [("path", text) for text in _paths(recording)]
+    for k, operation in enumerate(recording.operations, 1):
+        if operation.rest is None:
+            lines.append(("not seen", f"operation {k}, as stated"))
+        in_hand = f"in the hand during operation {k}"
+        beside = f"during operation {k}, which does not move it: counted into its error"
+        lines += [
+            ("moved", f"{part} by {_mm(twist):.1f} mm and {_deg(twist):.1f} deg {how_moved}")
+            for moved, how_moved in ((operation.carried, in_hand), (operation.adjusted, beside))
+            for part, twist in moved.items()
+            if np.linalg.norm(twist[:3]) > 1e-3
+        ]
+    return lines + [("unclear", text) for text in recording.unclear]
 
 
 def rest_lines(rests: Sequence[tuple[str, RestSpan | None]], X: Array, times: Mapping[str, Array]) -> list[str]:
@@ -96,18 +102,15 @@ def rest_lines(rests: Sequence[tuple[str, RestSpan | None]], X: Array, times: Ma
         X: (4, 4), world from camera.
         times: Part -> times of its frames, [s].
     """
-    cells = [
-        (str(k), part, *(_rest_cells(rest, X) if rest else ["not seen", *[""] * 7]))
-        for k, (part, rest) in enumerate(rests, 1)
-    ]
+    table = [_HEADS]
     outliers = []
     for k, (part, rest) in enumerate(rests, 1):
-        if rest is None or rest.mean.inlier.all():
-            continue
-        t = times[part][rest.first : rest.last + 1][~rest.mean.inlier]
-        first_few = ", ".join(f"{x:.2f}" for x in t[:_MOST_TIMES]) + (", ..." if len(t) > _MOST_TIMES else "")
-        outliers.append(f"outliers of operation {k} ({part}) at {first_few} s, left out")
-    return [*columns([_HEADS, *cells]), *([""] if outliers else []), *outliers]
+        table.append((str(k), part, *(_rest_cells(rest, X) if rest else ("not seen", *[""] * 7))))
+        if rest is not None and not rest.mean.inlier.all():
+            t = times[part][rest.first : rest.last + 1][~rest.mean.inlier]
+            first_few = ", ".join(f"{x:.2f}" for x in t[:_MOST_TIMES]) + (", ..." if len(t) > _MOST_TIMES else "")
+            outliers.append(f"outliers of operation {k} ({part}) at {first_few} s, left out")
+    return [*columns(table), *([""] if outliers else []), *outliers]
 
 
 def put_lines(recording: UnplannedRecording) -> list[str]:
@@ -137,11 +140,10 @@ def observation_table(
 
 def path_rows(recording: ImportedRecording) -> Iterator[tuple[object, ...]]:
     """The paths between rests: operation, part, time, pose in the world."""
-    planned = recording.scenario.assembly.operations
-    for k, (operation, seen) in enumerate(zip(planned, recording.operations, strict=True), 1):
-        if seen.path is not None:
-            for t, T in zip(seen.path.t, seen.path.T, strict=True):
-                yield (k, operation.main, round(float(t), 6), *(pose.pack(T) * _POSE_UNITS).round(6).tolist())
+    for k, seen in enumerate(recording.operations, 1):
+        if seen.path is not None and seen.stay is not None:
+            for t, T in zip(*seen.path, strict=True):
+                yield (k, seen.stay.part, round(float(t), 6), *(pose.pack(T) * _POSE_UNITS).round(6).tolist())
 
 
 PATH_HEAD = ("operation", "part", "t_s", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz")
@@ -155,21 +157,21 @@ def _paths(recording: ImportedRecording) -> Iterator[str]:
             yield f"{operation} shows no straight end"
             continue
         way = direction(np.round(approach.end.direction, 2))
-        how = (
-            f"as `{approach.macro}` of the plan, {approach.off_deg:.0f} deg off"
-            if approach.alike
-            else f"unlike the plan, whose nearest motion, `{approach.macro}`, is {approach.off_deg:.0f} deg off"
+        how = f"unlike the plan, whose nearest motion, `{approach.macro}`, is"
+        if approach.off_deg <= _ALIKE_DEG:
+            how = f"as `{approach.macro}` of the plan,"
+        yield (
+            f"{operation} ends along {way} of the part for {1e3 * approach.end.length_m:.0f} mm, {how} "
+            f"{approach.off_deg:.0f} deg off"
         )
-        yield f"{operation} ends along {way} of the part for {1e3 * approach.end.length_m:.0f} mm, {how}"
 
 
 def _rest_cells(rest: RestSpan, X: Array) -> list[str]:
     m, rad = per_axis(rest.mean.scatter)
-    p = 1e3 * (X @ rest.T)[:3, 3]
+    begins, ends, *place = (f"{x:.2f}" for x in (rest.begins, rest.ends, *(1e3 * (X @ rest.T)[:3, 3])))
+    inlier = rest.mean.inlier
     off = f"{1e3 * m:.2f} mm {np.degrees(rad):.2f} deg"
-    frames = len(rest.mean.inlier)
-    outliers = frames - int(rest.mean.inlier.sum())
-    return [f"{rest.begins:.2f}", f"{rest.ends:.2f}", str(frames), str(outliers), *(f"{x:.2f}" for x in p), off]
+    return [begins, ends, str(len(inlier)), str(int((~inlier).sum())), *place, off]
 
 
 def _pose_text(T: Array) -> str:
