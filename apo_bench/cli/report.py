@@ -54,8 +54,7 @@ def compare_command(
     """Compare two sweeps trial by trial: two versions, machines or fidelities; write compare.html."""
     from apo_bench.cli.terminal import print_comparison
     from apo_bench.report.comparison.compare import compare
-    from apo_bench.report.comparison.page import write_comparison
-    from apo_bench.report.comparison.text import comparison_form
+    from apo_bench.report.comparison.text import comparison_form, write_comparison
 
     comparison = compare(first, second)
     if out is None and not as_json:

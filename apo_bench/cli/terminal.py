@@ -80,10 +80,10 @@ def print_report(report: Report) -> None:
 
 def print_comparison(comparison: Comparison) -> None:
     """How far two sweeps agree, and what is not the same in them."""
-    from apo_bench.report.comparison.text import agreement_table, in_words
+    from apo_bench.report.comparison.text import comparison_tables, in_words
 
     console().print(clean(in_words(comparison)))
-    print_table(agreement_table(comparison))
+    print_table(comparison_tables(comparison)["agreement"])
     names = [d.what for d in comparison.differences]
     more = f" and {len(names) - _MOST_NAMES} more" * (len(names) > _MOST_NAMES)
     differ = clean(f"Not the same: {', '.join(names[:_MOST_NAMES])}{more}")

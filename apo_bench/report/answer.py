@@ -7,10 +7,22 @@ the difference is beyond chance, "as often" only where the interval lies close a
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from apo_bench.io.words import listed_words
 from apo_bench.records import CORRECTOR, Row, knows_relations, knows_truth, look_up
-from apo_bench.statistics import FEWEST_SEEDS, Contrast, Interval, Place, Results, contrast, percent, pooled_rate, rank
+from apo_bench.statistics import (
+    FEWEST_SEEDS,
+    Contrast,
+    Interval,
+    Results,
+    contrast,
+    percent,
+    percents,
+    pooled_rate,
+    rank,
+)
 from apo_bench.statistics.levels.half_level import HalfLevel
 from apo_bench.statistics.levels.summary import Summary
+from apo_bench.statistics.rates import PLACE_FIELDS
 
 ALIKE_WITHIN = 0.05
 """Two methods are alike only where the whole interval of their difference is within this, to either side of 0."""
@@ -33,20 +45,25 @@ def answer(rows: Iterable[Row], summary: Summary) -> str:
     own = pooled_rate(results[best])
     few = own.seeds < FEWEST_SEEDS
     if not any(any(each.values()) for each in results.values()):
-        return f"No method succeeds in any trial: {_nothing([best, *others], results)}.{_wrong(kinds)}"
-    first = f"{_named(best)} succeeds in {_counted(own.right, own.trials, None if few else own.interval)}"
-    sentences = [f"{first}{_tied(best, others, results)}."]
-    curves = [h for h in summary.half_levels if h.setting.relations in kinds]
-    half = [h for h in curves if (h.setting.method, h.setting.looks) == best]
-    if half and not few:
-        sentences.append(_reach(half))
+        nothing = ", ".join(f"{_named(who)} in 0 of {len(results[who]):,}" for who in (best, *others))
+        return f"No method succeeds in any trial: {nothing}.{_wrong(kinds)}"
+    half = [
+        h
+        for h in summary.half_levels
+        if h.setting.relations in kinds and (h.setting.method, h.setting.looks) == best and not few
+    ]
     known = [(m, 0) for m in _AGAINST if (m, 0) in results and (m, 0) != best] or others[:1]
-    sentences += [_compared(best, m, results) for m in known]
-    if few:
-        sentences.append(
-            f"{own.seeds} {'seed is' if own.seeds == 1 else 'seeds are'} too few for an interval: from {FEWEST_SEEDS} "
-            "on, a difference at every seed is beyond chance."
-        )
+    counted = _counted(own.right, own.trials, None if few else own.interval)
+    too_few = (
+        f"{own.seeds} {'seed is' if own.seeds == 1 else 'seeds are'} too few for an interval: from {FEWEST_SEEDS} "
+        "on, a difference at every seed is beyond chance."
+    )
+    sentences = (
+        f"{_named(best)} succeeds in {counted}{_tied(best, others, results)}.",
+        _reach(half) if half else "",
+        *(_compared(best, m, results) for m in known),
+        too_few * few,
+    )
     return " ".join(sentence for sentence in sentences if sentence) + _wrong(kinds)
 
 
@@ -64,14 +81,8 @@ def _named(who: _Who) -> str:
 
 def _counted(right: int, trials: int, interval: Interval | None) -> str:
     """`95 of 100 trials (95.0 %; 95 % interval 88.8 to 97.8 %)`."""
-    rate = percent(right / trials)
-    between = "" if interval is None else f"; 95 % interval {100 * interval.low:.1f} to {100 * interval.high:.1f} %"
-    return f"{right:,} of {trials:,} trial{'s' * (trials != 1)} ({rate}{between})"
-
-
-def _nothing(methods: Sequence[_Who], results: Mapping[_Who, Results]) -> str:
-    """`none` in 0 of 24, `contact` in 0 of 24."""
-    return ", ".join(f"{_named(who)} in 0 of {len(results[who]):,}" for who in methods)
+    between = "" if interval is None else f"; 95 % interval {percents(interval)}"
+    return f"{right:,} of {trials:,} trial{'s' * (trials != 1)} ({percent(right / trials)}{between})"
 
 
 def _results(rows: Iterable[Row]) -> tuple[dict[_Who, dict[tuple[Any, ...], bool]], set[str]]:
@@ -83,15 +94,15 @@ def _results(rows: Iterable[Row]) -> tuple[dict[_Who, dict[tuple[Any, ...], bool
     ]
     kinds = {str(row["relations"]) for row in counted if knows_relations(row["method"])} or {_GIVEN}
     kinds = {_GIVEN} if _GIVEN in kinds else kinds
-    # the one trial of a method that is told nothing would count once for each kind of relations that others are told
-    counted = [row for row in counted if len(kinds) == 1 or knows_relations(row["method"])]
-    names = [name for name in Place._fields if name not in ("method", "relations", "fidelity", "looks")]
+    names = [name for name in PLACE_FIELDS if name not in ("method", "relations", "fidelity", "looks")]
     results: dict[_Who, dict[tuple[Any, ...], bool]] = {}
     for row in counted:
         relations = str(row["relations"]) if knows_relations(row["method"]) else min(kinds)
-        if relations in kinds:
-            key = (*(look_up(row, name) for name in names), row.get("fidelity"), relations, row["seed"])
-            results.setdefault((row["method"], row.get("looks") or 0), {})[key] = bool(row["success"])
+        # the one trial of a method that is told nothing would count once for each kind of relations that others hear
+        if relations in kinds and (len(kinds) == 1 or knows_relations(row["method"])):
+            results.setdefault((row["method"], row.get("looks") or 0), {})[
+                (*(look_up(row, name) for name in names), row.get("fidelity"), relations, row["seed"])
+            ] = bool(row["success"])
     return results, kinds
 
 
@@ -118,11 +129,8 @@ def _tied(best: _Who, others: Sequence[_Who], results: Mapping[_Who, Results]) -
         and results[who].keys() == ours.keys()
         and sum(results[who].values()) == sum(ours.values())
     ]
-    if not same:
-        return ""
-    names = [_named(who) for who in same[:_NAMED]] + ([f"{len(same) - _NAMED} more"] if len(same) > _NAMED else [])
-    listed = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
-    return f", as many as {listed}"
+    more = [f"{len(same) - _NAMED} more"] * (len(same) > _NAMED)
+    return f", as many as {listed_words([*map(_named, same[:_NAMED]), *more])}" if same else ""
 
 
 def _compared(ours: _Who, other: _Who, results: Mapping[_Who, Results]) -> str:
@@ -130,10 +138,13 @@ def _compared(ours: _Who, other: _Who, results: Mapping[_Who, Results]) -> str:
     c = contrast(results[ours], results[other])
     if c is None:
         return ""
-    if c.trials == len(results[ours]):
-        return f"{_named(other)} succeeds in {c.theirs:,} of the same {c.trials:,}{_told(ours, c)}."
-    both = f"Of the {c.trials:,} trials that both have, {_named(other)} succeeds in {c.theirs:,} and {_named(ours)} in"
-    return f"{both} {c.ours:,}{_told(ours, c)}."
+    counted = (
+        f"{_named(other)} succeeds in {c.theirs:,} of the same {c.trials:,}"
+        if c.trials == len(results[ours])
+        else f"Of the {c.trials:,} trials that both have, {_named(other)} succeeds in {c.theirs:,} and {_named(ours)} "
+        f"in {c.ours:,}"
+    )
+    return f"{counted}{_told(ours, c)}."
 
 
 def _told(ours: _Who, c: Contrast) -> str:
@@ -144,10 +155,11 @@ def _told(ours: _Who, c: Contrast) -> str:
     low, high = (100 * x for x in c.interval)
     between = f"95 % interval {low:+.1f} to {high:+.1f}"
     if c.sure:
-        more = "more" if low > 0 else "less"
         least, most = sorted((abs(low), abs(high)))
-        ends = f"95 % interval {least:.1f} to {most:.1f}"
-        return f": {_named(ours)} succeeds {more} often, by {points:.1f} points ({ends})"
+        return (
+            f": {_named(ours)} succeeds {'more' if low > 0 else 'less'} often, by {points:.1f} points "
+            f"(95 % interval {least:.1f} to {most:.1f})"
+        )
     if c.interval.low >= -ALIKE_WITHIN and c.interval.high <= ALIKE_WITHIN:
         return f": as often, to within {max(-low, high):.1f} points (95 % interval of the difference)"
     if c.difference == 0.0:
@@ -155,8 +167,7 @@ def _told(ours: _Who, c: Contrast) -> str:
     ahead = f": {_named(ours)} is {points:.1f} points {'ahead' if c.difference > 0 else 'behind'}"
     if not low <= 0.0 <= high:
         return f"{ahead}, but too few seeds differ to tell it from chance (better at {c.better}, worse at {c.worse})"
-    enough = c.enough
-    more = f"; if as many differ on, {enough:,} seeds would" if enough is not None and enough > c.seeds else ""
+    more = f"; if as many differ on, {c.enough:,} seeds would" if (c.enough or 0) > c.seeds else ""
     return f"{ahead}, which {c.seeds:,} seeds do not tell from chance ({between}{more})"
 
 
@@ -164,15 +175,14 @@ def _reach(half: Sequence[HalfLevel]) -> str:
     """Where its curve over the level falls to one half; of several settings the worst and the best."""
     ends = sorted(half, key=lambda h: (h.beyond == "above", h.level or 0.0, h.largest))
     worst, best = (_half(ends[i]) for i in (0, -1))
-    if len(ends) > 1 and ends[0].beyond == "above":
-        return (
-            f"Its curve over the level stays above one half up to the largest tried, in each of {len(ends)} settings."
-        )
+    every = f"in each of {len(ends)} settings."
     if len(ends) == 1:
         between = "" if ends[0].level is None else f" (95 % interval: {_between(ends[0])})"
         return f"Its curve over the level {worst}{between}."
+    if ends[0].beyond == "above":
+        return f"Its curve over the level stays above one half up to the largest tried, {every}"
     if worst == best:
-        return f"Its curve over the level {worst}; so in each of {len(ends)} settings."
+        return f"Its curve over the level {worst}; so {every}"
     return f"In the worst of {len(ends)} settings its curve over the level {worst}; in the best it {best}."
 
 
@@ -181,11 +191,10 @@ def _half(h: HalfLevel) -> str:
         return f"falls to one half at level {h.text}"
     if h.beyond == "above":
         return f"stays above one half up to level {h.largest:g}, the largest tried"
-    lowest = f"from level {h.smallest:g}, the smallest tried above 0, on"
-    return f"is below one half {lowest}" if h.beyond == "below" else "is below one half even at level 0"
+    lowest = f"from level {h.smallest:g}, the smallest tried above 0, on" if h.beyond == "below" else "even at level 0"
+    return f"is below one half {lowest}"
 
 
 def _between(h: HalfLevel) -> str:
     """`1.1 to 1.6`, `below 0.2`, `above 3.2`; `any level` where it is open at both ends."""
-    text = h.interval_text
-    return "any level" if text == "any" else text.replace("<", "below").replace(">", "above")
+    return {"any": "any level"}.get(h.interval_text, h.interval_text.replace("<", "below").replace(">", "above"))

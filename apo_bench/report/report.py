@@ -2,9 +2,8 @@
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from operator import itemgetter
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from apo_bench.errors import InputError
 from apo_bench.io.ordinary_files import check_folders, check_target, to_write
@@ -20,15 +19,7 @@ from apo_bench.report.run.facts import scenario_files
 from apo_bench.report.run.trials import Draw, draw_failures
 from apo_bench.report.tables.cells import cell_table, gap_table, pair_table
 from apo_bench.report.tables.forecasts import calibration_table, confusion_table, recognition_table
-from apo_bench.report.tables.methods import (
-    area_difference_table,
-    area_table,
-    effort_table,
-    half_table,
-    time_table,
-    work_table,
-)
-from apo_bench.report.tables.table import Table
+from apo_bench.report.tables.methods import area_table, effort_table, half_table, time_table, work_table
 from apo_bench.statistics import (
     Cell,
     Confusion,
@@ -117,8 +108,9 @@ def report(
             (folder / name).mkdir(exist_ok=True)
         _remove_older(folder)
         _write_rows(rows, folder / TABLES / ROWS)
-        draw_own = partial(draw_failures, most=pictures, draw=draw, salt=salt, trust_code=trust_code)
-        return _written(folder, rows, numbers, draw_own)
+        return _written(
+            folder, rows, numbers, partial(draw_failures, most=pictures, draw=draw, salt=salt, trust_code=trust_code)
+        )
     except OSError as error:
         raise InputError(f"'{folder}' cannot be written ({error.strerror}); copy it to a place that can.") from error
 
@@ -137,7 +129,7 @@ def _written(folder: Path, rows: Sequence[Row], numbers: Summary, draw_own: Draw
         "pairs": pair_table(numbers.pairs),
         "half_levels": half_table(numbers.half_levels, numbers.areas),
         "areas": area_table(numbers.areas, numbers.area_differences),
-        "area_differences": area_difference_table(numbers.area_differences),
+        "area_differences": area_table((), numbers.area_differences),
         "gaps": gap_table(gap_summaries),
         "confusion": confusion_table(confused),
         "recognised": recognition_table(recognised),
@@ -146,12 +138,14 @@ def _written(folder: Path, rows: Sequence[Row], numbers: Summary, draw_own: Draw
         "times": time_table(times),
         "work": work_table(workers),
     }
-    kept = _write_tables(tables, folder / TABLES)
+    wanted = [name for name in FILES if tables[name].items or name not in ("recognised", "times")]
+    kept = {name: tables[name].write(folder / TABLES / f"{name}.csv") for name in wanted}
+    for name in wanted:
+        tables[name].write(folder / TABLES / f"{name}.parquet")
     drawn = figures(numbers, grouped, gap_summaries, confused, recognised, times)
     paths = [drawing.write(folder / FIGURES / f"{name}.svg") for name, drawing in drawn.items()]
-    for name in PNG:
-        if name in drawn and len(drawn[name].panels) <= MOST_PANELS:
-            paths.append(drawn[name].write(folder / FIGURES / f"{name}.png"))
+    small = [name for name in PNG if name in drawn and len(drawn[name].panels) <= MOST_PANELS]
+    paths += [drawn[name].write(folder / FIGURES / f"{name}.png") for name in small]
     pictures, no_pictures = draw_own(rows, folder, scenario_files(run))
     beside = [path for table in kept.values() for path in (table, table.with_suffix(".parquet"))]
     sentences = answer(rows, numbers)
@@ -185,17 +179,9 @@ def _remove_older(folder: Path) -> None:
             path.unlink()
 
 
-def _write_tables(tables: Mapping[str, Table], folder: Path) -> dict[str, Path]:
-    wanted = [name for name in FILES if tables[name].items or name not in ("recognised", "times")]
-    for name in wanted:
-        tables[name].write(folder / f"{name}.parquet")
-    return {name: tables[name].write(folder / f"{name}.csv") for name in wanted}
-
-
 def _write_rows(rows: Sequence[Row], path: Path) -> None:
     """The rows themselves, what was predicted in columns of its own."""
-    plain = [name for name in KEPT if name != "predicted"]
-    columns = [[row.get(name) for row in rows] for name in plain]
-    keys = ("fails", "operation", "code")
-    predicted = [[None if (p := row.get("predicted")) is None else itemgetter(key)(p) for row in rows] for key in keys]
-    write_columns([*plain, *(f"predicted_{key}" for key in keys)], [*columns, *predicted], path)
+    columns = {name: [row.get(name) for row in rows] for name in KEPT if name != "predicted"}
+    predicted: list[Mapping[str, Any]] = [row.get("predicted") or {} for row in rows]
+    columns |= {f"predicted_{key}": [said.get(key) for said in predicted] for key in ("fails", "operation", "code")}
+    write_columns(list(columns), list(columns.values()), path)

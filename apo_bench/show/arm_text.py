@@ -1,7 +1,5 @@
 """What an arm can do, in lines."""
 
-from collections.abc import Iterator
-
 import numpy as np
 
 from apo_bench.simulation.arm_checks.arm_check import ArmCheck
@@ -15,33 +13,31 @@ def list_line(name: str, arm: Arm) -> str:
     return f"{name}: {len(arm.joints)} joints, opens {2e3 * arm.opening_m:.1f} mm{hand}{payload}; {arm.control}"
 
 
-def check_lines(check: ArmCheck) -> Iterator[str]:
+def check_lines(check: ArmCheck) -> list[str]:
     """All that was found, one line each; at last what is missing."""
     arm = check.arm
-    yield f"joints: {len(arm.joints)} ({', '.join(arm.joints)}), {arm.control}"
-    yield f"home: {_row(np.degrees(arm.home))} degrees; base at {_row(1e3 * np.array(arm.base))} mm"
     at = check.reached
-    whole = at[at[:, 2] == 1.0]
-    yield (
-        f"reach: {len(whole)} of {len(at)} places of the table, {100 * at[0, 0]:.0f} to {100 * at[-1, 0]:.0f} cm ahead "
-        f"and {100 * at[0, 1]:.0f} to {100 * at[-1, 1]:.0f} cm aside of its middle, at every turn of the gripper"
-    )
-    for error in check.tip_errors:
-        yield (
+    x, y, z = check.mm_per_n
+    friction = f", friction {arm.hand.friction:g}, closes in {arm.hand.seconds:.2f} s" if arm.hand is not None else ""
+    margins = ", ".join(f"{name} {x:.0f}" for name, x in zip(arm.joints, check.margins_deg, strict=True))
+    return [
+        f"joints: {len(arm.joints)} ({', '.join(arm.joints)}), {arm.control}",
+        f"home: {_row(np.degrees(arm.home))} degrees; base at {_row(1e3 * np.array(arm.base))} mm",
+        f"reach: {(at[:, 2] == 1.0).sum()} of {len(at)} places of the table, {100 * at[0, 0]:.0f} to "
+        f"{100 * at[-1, 0]:.0f} cm ahead and {100 * at[0, 1]:.0f} to {100 * at[-1, 1]:.0f} cm aside of its middle, at "
+        "every turn of the gripper",
+        *(
             f"tip at {1e3 * error.speed:g} mm/s: {error.across_mm:.3f} mm beside its line, {error.along_mm:.3f} mm "
             f"behind, turned by {error.turn_deg:.3f} degrees at most"
-        )
-    yield f"tip at rest: {check.rest_error_mm:.4f} mm off"
-    x, y, z = check.mm_per_n
-    yield f"stiffness: a newton pushes the tip by {x:.4f} mm along x, {y:.4f} along y, {z:.4f} along z"
-    friction = f", friction {arm.hand.friction:g}, closes in {arm.hand.seconds:.2f} s" if arm.hand is not None else ""
-    yield f"gripper: opens {check.opening_mm:.1f} mm, each pad pushes with {check.force_n:.1f} N{friction}"
-    margins = ", ".join(f"{name} {x:.0f}" for name, x in zip(arm.joints, check.margins_deg, strict=True))
-    yield f"room to the limits of joints along the plans of {check.scenario}, degrees: {margins}"
-    yield f"layouts of {check.scenario} in reach: {check.layouts_reached} of {check.layouts}"
-    yield from (f"missing: {each}" for each in check.missing)
-    if not check.missing:
-        yield "nothing is missing"
+            for error in check.tip_errors
+        ),
+        f"tip at rest: {check.rest_error_mm:.4f} mm off",
+        f"stiffness: a newton pushes the tip by {x:.4f} mm along x, {y:.4f} along y, {z:.4f} along z",
+        f"gripper: opens {check.opening_mm:.1f} mm, each pad pushes with {check.force_n:.1f} N{friction}",
+        f"room to the limits of joints along the plans of {check.scenario}, degrees: {margins}",
+        f"layouts of {check.scenario} in reach: {check.layouts_reached} of {check.layouts}",
+        *([f"missing: {each}" for each in check.missing] or ["nothing is missing"]),
+    ]
 
 
 def _row(numbers: np.ndarray) -> str:

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Observation, Poses, arc_residuals, placements, relation_graph
+from apo_bench.assembly import Observation, Operation, Poses, arc_residuals, placements, relation_graph
 from apo_bench.geometry import Array, world_bounds
 from apo_bench.io.figures import default_looks, save_figure
 from apo_bench.io.words import listed_words
@@ -44,17 +44,15 @@ def belief_panel(title: str, observation: Observation, goals: Array, step: int, 
     """What goals (n, 4, 4), world frame, [m], mean after so many operations."""
     graph = relation_graph(observation.assembly, step)
     residuals = arc_residuals(observation.assembly, observation.start, goals, graph)
-    worst_first = sorted(zip(residuals, graph.arcs, strict=True), key=lambda pair: -pair[0])
     wrong = tuple(
         f"{arc}: {1e3 * e:.2f} mm{' (disappeared)' * (arc.lost is not None)}"
-        for e, arc in worst_first
+        for e, arc in sorted(zip(residuals, graph.arcs, strict=True), key=lambda pair: -pair[0])
         if e > observation.gap_m
     )
     poses = placements(observation.assembly.first(step), observation.start, goals[:step])[-1]
-    standing = [arc for arc in graph.arcs if arc.lost is None]
     beside = tuple(
         f"{arc}: beside it"
-        for arc in standing
+        for arc in [arc for arc in graph.arcs if arc.lost is None]
         if any(face_overlap(observation.assembly, contact, poses).area <= 0.0 for contact in arc.contacts)
     )
     return BeliefPanel(title, poses, max(residuals, default=0.0), (*wrong, *beside), warning)
@@ -85,10 +83,8 @@ def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[BeliefPanel], 
 
     scene = build_scene(scenario)
     last = scenario.assembly.operations[step - 1]
-    near = dict.fromkeys([*last.moves, *(c.environment.part for c in last.contacts)])
-    camera = _camera(scenario, beliefs[0].poses, tuple(part for part in near if part not in scenario.assembly.fixed))
-    lines = max(len(_below(b)) for b in beliefs) + 1
-    below = _LINE_PX * lines + 8
+    camera = _camera(scenario, beliefs[0].poses, last)
+    below = _LINE_PX * (max(len(_below(b)) for b in beliefs) + 1) + 8
     width = _WIDTH * len(beliefs)
     height = _HEIGHT + below + 56
     figure = Figure(figsize=(width / 100, height / 100))
@@ -110,19 +106,19 @@ def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[BeliefPanel], 
 
 def _below(belief: BeliefPanel) -> list[str]:
     """The lines below a panel."""
-    warning = textwrap.wrap(belief.warning, _LETTERS)
-    if not belief.open:
-        return [f"every contact holds: largest gap {1e3 * belief.gap_m:.3f} mm", *warning]
-    lines = [f"contacts that do not hold: {belief.open[0]}", *belief.open[1 : _MOST_LINES - 1]]
+    lines = [f"every contact holds: largest gap {1e3 * belief.gap_m:.3f} mm"]
+    if belief.open:
+        lines = [f"contacts that do not hold: {belief.open[0]}", *belief.open[1 : _MOST_LINES - 1]]
     left = len(belief.open) - len(lines)
-    return [*lines, *([f"and {left} more"] if left else []), *warning]
+    return [*lines, *[f"and {left} more"] * (left > 0), *textwrap.wrap(belief.warning, _LETTERS)]
 
 
-def _camera(scenario: Scenario, poses: Poses, parts: tuple[str, ...]) -> Any:
+def _camera(scenario: Scenario, poses: Poses, last: Operation) -> Any:
     """One that sees what the last operation was about, obliquely to the assembly."""
     from apo_bench.simulation.scene.render import camera_view
 
-    low, high = world_bounds((scenario.assembly.solids[part], poses[part]) for part in parts)
+    near = {*last.moves, *(c.environment.part for c in last.contacts)} - set(scenario.assembly.fixed)
+    low, high = world_bounds((scenario.assembly.solids[part], poses[part]) for part in near)
     first = poses[scenario.assembly.operations[0].main]
     azimuth = np.degrees(np.arctan2(first[1, 0], first[0, 0])) + _AZIMUTH_DEG
     return camera_view(

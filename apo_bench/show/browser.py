@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry import Array, pose
+from apo_bench.geometry import pose
 from apo_bench.show.stepping import COLOR_NAMES, COLORS, FACES, Cursor
 from apo_bench.simulation.film.film import FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG, framing
 from apo_bench.simulation.film.meshes import BodyMesh, body_meshes, body_poses, part_meshes
@@ -109,14 +109,12 @@ class Page:
         self._drawn = state
 
     def _draw_ghosts(self, ghosts: tuple[Ghost, ...]) -> None:
-        placed = {(ghost.name, part): T for ghost in ghosts for part, T in ghost.poses.items()}
-        for key, meshes in self._ghosts.items():
-            for mesh in meshes:
-                mesh.visible = key in placed
-                if mesh.visible:
-                    at = pose.pack(placed[key])
-                    mesh.position = at[:3]
-                    mesh.wxyz = at[3:]
+        placed = {(ghost.name, part): pose.pack(T) for ghost in ghosts for part, T in ghost.poses.items()}
+        for key, mesh in ((key, mesh) for key, meshes in self._ghosts.items() for mesh in meshes):
+            mesh.visible = key in placed
+            if mesh.visible:
+                mesh.position = placed[key][:3]
+                mesh.wxyz = placed[key][3:]
 
     def _set_up(self, story: Story) -> None:
         server = self._server
@@ -127,12 +125,14 @@ class Page:
         server.scene.set_up_direction("+z")
         server.scene.configure_default_lights(cast_shadow=False)
         look_at, far = framing(assembly, [story.assembled])
+        azimuth, elevation = np.radians([FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG])
+        # where the camera looks, as a unit vector
+        forwards = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
         view = server.initial_camera
         view.look_at = look_at
-        view.position = look_at - far * _forwards()
+        view.position = look_at - far * np.array(forwards)
         view.fov = _FOV_RAD
-        bodies = range(world.model.nbody)
-        self._bodies = [server.scene.add_frame(f"/bodies/{i}", show_axes=False) for i in bodies]
+        self._bodies = [server.scene.add_frame(f"/bodies/{i}", show_axes=False) for i in range(world.model.nbody)]
         meshes = [
             (shape.part, _add(server, f"/bodies/{shape.body}/{i}", shape, shape.rgba[:3], shape.rgba[3]))
             for i, shape in enumerate(body_meshes(world))
@@ -183,7 +183,11 @@ class Page:
         self._arm_shown = gui.add_checkbox("arm", True)
         for name in story.goals:
             box = gui.add_checkbox(f"{name} ({COLOR_NAMES[name]})", False)
-            box.on_update(lambda event, name=name: self._do(lambda cursor: _tick(cursor, name, event.target.value)))
+            box.on_update(
+                lambda event, name=name: self._do(
+                    lambda cursor: (cursor.goals.add if event.target.value else cursor.goals.discard)(name)
+                )
+            )
 
     def _do(self, what: Callable[[Cursor], object]) -> None:
         with self.lock:
@@ -198,10 +202,6 @@ class Page:
         with self.lock:
             if chapter == self.cursor.chapter and moment != self.cursor.moment and not self.cursor.playing:
                 self.cursor.go(moment)
-
-
-def _tick(cursor: Cursor, name: str, on: bool) -> None:
-    cursor.goals = cursor.goals | {name} if on else cursor.goals - {name}
 
 
 def _server(port: int) -> Any:
@@ -226,10 +226,3 @@ def _add(server: Any, name: str, shape: BodyMesh, color: tuple[float, ...], opac
         flat_shading=True,
         scale=scale,
     )
-
-
-def _forwards() -> Array:
-    """Where the camera looks, unit vector, (3,)."""
-    azimuth, elevation = np.radians([FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG])
-    flat = np.cos(elevation)
-    return np.array([flat * np.cos(azimuth), flat * np.sin(azimuth), np.sin(elevation)])

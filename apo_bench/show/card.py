@@ -32,10 +32,12 @@ def cards(
         introduction: What stands above the cards of what was measured.
         measured: Scenario -> what was measured of it, in Markdown.
     """
-    lines = [f"<!-- Written by `{command}`; change the scenarios, not this page. -->", "", "# Scenarios", ""]
-    lines += [f"- [{s.name}](#{s.name}): {s.title} ({s.paper})" for s in scenarios]
-    lines += ["", "What is asked for under *Success*: [the two verdicts](../how/judge.md)."]
-    lines += ["", introduction] if introduction else []
+    lines = [
+        *(f"<!-- Written by `{command}`; change the scenarios, not this page. -->", "", "# Scenarios", ""),
+        *(f"- [{s.name}](#{s.name}): {s.title} ({s.paper})" for s in scenarios),
+        *("", "What is asked for under *Success*: [the two verdicts](../how/judge.md)."),
+        *(["", introduction] if introduction else []),
+    ]
     for s in scenarios:
         head, _, rest = scenario_card(s, 2).partition("\n\n")
         graph = f"![Relations of {s.name} after its last operation]({picture.format(s.name)})"
@@ -48,27 +50,24 @@ def scenario_card(scenario: Scenario, level: int = 1) -> str:
     """The card of a scenario under a heading of that level."""
     mark = "#" * level
     graph = relation_graph(scenario.assembly)
-    parts = [f"{mark} {scenario.name}: {scenario.title}"]
-    if scenario.paper:
-        parts.append(f"In the paper: {scenario.paper}.")
-    parts += [
-        f"{mark}# Parts\n\n" + _list(_parts(scenario)),
+    parts = [
+        f"{name}{'' if path.stem == name else f' ({path.stem})'}{', fixed' if name in scenario.assembly.fixed else ''}"
+        for name, path in scenario.part_files.items()
+    ]
+    sections = (
+        f"{mark} {scenario.name}: {scenario.title}",
+        f"In the paper: {scenario.paper}." if scenario.paper else "",
+        f"{mark}# Parts\n\n" + _list(parts),
         f"{mark}# Operations\n\n" + "\n".join(_operations(scenario, graph)),
-        f"{mark}# The human\n\n" + _list(_human(scenario)),
+        f"{mark}# The human\n\n" + _list([*filter(None, [scenario.human]), _carelessness(scenario)]),
         f"{mark}# What varies\n\n" + _list(_varies(scenario)),
         f"{mark}# Success\n\n" + _list(_success(scenario)),
-    ]
-    return "\n\n".join(parts) + "\n"
+    )
+    return "\n\n".join(filter(None, sections)) + "\n"
 
 
 def _list(lines: Iterable[str]) -> str:
     return "\n".join(f"- {line}" for line in lines)
-
-
-def _parts(scenario: Scenario) -> Iterator[str]:
-    for name, path in scenario.part_files.items():
-        kind = "" if path.stem == name else f" ({path.stem})"
-        yield f"{name}{kind}{', fixed' if name in scenario.assembly.fixed else ''}"
 
 
 def _operations(scenario: Scenario, graph: Graph) -> Iterator[str]:
@@ -85,8 +84,7 @@ def _operations(scenario: Scenario, graph: Graph) -> Iterator[str]:
 
 def _where(scenario: Scenario, arcs: Sequence[Arc]) -> str:
     """`onto table and against cube`."""
-    ends = dict.fromkeys((_way(scenario, arc), arc.environment.part) for arc in arcs)
-    ways = groupby(ends, key=lambda end: end[0])
+    ways = groupby(dict.fromkeys((_way(scenario, arc), arc.environment.part) for arc in arcs), key=lambda end: end[0])
     return listed_words([f"{way} {listed_words([part for _, part in same])}" for way, same in ways])
 
 
@@ -106,15 +104,12 @@ def _way(scenario: Scenario, arc: Arc) -> str:
     return "against" if N[:, 2].max() < _LEVEL else "onto"
 
 
-def _human(scenario: Scenario) -> Iterator[str]:
-    if scenario.human:
-        yield scenario.human
+def _carelessness(scenario: Scenario) -> str:
     how = scenario.careless
     if how is None:
-        yield "No carelessness is drawn."
-        return
+        return "No carelessness is drawn."
     main = scenario.assembly.operations[how.operation].main
-    yield (
+    return (
         f"At `careless` 1, operation {how.operation + 1} puts {main} {_span(how.low_m, how.high_m)} mm aside along "
         f"{_axis(how.axis)}, to either side{_followers(scenario, how)}; "
         "what is wrong is mended at the last operation, unseen."
@@ -129,67 +124,59 @@ def _followers(scenario: Scenario, how: Carelessness) -> str:
     return f"; {listed_words(words)} {'follow' if len(words) > 1 else 'follows'}" if words else ""
 
 
-def _varies(scenario: Scenario) -> Iterator[str]:
+def _varies(scenario: Scenario) -> list[str]:
     site = scenario.site
     x, y = (f"{c * 1e3:g} ± {s * 1e3:g}" for c, s in zip(site.center_m, site.spread_m, strict=True))
     low, high = np.degrees(site.yaw_rad)
-    yield f"Where the assembly stands: x {x} mm, y {y} mm, turned by {low:g} to {high:g} degrees."
-    for shift in scenario.shifts:
-        main = scenario.assembly.operations[shift.operation].main
-        span = _span(shift.low_m, shift.high_m)
-        yield f"Operation {shift.operation + 1}: {main} by {span} mm along {_axis(shift.axis)}."
-    for turn in scenario.turns:
-        main = scenario.assembly.operations[turn.operation].main
-        low, high = np.degrees([turn.low_rad, turn.high_rad])
-        about = f"{_axis(turn.axis)}{_through(turn)}"
-        yield f"Operation {turn.operation + 1}: {main} by {low:g} to {high:g} degrees about {about}."
+    names = [f"Operation {k}: {operation.main}" for k, operation in enumerate(scenario.assembly.operations, start=1)]
+    return [
+        f"Where the assembly stands: x {x} mm, y {y} mm, turned by {low:g} to {high:g} degrees.",
+        *(f"{names[s.operation]} by {_span(s.low_m, s.high_m)} mm along {_axis(s.axis)}." for s in scenario.shifts),
+        *(
+            f"{names[turn.operation]} by {np.degrees(turn.low_rad):g} to {np.degrees(turn.high_rad):g} degrees about "
+            f"{_axis(turn.axis)}{_through(turn)}."
+            for turn in scenario.turns
+        ),
+    ]
 
 
 def _success(scenario: Scenario) -> Iterator[str]:
     t = scenario.thresholds
     clearance = scenario.clearance_mm
-    if scenario.success:
-        yield scenario.success
-    yield (
+    wider = "; ".join(f"{contact} by {play + t.fit_margin_mm:.2f} mm" for contact, play in sorted(_wider(scenario)))
+    away = sorted(fixtures(scenario.assembly))
+    is_round = any(map(scenario.assembly.is_round, (relation.contact for relation in scenario.assembly.relations())))
+    said: dict[str, object] = {
+        scenario.success: scenario.success,
         f"Success, at the end: contacts of parts that fit within {clearance + t.fit_margin_mm:g} mm (at {clearance:g} "
         f"mm clearance per side), other contacts within {t.support_mm:g} mm, over at least "
         f"{100 * t.overlap_fraction:g} % of the true overlap; no part more than {t.penetration_mm:g} mm inside "
         f"another, no parts that touch slid against each other by more than {t.pushed_mm:g} mm since they were put; "
-        f"all let go of and slower than {t.rest_mm_s:g} mm/s and {t.rest_deg_s:g} degrees/s."
-    )
-    wider = sorted(_wider(scenario))
-    if wider:
-        yield (
-            "The play of all faces of two parts together leaves some of them more, so they may be farther apart: "
-            + "; ".join(f"{contact} by {play + t.fit_margin_mm:.2f} mm" for contact, play in wider)
-            + "."
-        )
-    if any(map(scenario.assembly.is_round, (relation.contact for relation in scenario.assembly.relations()))):
-        yield (
-            "Of round faces the axes count, at both ends of the length that they have in common, which is their "
-            "overlap; a hole that is wider than its shaft allows that much more. A part of revolution may end at any "
-            "turn about its axis."
-        )
-    away = sorted(fixtures(scenario.assembly))
-    if away:
-        yield f"Where {listed_words(away)} ends is free: it is a fixture, used and put away."
-    yield (
+        f"all let go of and slower than {t.rest_mm_s:g} mm/s and {t.rest_deg_s:g} degrees/s.": True,
+        "The play of all faces of two parts together leaves some of them more, so they may be farther apart: "
+        f"{wider}.": wider,
+        "Of round faces the axes count, at both ends of the length that they have in common, which is their overlap; a "
+        "hole that is wider than its shaft allows that much more. A part of revolution may end at any turn about its "
+        "axis.": is_round,
+        f"Where {listed_words(away)} ends is free: it is a fixture, used and put away.": away,
         "As demonstrated: the same, and every contact also when it was made, where it was shown; no part in place "
         f"pushed on the way, nor a corner of one more than {t.pushed_mm:g} mm from where it was put."
-        + (" Here only that is a success." if scenario.success_means != "assembled" else "")
-    )
-    yield f"Loose: every contact within {t.loose_gap_mm:g} mm and {t.loose_angle_deg:g} degrees, over the same overlap."
-    yield f"Contact equations count as solved below {scenario.gap_mm:g} mm."
+        + " Here only that is a success."
+        * (scenario.success_means != "assembled"): True,
+        f"Loose: every contact within {t.loose_gap_mm:g} mm and {t.loose_angle_deg:g} degrees, over the same "
+        "overlap.": True,
+        f"Contact equations count as solved below {scenario.gap_mm:g} mm.": True,
+    }
+    return (sentence for sentence, holds in said.items() if holds)
 
 
 def _wider(scenario: Scenario) -> Iterator[tuple[str, float]]:
     """Contacts whose faces can come farther apart than their own clearance, and how far, [mm]; at the nominal goals."""
     assembly = scenario.assembly
-    clearance = scenario.clearance_mm
     history = placements(assembly, scenario.start, scenario.goals)
     for contact, operation, _ in assembly.relations():
-        play = joint_play_mm(assembly, contact, operation, history[operation], clearance)
-        if play is not None and play > clearance:
+        play = joint_play_mm(assembly, contact, operation, history[operation], scenario.clearance_mm)
+        if play is not None and play > scenario.clearance_mm:
             yield str(contact), play
 
 

@@ -21,27 +21,25 @@ def correction_lines(
     observation: Observation, correction: Correction, explanation: Explanation | None
 ) -> list[tuple[str, str]]:
     """How it ended, the gaps, the test, what is free: name and text of each line."""
-    lines = [("ended", f"{'' if correction.ok else f'{correction.status}: '}{correction.sentence}")]
-    lines.append(("contact gap", _gaps(correction)))
-    if correction.test is not None:
-        lines.append(("test", _test(correction.test, correction.status == "inconsistent")))
-    if correction.dropped:
-        lines.append(("left out", ", ".join(correction.dropped)))
-    if correction.test_after is not None:
-        lines.append(("test without", _test(correction.test_after, correction.status == "inconsistent")))
-    if explanation is not None:
-        lines.append(("contacts", total(explanation)))
-        lines += [("" if i else "free", sentence) for i, sentence in enumerate(sentences(explanation))]
-    return lines
+    facts = {
+        "ended": f"{'' if correction.ok else f'{correction.status}: '}{correction.sentence}",
+        "contact gap": _gaps(correction),
+        "test": _test(correction.test, correction.status == "inconsistent"),
+        "left out": ", ".join(correction.dropped),
+        "test without": _test(correction.test_after, correction.status == "inconsistent"),
+        "contacts": "" if explanation is None else total(explanation),
+    }
+    free = [] if explanation is None else sentences(explanation)
+    named = [(name, text) for name, text in facts.items() if text]
+    return named + [("" if i else "free", sentence) for i, sentence in enumerate(free)]
 
 
 def pose_table(observation: Observation, correction: Correction) -> Any:
     """Corrected poses in mm and wxyz, and how far they were moved, as a table of `rich`."""
-    from rich.table import Table
+    from rich.table import Column, Table
 
-    table = Table("", "part", box=None, pad_edge=False)
-    for name in ("x mm", "y mm", "z mm", "qw", "qx", "qy", "qz", "moved mm", "turned deg"):
-        table.add_column(name, justify="right")
+    numbers = ("x mm", "y mm", "z mm", "qw", "qx", "qy", "qz", "moved mm", "turned deg")
+    table = Table("", "part", *(Column(name, justify="right") for name in numbers), box=None, pad_edge=False)
     moved = _moved(observation, correction)
     for k, operation in enumerate(observation.assembly.operations):
         packed = pose.pack(correction.goals[k])
@@ -52,17 +50,16 @@ def pose_table(observation: Observation, correction: Correction) -> Any:
 
 def suspect_table(test: Consistency) -> Any:
     """Every relation, and how well the rest fits without it, as a table of `rich`."""
-    from rich.table import Table
+    from rich.table import Column, Table
 
-    table = Table("without", "made", "contacts", box=None, pad_edge=False)
-    for name in ("chi-square", "of", "p"):
-        table.add_column(name, justify="right")
-    table.add_column("")
+    numbers = (Column(name, justify="right") for name in ("chi-square", "of", "p"))
+    table = Table("without", "made", "contacts", *numbers, "", box=None, pad_edge=False)
     for suspect in test.suspects:
-        contacts = ", ".join(map(str, suspect.contacts))
-        numbers = (f"{suspect.chi_square:.1f}", str(suspect.freedom), f"{suspect.p_value:.2g}")
-        verdict = "may be wrong" if suspect in test.ambiguous else ""
-        table.add_row(suspect.relation, str(suspect.made + 1), contacts, *numbers, verdict)
+        table.add_row(
+            *(suspect.relation, str(suspect.made + 1), ", ".join(map(str, suspect.contacts))),
+            *(f"{suspect.chi_square:.1f}", str(suspect.freedom), f"{suspect.p_value:.2g}"),
+            "may be wrong" if suspect in test.ambiguous else "",
+        )
     return table
 
 
@@ -87,8 +84,8 @@ def correction_form(
         "freedom": None if explanation is None else explanation.freedom,
         "deviations_assumed": assumed,
         "operations": _operations_form(observation, correction) if correction.ok else None,
-        "test": None if correction.test is None else _test_form(correction.test),
-        "test_after": None if correction.test_after is None else _test_form(correction.test_after),
+        "test": _test_form(correction.test),
+        "test_after": _test_form(correction.test_after),
         "dropped": list(correction.dropped),
         "explanation": None if explanation is None else explanation_form(scenario, explanation),
     }
@@ -103,7 +100,9 @@ def _gaps(correction: Correction) -> str:
     return f"{before}, {correction.gap_after_m * 1e3:.3f} mm corrected{of}"
 
 
-def _test(test: Consistency, contradictory: bool) -> str:
+def _test(test: Consistency | None, contradictory: bool) -> str:
+    if test is None:
+        return ""
     numbers = (
         f"chi-square {test.chi_square:.1f}, {test.freedom} degrees of freedom, p {shown_p(test.p_value, test.level)}"
     )
@@ -122,16 +121,18 @@ def _test(test: Consistency, contradictory: bool) -> str:
 
 def shown_p(p: float, level: float) -> str:
     """Two digits, or as many as it takes to see on which side of the level it is."""
-    texts = (f"{p:.{digits}g}" for digits in range(2, 18))
-    return next(text for text in texts if (float(text) >= level) == (p >= level))
+    return next(
+        text for text in (f"{p:.{digits}g}" for digits in range(2, 18)) if (float(text) >= level) == (p >= level)
+    )
 
 
 def _moved(observation: Observation, correction: Correction) -> Array:
     """How far each goal was moved and turned, (n, 2), [mm, degrees]."""
     # D = seen^-1 corrected: its log ends with the turn, whose size is an angle
     D = pose.inverse(observation.goals) @ correction.goals
-    turned = np.linalg.norm(pose.log(D)[..., 3:], axis=-1)
-    return np.column_stack([np.linalg.norm(D[..., :3, 3], axis=-1) * 1e3, np.degrees(turned)])
+    return np.column_stack(
+        [np.linalg.norm(D[..., :3, 3], axis=-1) * 1e3, np.degrees(np.linalg.norm(pose.log(D)[..., 3:], axis=-1))]
+    )
 
 
 def _operations_form(observation: Observation, correction: Correction) -> list[dict[str, Any]]:
@@ -149,8 +150,8 @@ def _operations_form(observation: Observation, correction: Correction) -> list[d
     ]
 
 
-def _test_form(test: Consistency) -> dict[str, Any]:
-    return {
+def _test_form(test: Consistency | None) -> dict[str, Any] | None:
+    return test and {
         "chi_square": _number(test.chi_square),
         "freedom": test.freedom,
         "p_value": test.p_value,

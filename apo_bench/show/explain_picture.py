@@ -10,6 +10,7 @@ from apo_bench.correction.directions import Direction
 from apo_bench.correction.explanation import Explanation, OperationExplanation
 from apo_bench.geometry import Array, Solid, extent, world_bounds
 from apo_bench.io.figures import default_looks, save_figure
+from apo_bench.io.grouping import grouped
 from apo_bench.io.words import listed_words, with_article
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.axes import axis_marks
@@ -23,7 +24,6 @@ _AWAY_M = 0.006
 """Length of an arrow, and how far from its part it begins."""
 _GRAY = (0.45, 0.45, 0.45)
 _NEAREST_M = 0.12
-_FARTHER = 1.0
 _AZIMUTH_DEG = 230.0
 _ELEVATION_DEG = -33.0
 _LOW = 0.3
@@ -48,45 +48,43 @@ def draw_explanation(scenario: Scenario, observation: Observation, explanation: 
     Raises:
         InputError: There is nothing to draw with, or the file cannot be written.
     """
+    from matplotlib.patheffects import withStroke
+
     from apo_bench.simulation.scene.marks import Marks, pixels
     from apo_bench.simulation.scene.render import camera_view, picture
     from apo_bench.simulation.scene.scene import build_scene
 
-    drawn = _parts(scenario, explanation)
+    own = {o.part: o for o in explanation.operations}
+    drawn = [
+        _DrawnPart(scenario.assembly.solids[of.part], of.pose, scenario.colors.get(of.part, _GRAY), own[of.part])
+        for of in explanation.parts
+        if of.part in own
+    ]
     scene = build_scene(scenario)
     low, high = world_bounds((part.solid, part.pose) for part in drawn)
     azimuth = np.degrees(np.arctan2(explanation.goals[0][1, 0], explanation.goals[0][0, 0])) + _AZIMUTH_DEG
     middle = (low + high) / 2 - [0.0, 0.0, 0.1 * (high - low)[2]]
-    camera = camera_view(middle, _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low)), azimuth, _ELEVATION_DEG)
-    marks = [_mark(part, free.direction, -_looking(azimuth)) for part in drawn for free in part.operation.free]
+    camera = camera_view(middle, _NEAREST_M + float(np.linalg.norm(high - low)), azimuth, _ELEVATION_DEG)
+    # the horizontal direction towards the camera
+    toward = -np.array([np.cos(np.radians(azimuth)), np.sin(np.radians(azimuth)), 0.0])
+    marks = [_mark(part, free.direction, toward) for part in drawn for free in part.operation.free]
     poses = {**observation.start, **{part.part: part.pose for part in explanation.parts}}
-    standing = [relation.contact for relation in scenario.assembly.relations() if relation.lost is None]
-    lines = axis_marks(scenario.assembly, standing, poses)
+    lines = axis_marks(
+        scenario.assembly,
+        [relation.contact for relation in scenario.assembly.relations() if relation.lost is None],
+        poses,
+    )
     image = picture(scene, poses, _WIDTH, _HEIGHT, camera, Marks([*marks, *lines]))
     fovy = float(scene.shown.model.vis.global_.fovy)
-    names = [(mark, pixels(mark.tips, camera, fovy, _WIDTH, _HEIGHT)) for mark in marks]
     figure = _captioned(image, scenario, explanation, drawn)
-    for mark, tips in names:
+    for mark in marks:
+        tips = pixels(mark.tips, camera, fovy, _WIDTH, _HEIGHT)
         x, y = max(tips, key=lambda tip: (round(tip[1]), tip[0]))
-        _name(figure, mark.name, x, y, mark.color)
+        figure.axes[0].text(
+            x, y, mark.name, color=tuple(0.75 * c for c in mark.color), fontsize=13, weight="bold", ha="center",
+            va="center", path_effects=[withStroke(linewidth=3.5, foreground="white")],
+        )  # fmt: skip
     save_figure(figure, out)
-
-
-def _parts(scenario: Scenario, explanation: Explanation) -> list[_DrawnPart]:
-    own = {o.part: o for o in explanation.operations}
-    return [
-        _DrawnPart(
-            scenario.assembly.solids[part.part], part.pose, scenario.colors.get(part.part, _GRAY), own[part.part]
-        )
-        for part in explanation.parts
-        if part.part in own
-    ]
-
-
-def _looking(azimuth_deg: float) -> Array:
-    """The horizontal direction in which a camera looks."""
-    a = np.radians(azimuth_deg)
-    return np.array([np.cos(a), np.sin(a), 0.0])
 
 
 def _mark(part: _DrawnPart, direction: Direction, toward: Array) -> Any:
@@ -95,13 +93,13 @@ def _mark(part: _DrawnPart, direction: Direction, toward: Array) -> Any:
 
     R = part.pose[:3, :3]
     middle = part.solid.bounds.mean(axis=0)
-    r, g, b = part.color
-    color = (_SHADE * r, _SHADE * g, _SHADE * b)
+    r, g, b = (_SHADE * c for c in part.color)
     axis = R @ direction.axis
     if not direction.turns:
         reach = extent(part.solid.pieces, direction.axis)[1] - direction.axis @ middle
-        center = R @ middle + part.pose[:3, 3]
-        return ShiftArrows(center, axis, reach + _AWAY_M, reach + _AWAY_M + _ARROW_M, color, str(direction))
+        return ShiftArrows(
+            R @ middle + part.pose[:3, 3], axis, reach + _AWAY_M, reach + _AWAY_M + _ARROW_M, (r, g, b), str(direction)
+        )
     low, high = extent(part.solid.pieces, direction.axis)
     # on the axis of the turn, at a part of the way from the lower end of the solid along it
     about = direction.point + (_LOW * high + (1 - _LOW) * low - direction.point @ direction.axis) * direction.axis
@@ -109,7 +107,7 @@ def _mark(part: _DrawnPart, direction: Direction, toward: Array) -> Any:
     across = np.linalg.svd(direction.axis[None])[2][1:]
     ends = np.array([extent(part.solid.pieces, v) for v in across]) - (across @ about)[:, None]
     radius = float(np.linalg.norm(np.abs(ends).max(axis=1))) + 2 * _AWAY_M
-    return TurnRing(R @ about + part.pose[:3, 3], axis, toward, radius, color, str(direction))
+    return TurnRing(R @ about + part.pose[:3, 3], axis, toward, radius, (r, g, b), str(direction))
 
 
 def _captioned(image: Any, scenario: Scenario, explanation: Explanation, drawn: list[_DrawnPart]) -> Any:
@@ -131,23 +129,9 @@ def _captioned(image: Any, scenario: Scenario, explanation: Explanation, drawn: 
     return figure
 
 
-def _name(figure: Any, name: str, x: float, y: float, color: tuple[float, float, float]) -> None:
-    """Write the name of a direction where its arrow ends, (x, y) in pixels of the picture."""
-    from matplotlib.patheffects import withStroke
-
-    axes = figure.axes[0]
-    shade = tuple(0.75 * c for c in color)
-    axes.text(
-        x, y, name, color=shade, fontsize=13, weight="bold", ha="center", va="center",
-        path_effects=[withStroke(linewidth=3.5, foreground="white")],
-    )  # fmt: skip
-
-
 def _line(explanation: Explanation, o: OperationExplanation) -> str:
     """`castle1: x 1.00 mm free; y 0.58 mm, yaw 0.58 deg free with castle2 and the stick; the rest fixed`."""
-    together: dict[tuple[int, ...], list[str]] = {}
-    for free in o.free:
-        together.setdefault(free.along, []).append(f"{free.direction} ({size(free)})")
+    together = grouped((free.along, f"{free.direction} ({size(free)})") for free in o.free)
     groups = []
     for along, words in together.items():
         others = dict.fromkeys(with_article(explanation.operations[j].part) for j in along)

@@ -12,6 +12,7 @@ from apo_bench.correction.relation_equations import RelationHold
 from apo_bench.correction.shared_estimate import SharedEstimate
 from apo_bench.files.json_forms import covariance_form, pose_form
 from apo_bench.geometry import Array, RoundFace
+from apo_bench.io.grouping import grouped
 from apo_bench.io.words import listed_words, with_article
 
 _EXPLANATION = "apo-bench/explanation/1"
@@ -31,28 +32,29 @@ def total(explanation: Explanation) -> str:
 
 def sentences(explanation: Explanation) -> list[str]:
     """One for each operation: what is fixed by which parts, and what is free; then one for each shared error."""
-    operations = [
+    return [
         f"{o.operation + 1} {o.part}: {_fixed(o)}; {_loose(explanation, o.free)}{_along_axes(explanation, o)}"
         for o in explanation.operations
-    ]
-    return operations + [_shared(estimate) for estimate in explanation.shared]
+    ] + [_shared(estimate) for estimate in explanation.shared]
 
 
 def explanation_tables(explanation: Explanation) -> list[Any]:
     """What holds each operation, and how well every part is known at the end, as tables of `rich`."""
-    from rich.table import Table
+    from rich.table import Column, Table
 
     operations = Table("", "operation", "fixed", "free", "through", "agrees", box=None, pad_edge=False)
     for o in explanation.operations:
         through, agreeing = ("\n".join(map(_hold, some)) or "-" for some in (o.through, o.agreeing))
-        free = "\n".join(map(_free, o.free)) or "-"
-        operations.add_row(str(o.operation + 1), o.part, f"{o.rank} of 6", free, through, agreeing)
-    parts = Table("at the end", "pose", "fixed", box=None, pad_edge=False)
-    for name in (*(f"{name} mm" for name in SHIFT_NAMES), *(f"{name} deg" for name in TURN_NAMES)):
-        parts.add_column(name, justify="right")
+        operations.add_row(
+            str(o.operation + 1), o.part, f"{o.rank} of 6", "\n".join(map(_free, o.free)) or "-", through, agreeing
+        )
+    names = (*(f"{name} mm" for name in SHIFT_NAMES), *(f"{name} deg" for name in TURN_NAMES))
+    numbers = (Column(name, justify="right") for name in names)
+    parts = Table("at the end", "pose", "fixed", *numbers, box=None, pad_edge=False)
     for part in explanation.parts:
-        deviations = [f"{x:.2f}" for x in part.deviations * _TO_MM_DEG]
-        parts.add_row(part.part, spelled(part.odl), f"{part.rank} of 6", *deviations)
+        parts.add_row(
+            part.part, spelled(part.odl), f"{part.rank} of 6", *[f"{x:.2f}" for x in part.deviations * _TO_MM_DEG]
+        )
     return [operations, parts]
 
 
@@ -66,26 +68,27 @@ def explanation_form(scenario: str, explanation: Explanation) -> dict[str, Any]:
         "rank": explanation.rank,
         "freedom": explanation.freedom,
         "redundant": explanation.redundant,
-        "shared": [_shared_form(estimate) for estimate in explanation.shared],
+        "shared": [
+            {
+                "name": estimate.error.name,
+                "operations": _numbers(estimate.error.operations),
+                "twist_mm_deg": (estimate.twist * _TO_MM_DEG).tolist(),
+                "covariance_mm_deg": covariance_form(estimate.covariance),
+            }
+            for estimate in explanation.shared
+        ],
         "spectral_gap": explanation.spectral_gap if np.isfinite(explanation.spectral_gap) else None,
     }
 
 
 def _shared(estimate: SharedEstimate) -> str:
     """`camera: seen off by (-0.30 +- 0.50, 1.90 +- 0.30, 0.10 +- 0.40) mm and (..) deg, in its frame`."""
-    numbers = zip(estimate.twist * _TO_MM_DEG, estimate.deviations * _TO_MM_DEG, strict=True)
-    each = [f"{x:.2f} +- {s:.2f}" for x, s in numbers]
+    each = [
+        f"{x:.2f} +- {s:.2f}"
+        for x, s in zip(estimate.twist * _TO_MM_DEG, estimate.deviations * _TO_MM_DEG, strict=True)
+    ]
     frame = "in the frame of the part" if estimate.error.frame is None else "in its frame"
     return f"{estimate.error.name}: seen off by ({', '.join(each[:3])}) mm and ({', '.join(each[3:])}) deg, {frame}"
-
-
-def _shared_form(estimate: SharedEstimate) -> dict[str, Any]:
-    return {
-        "name": estimate.error.name,
-        "operations": [k + 1 for k in estimate.error.operations],
-        "twist_mm_deg": (estimate.twist * _TO_MM_DEG).tolist(),
-        "covariance_mm_deg": covariance_form(estimate.covariance),
-    }
 
 
 def size(free: FreeDirection) -> str:
@@ -105,12 +108,8 @@ def _fixed(o: OperationExplanation) -> str:
 
 def _loose(explanation: Explanation, free: Sequence[FreeDirection]) -> str:
     """Free directions, those that go together in one breath."""
-    if not free:
-        return "nothing is free"
-    together: dict[tuple[int, ...], list[FreeDirection]] = {}
-    for direction in free:
-        together.setdefault(direction.along, []).append(direction)
-    return "; ".join(_group(explanation, along, some) for along, some in together.items())
+    together = grouped((direction.along, direction) for direction in free)
+    return "; ".join(_group(explanation, along, some) for along, some in together.items()) or "nothing is free"
 
 
 def _group(explanation: Explanation, along: tuple[int, ...], some: list[FreeDirection]) -> str:
@@ -141,21 +140,17 @@ def _along_axes(explanation: Explanation, o: OperationExplanation) -> str:
 
 def _is_on(direction: Direction, face: RoundFace) -> bool:
     """Whether a direction is a shift along the axis of a face, or a pure turn about it."""
-    if abs(direction.axis @ face.axis) < 1.0 - _ALONG:
-        return False
-    if not direction.turns:
-        return True
+    along = abs(direction.axis @ face.axis) >= 1.0 - _ALONG
     # distance of the two parallel lines: |(p - q) x a| of a unit axis a
-    off = np.cross(face.point - direction.point, face.axis)
-    return bool(np.sqrt(off @ off) < _OFF_M and abs(direction.pitch_m) < _OFF_M)
+    off = np.linalg.norm(np.cross(face.point - direction.point, face.axis)) if direction.turns else 0.0
+    return bool(along and off < _OFF_M and (not direction.turns or abs(direction.pitch_m) < _OFF_M))
 
 
 def _about(free: FreeDirection) -> str:
     """The point of a turn, if it is not the origin of the part."""
     point = free.direction.point
-    if not free.direction.turns or np.abs(point).max() < _OFF_M:
-        return ""
-    return f" about ({', '.join(f'{x * 1e3:.0f}' for x in point)}) mm"
+    is_off = free.direction.turns and np.abs(point).max() >= _OFF_M
+    return f" about ({', '.join(f'{x * 1e3:.0f}' for x in point)}) mm" if is_off else ""
 
 
 def _free(free: FreeDirection) -> str:
@@ -205,17 +200,12 @@ def _free_forms(free: Sequence[FreeDirection], T: Array) -> Iterator[dict[str, A
     """Twists per mm of a shift and per degree of a turn; axes in the frame of the part and in the world."""
     for freedom in free:
         d = freedom.direction
-        unit = _TO_MM_DEG[3 if d.turns else 0]
-        form: dict[str, Any] = {
+        yield {
             "name": str(d),
-            "twist_mm_deg": (d.twist * _TO_MM_DEG / unit).tolist(),
+            "twist_mm_deg": (d.twist * _TO_MM_DEG / _TO_MM_DEG[3 if d.turns else 0]).tolist(),
             "axis": d.axis.tolist(),
             "axis_world": (T[:3, :3] @ d.axis).tolist(),
-        }
-        if d.turns:
-            form["point_mm"] = (d.point * 1e3).tolist()
-        yield {
-            **form,
+            **({"point_mm": (d.point * 1e3).tolist()} if d.turns else {}),
             "deviation_deg" if d.turns else "deviation_mm": _deviation(freedom),
             "with": _numbers(freedom.along),
         }

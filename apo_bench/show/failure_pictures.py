@@ -4,8 +4,8 @@ A trial is run again only where specification, assets and code are those of its 
 drawn where the row says that they ended. So are those of a salted trial whose salt was not given.
 """
 
-import io
 import json
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +28,6 @@ _WIDTH = 640
 _HEIGHT = 480
 _QUALITY = 82
 _NEAREST_M = 0.12
-_FARTHER = 1.0
 _AZIMUTH_DEG = 128.0
 _ELEVATION_DEG = -24.0
 _ARROW_M = 0.11
@@ -73,6 +72,8 @@ def failure_pictures(
 def _picture_of(
     row: Row, folder: Path, files: Files, scenes: dict[tuple[Any, ...], Any], salt: Salt | None
 ) -> FailurePicture:
+    import imageio.v3 as iio
+
     from apo_bench.scenario.file import scenario_names
     from apo_bench.simulation.scene.render import picture
     from apo_bench.trial.fingerprint import content_hash, spec_hash
@@ -87,20 +88,19 @@ def _picture_of(
     scene = scenes[key]
     picture(scene, {}, 16, 12)  # is there anything to draw with? asked before the trial is run
     content = content_hash(scene.scenario, spec.scenario, scene.arm.files)
-    if spec_hash(spec, content) == row.get("spec_hash"):
-        image = _again(row, spec, scene, content)
-        if image is not None:
-            how = "how the replay ended, run again for this picture"
-            return FailurePicture(row, _jpeg(image), f"{how}{_pointed_at(row, scene)}")
-    whole = _whole_row(folder, row)
-    poses = _poses(whole.get("reached"))
-    if not poses:
-        raise ValueError(f"of seed {row['seed']} of {row['scenario']} nothing is known of where the parts ended")
-    image = picture(scene, poses, _WIDTH, _HEIGHT, _camera(scene, row, poses), _mark(row, scene, poses))
-    secret = row.get("salt") is not None and salt is None
-    why = "the file of its salt was not given (--salt-file)" if secret else "other code or assets made it"
-    how = f"where the parts ended, as the row says; {why}, so it was not run again"
-    return FailurePicture(row, _jpeg(image), f"{how}{_pointed_at(row, scene)}")
+    how = "how the replay ended, run again for this picture"
+    image = _again(row, spec, scene, content) if spec_hash(spec, content) == row.get("spec_hash") else None
+    if image is None:
+        poses = _poses(_whole_row(folder, row).get("reached"))
+        if not poses:
+            raise ValueError(f"of seed {row['seed']} of {row['scenario']} nothing is known of where the parts ended")
+        image = picture(scene, poses, _WIDTH, _HEIGHT, _camera(scene, row, poses), _mark(row, scene, poses))
+        secret = row.get("salt") is not None and salt is None
+        why = "the file of its salt was not given (--salt-file)" if secret else "other code or assets made it"
+        how = f"where the parts ended, as the row says; {why}, so it was not run again"
+    contact = _failed_contact(row, scene)
+    at = "" if contact is None else f"; the arrow points at {contact}"
+    return FailurePicture(row, iio.imwrite("<bytes>", image, extension=".jpg", quality=_QUALITY), f"{how}{at}")
 
 
 def _whole_row(folder: Path, row: Row) -> Mapping[str, Any]:
@@ -120,15 +120,11 @@ def _again(row: Row, spec: TrialSettings, scene: Any, content: str) -> Any:
     from apo_bench.simulation.scene.render import picture_with_arm
     from apo_bench.trial.trial import run_trial
 
-    last: list[Any] = []
-
-    def keep(data: Any) -> None:
-        last[:] = [np.array(data.qpos)]
-
-    again = run_trial(spec, scene, content=content, watch=keep)
+    last: deque[Any] = deque(maxlen=1)
+    again = run_trial(spec, scene, content=content, watch=lambda data: last.append(np.array(data.qpos)))
     if not last or any(again.get(name) != row.get(name) for name in _SAME):
         return None
-    poses = _poses(again["reached"]) or {}
+    poses = _poses(again["reached"])
     camera = _camera(scene, row, poses)
     fixed = {part: poses[part] for part in scene.scenario.assembly.fixed if part in poses}
     return picture_with_arm(scene, fixed, last[0], _WIDTH, _HEIGHT, camera, _mark(row, scene, poses))
@@ -141,13 +137,7 @@ def _failed_contact(row: Row, scene: Any) -> Contact | None:
     every = [contact for operation in operations for contact in operation.contacts]
     # with a space behind it, so that `a.px on b.n` is not found in `a.px on b.nx`
     named = [contact for contact in every if f"{contact} " in f"{row.get('sentence') or ''} "]
-    stopped = operations[k - 1].contacts if k and row["failure_code"] == "force_stop" else ()
-    return next(iter(named or stopped), None)
-
-
-def _pointed_at(row: Row, scene: Any) -> str:
-    contact = _failed_contact(row, scene)
-    return "" if contact is None else f"; the arrow points at {contact}"
+    return next(iter(named or (operations[k - 1].contacts if k and row["failure_code"] == "force_stop" else ())), None)
 
 
 def _mark(row: Row, scene: Any, poses: Poses) -> Any:
@@ -157,21 +147,17 @@ def _mark(row: Row, scene: Any, poses: Poses) -> Any:
 
     contact = _failed_contact(row, scene)
     assembly = scene.scenario.assembly
-    if contact is None:
-        return None
-    of = contact.manipulated if contact.environment.part in assembly.fixed else contact.environment
-    if of.part not in poses:
+    of = contact and (contact.manipulated if contact.environment.part in assembly.fixed else contact.environment)
+    if contact is None or of is None or of.part not in poses:
         return None
     middle = outline_points(assembly, of, poses).mean(axis=0)
     lines = axis_marks(assembly, [contact], poses) if all(each.part in poses for each in contact) else []
     return Marks([ShiftArrows(middle, np.array([0.0, 0.0, 1.0]), _ARROW_M, _TIP_M, _ARROW), *lines])
 
 
-def _poses(reached: Mapping[str, Sequence[float]] | None) -> Poses | None:
+def _poses(reached: Mapping[str, Sequence[float]] | None) -> Poses:
     """Part -> (4, 4), world frame, [m], of what a row says in mm."""
-    if not reached:
-        return None
-    return {part: pose.unpack([*(np.array(x[:3]) * 1e-3), *x[3:]]) for part, x in reached.items()}
+    return {part: pose.unpack([*(np.array(x[:3]) * 1e-3), *x[3:]]) for part, x in (reached or {}).items()}
 
 
 def _camera(scene: Any, row: Row, poses: Poses) -> Any:
@@ -186,13 +172,5 @@ def _camera(scene: Any, row: Row, poses: Poses) -> Any:
     if not parts:
         return camera_view(np.array([*scene.scenario.site.center_m, 0.06]), 0.6, _AZIMUTH_DEG, _ELEVATION_DEG)
     low, high = world_bounds((assembly.solids[part], poses[part]) for part in parts)
-    far = _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low))
+    far = _NEAREST_M + float(np.linalg.norm(high - low))
     return camera_view((low + high) / 2, min(far, 1.2), _AZIMUTH_DEG, _ELEVATION_DEG)
-
-
-def _jpeg(image: Any) -> bytes:
-    import imageio.v3 as imageio
-
-    file = io.BytesIO()
-    imageio.imwrite(file, image, extension=".jpg", quality=_QUALITY)
-    return file.getvalue()

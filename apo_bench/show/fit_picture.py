@@ -35,21 +35,18 @@ def draw_fit(residuals: Residuals, measured: MeasuredNoise, path: Path) -> None:
     figure = Figure(figsize=(11.0, 6.6), layout="constrained")
     axes = figure.subplots(2, 3)
     for column, (name, sizes, cdf, limit) in zip(axes.T, columns, strict=True):
-        _histogram(column[0], sizes, cdf, limit)
-        _quantiles(column[1], sizes, cdf, limit)
-        column[0].set_xlabel(name)
-        column[1].set_xlabel(f"fitted, {name}")
+        _histogram(column[0], name, sizes, cdf, limit)
+        _quantiles(column[1], name, sizes, cdf, limit)
     axes[0, 0].set_ylabel("density")
     axes[1, 0].set_ylabel("seen")
     axes[0, 0].legend(frameon=False)
+    source = measured.source if len(measured.source) <= 110 else measured.source[:107] + "..."
     rates = f"{100 * measured.outliers:.1f} % outliers, {100 * measured.missed:.1f} % missed"
-    figure.suptitle(
-        f"{_short(measured.source)}\n{int(upright.sum())} inliers that are not turned; {rates}", fontsize=11
-    )
+    figure.suptitle(f"{source}\n{int(upright.sum())} inliers that are not turned; {rates}", fontsize=11)
     figure.savefig(path, dpi=120)
 
 
-def _histogram(axis: Any, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> None:
+def _histogram(axis: Any, name: str, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> None:
     top = min(limit, max(float(np.quantile(sizes, _SHOWN)) * 1.05, 1e-3 * limit))
     edges = np.linspace(0.0, top, _BINS + 1)
     # a density of all sizes, also of those beyond the last bin: each counts 1 / (n * width of a bin)
@@ -57,11 +54,11 @@ def _histogram(axis: Any, sizes: Array, cdf: Callable[[Array], Array], limit: fl
     # the fitted density is the slope of its distribution
     fine = np.linspace(0.0, top, 401)
     axis.plot((fine[1:] + fine[:-1]) / 2, np.diff(cdf(fine)) / np.diff(fine), color=_FITTED, label="fitted")
-    axis.set_xlim(0.0, top)
+    axis.set(xlim=(0.0, top), xlabel=name)
     axis.spines[["top", "right"]].set_visible(False)
 
 
-def _quantiles(axis: Any, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> None:
+def _quantiles(axis: Any, name: str, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> None:
     """Every seen size against the one that the fit has at its rank; on the line they are alike."""
     grid = limit * np.linspace(0.0, 1.0, 2001) ** 2
     chance = np.maximum.accumulate(cdf(grid))
@@ -69,11 +66,5 @@ def _quantiles(axis: Any, sizes: Array, cdf: Callable[[Array], Array], limit: fl
     rank = (np.arange(len(sizes)) + 0.5) / len(sizes)
     axis.plot([0.0, limit], [0.0, limit], color=_FITTED, linewidth=1.0)
     axis.plot(np.interp(rank, chance, grid), np.sort(sizes), ".", color="#33557a", markersize=3)
-    axis.set_xlim(0.0, limit)
-    axis.set_ylim(0.0, limit)
-    axis.set_aspect("equal")
+    axis.set(xlim=(0.0, limit), ylim=(0.0, limit), aspect="equal", xlabel=f"fitted, {name}")
     axis.spines[["top", "right"]].set_visible(False)
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= 110 else text[:107] + "..."

@@ -94,12 +94,15 @@ def fit_lines(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[F
         *_tail_facts("shift", ("across the ray", "along the ray"), measured.shift_mm, "mm", figures[:2]),
         *_tail_facts("turn", ("across the ray", "about the ray"), measured.turn_deg, "deg", figures[2:]),
     ]
-    lines = [*columns(facts), "", " " * 33 + "".join(f"{f'p{p}':>8}" for p in PERCENTILES)]
-    for f in figures:
-        for word, values in (("seen", f.observed), ("fitted", f.fitted)):
-            name = f"{f.name} [{f.unit}]" if word == "seen" else ""
-            lines.append(f"{name:26}{word:7}" + "".join(f"{v:8.2f}" for v in values))
-    return lines
+    quantiles = [
+        row for f in figures for row in ((f"{f.name} [{f.unit}]", "seen", f.observed), ("", "fitted", f.fitted))
+    ]
+    return [
+        *columns(facts),
+        "",
+        " " * 33 + "".join(f"{f'p{p}':>8}" for p in PERCENTILES),
+        *(f"{name:26}{word:7}" + "".join(f"{v:8.2f}" for v in values) for name, word, values in quantiles),
+    ]
 
 
 def fit_notes(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Figures]) -> tuple[str, ...]:
@@ -140,8 +143,9 @@ def _left_over(residuals: Residuals) -> str:
 
 def _turned_and_off(residuals: Residuals, measured: MeasuredNoise) -> int:
     """How many turned inliers are off across the ray by more than `_RARE` of what was fitted to the others."""
-    turned = residuals.inlier & ~residuals.upright
-    return int((measured.shift_mm.cdf_across(residuals.across_mm[turned]) > 1.0 - _RARE).sum())
+    return int(
+        (measured.shift_mm.cdf_across(residuals.across_mm[(residuals.inlier & ~residuals.upright)]) > 1.0 - _RARE).sum()
+    )
 
 
 def _score_fact(residuals: Residuals) -> list[tuple[str, str]]:
@@ -179,19 +183,19 @@ def _bias(residuals: Residuals) -> tuple[Array, Array]:
 
 def _ratio(residuals: Residuals) -> float:
     """Median error along the ray over that across, of inliers."""
-    across = float(np.median(residuals.across_mm[residuals.inlier]))
-    return float(np.median(residuals.along_mm[residuals.inlier])) / max(across, 1e-9)
+    return float(np.median(residuals.along_mm[residuals.inlier])) / max(
+        float(np.median(residuals.across_mm[residuals.inlier])), 1e-9
+    )
 
 
 def _percentiles(values: Array) -> list[float]:
-    return [float(x) for x in np.percentile(values, PERCENTILES)]
+    return list(map(float, np.percentile(values, PERCENTILES)))
 
 
 def _split_form(split: Split) -> dict[str, Any]:
-    tails = {"across": split.across, "along": split.along}
     return {"limit": split.limit} | {
         name: {"scale": t.scale, "degrees_of_freedom": t.freedom if np.isfinite(t.freedom) else None}
-        for name, t in tails.items()
+        for name, t in {"across": split.across, "along": split.along}.items()
     }
 
 

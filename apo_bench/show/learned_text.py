@@ -35,17 +35,18 @@ def learned_form(learned: Learned) -> dict[str, Any]:
 def learned_lines(learned: Learned) -> list[str]:
     """The same in words, line by line; numbers in brackets are 95 % intervals."""
     noise = learned.noise
+    percent = EstimatedNumber(*(100.0 * x for x in noise.gross))
     facts = [
         ("source", learned.measured.source),
         ("observations", f"{noise.observations}, {learned.operations} operations, {learned.unseen} of them not seen"),
+        *((of.name, _estimate(found, of.unit)) for of, found in zip(COMPONENTS, noise.deviations, strict=True)),
+        ("outliers", f"{percent.value:.1f} % [{percent.low:.1f} to {percent.high:.1f}] of what was seen"),
     ]
-    for component, estimate in zip(COMPONENTS, noise.deviations, strict=True):
-        facts.append((component.name, _estimate(estimate, component.unit)))
-    percent = EstimatedNumber(*(100.0 * x for x in noise.gross))
-    facts.append(("outliers", f"{percent.value:.1f} % [{percent.low:.1f} to {percent.high:.1f}] of what was seen"))
     if noise.constant.any():
-        deviations = np.sqrt(np.diag(noise.constant_covariance))
-        each = [f"{x:.2f} +- {s:.2f}" for x, s in zip(noise.constant, deviations, strict=True)]
+        each = [
+            f"{x:.2f} +- {s:.2f}"
+            for x, s in zip(noise.constant, np.sqrt(np.diag(noise.constant_covariance)), strict=True)
+        ]
         facts.append(("constant error", f"({', '.join(each[:3])}) mm, ({', '.join(each[3:])}) deg, axes of the camera"))
     return columns(facts)
 

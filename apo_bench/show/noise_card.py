@@ -3,6 +3,7 @@ the Gaussian that its observations state."""
 
 import inspect
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -55,11 +56,9 @@ def listed_models() -> Mapping[str, str]:
 def facts(model: Any) -> Facts:
     """What a model says of itself; of one that says nothing, its docstring."""
     model = _model(model)
-    own = getattr(model, "FACTS", None)
-    if isinstance(own, Facts):
-        return own
     title = (inspect.getdoc(model) or "A noise model that says nothing of itself.").split("\n\n")[0]
-    return Facts(" ".join(title.split()), (), "", (), "")
+    own = getattr(model, "FACTS", None)
+    return own if isinstance(own, Facts) else Facts(" ".join(title.split()), (), "", (), "")
 
 
 def _model(model: Any) -> Any:
@@ -76,32 +75,30 @@ def draw_errors(model: Any, level: Level, draws: int = _DRAWS) -> Drawn:
     rng = np.random.default_rng(0)
     errors = []
     variances = []
-    missed = 0
     for _ in range(draws):
         observation = observe(demonstration, noise, rng)
         # error xi of T Exp(xi), turned from the part's own frame into that of the ray: R_ray^T R_part, for both halves
         R = np.swapaxes(camera.frames(observation.goals), 1, 2) @ observation.goals[:, :3, :3]
-        Q = np.zeros((len(R), 6, 6))
-        Q[:, :3, :3] = R
-        Q[:, 3:, 3:] = R
+        Q = np.kron(np.eye(2), R)
         xi = (Q @ pose.log(pose.inverse(demonstration.goals) @ observation.goals)[..., None])[..., 0]
         errors.append(xi[observation.seen])
         covariance = Q @ observation.covariance @ np.swapaxes(Q, 1, 2)
         variances.append(np.diagonal(covariance, axis1=1, axis2=2)[observation.seen])
-        missed += int(np.sum(~observation.seen))
     # x is across the ray and z along it; rx tilts it and rz turns about it
     scale = np.array([1e3, 1e3, np.degrees(1.0), np.degrees(1.0)])
     four = np.concatenate(errors)[:, [0, 2, 3, 5]] * scale
     stated = np.concatenate(variances)[:, [0, 2, 3, 5]]
-    rms = np.sqrt(stated.sum(axis=0) / max(1, len(stated))) * scale
-    return Drawn(four, rms, missed / (draws * len(demonstration.goals)))
+    return Drawn(
+        four,
+        np.sqrt(stated.sum(axis=0) / max(1, len(stated))) * scale,
+        1.0 - len(four) / (draws * len(demonstration.goals)),
+    )
 
 
 def nominal_demonstration() -> Demonstration:
     """What a careful human shows: the nominal goals of example 5.1, in the middle of where they may stand."""
     scenario = load_scenario(SCENARIO)
-    T = pose.at(np.append(scenario.site.center_m, 0.0))
-    goals = T @ scenario.goals
+    goals = pose.at(np.append(scenario.site.center_m, 0.0)) @ scenario.goals
     final = placements(scenario.assembly, scenario.start, goals)[-1]
     return Demonstration(scenario.assembly, scenario.start, goals, final, np.zeros((len(goals), 6, 6)))
 
@@ -119,16 +116,18 @@ def model_description(model: Any, heading: int = 1) -> str:
     """What a model says of itself, without a histogram."""
     about = facts(model)
     name = model if isinstance(model, str) else getattr(model, "__name__", type(model).__name__)
-    parts = [f"{'#' * heading} {name}: {about.title}"]
-    if about.formula:
-        parts.append("\n".join(f"    {line}" for line in about.formula))
-    lines = [f"Frame: {about.frame}."] * bool(about.frame)
-    lines += [f"Parameter {parameter}." for parameter in about.parameters]
-    lines += [f"States: {about.states}."] * bool(about.states)
-    lines += [f"{note}." for note in about.notes]
-    if lines:
-        parts.append("\n".join(f"- {line}" for line in lines))
-    return "\n\n".join(parts) + "\n"
+    lines = (
+        *[f"Frame: {about.frame}."] * bool(about.frame),
+        *(f"Parameter {parameter}." for parameter in about.parameters),
+        *[f"States: {about.states}."] * bool(about.states),
+        *(f"{note}." for note in about.notes),
+    )
+    parts = (
+        f"{'#' * heading} {name}: {about.title}",
+        "\n".join(f"    {line}" for line in about.formula),
+        "\n".join(f"- {line}" for line in lines),
+    )
+    return "\n\n".join(filter(None, parts)) + "\n"
 
 
 def drawn_sentence(model: Any, drawn: Drawn, level: Level) -> str:
@@ -166,32 +165,28 @@ def _histogram(drawn: Drawn) -> list[str]:
     edges = 0.5 * (np.arange(_BINS - 1) - (_BINS - 2) / 2)
     counts = np.array([np.bincount(np.digitize(column, edges), minlength=_BINS) for column in unit.T])
     longest = max(1, int(counts.max()))
-    lines = ["stated".rjust(12) + "".join(f"  {name:{_WIDTH}}" for name, _ in _PANELS)]
-    for i in range(_BINS):
-        if i == 0:
-            where = f"< {edges[0]:.2f}"
-        elif i == _BINS - 1:
-            where = f"> {edges[-1]:.2f}"
-        else:
-            where = f"{(edges[i - 1] + edges[i]) / 2:.1f}"
-        bars = ("#" * int(np.ceil(_WIDTH * count / longest)) for count in counts[:, i])
-        lines.append(where.rjust(12) + "".join(f"  {bar:{_WIDTH}}" for bar in bars))
-    deviation = np.sqrt(np.mean(drawn.errors**2, axis=0))
-    for word, values in (("deviation", deviation), ("stated", drawn.stated)):
-        sizes = (f"{value:.3g} {unit}" for value, (_, unit) in zip(values, _PANELS, strict=True))
-        lines.append(word.rjust(12) + "".join(f"  {size:{_WIDTH}}" for size in sizes))
-    return lines
+    middles = (f"{(a + b) / 2:.1f}" for a, b in pairwise(edges))
+    bins = (f"< {edges[0]:.2f}", *middles, f"> {edges[-1]:.2f}")
+    bars = [["#" * int(np.ceil(_WIDTH * count / longest)) for count in row] for row in counts.T]
+    found, stated = (
+        [f"{value:.3g} {unit}" for value, (_, unit) in zip(values, _PANELS, strict=True)]
+        for values in (np.sqrt(np.mean(drawn.errors**2, axis=0)), drawn.stated)
+    )
+    table = [
+        ("stated", [name for name, _ in _PANELS]),
+        *zip(bins, bars, strict=True),
+        ("deviation", found),
+        ("stated", stated),
+    ]
+    return [head.rjust(12) + "".join(f"  {cell:{_WIDTH}}" for cell in cells) for head, cells in table]
 
 
 def _panel(axis: Any, errors: Array, stated: float) -> None:
     sigma = stated or 1.0
     edges = np.linspace(-_REACH * sigma, _REACH * sigma, _DRAWN_BINS + 1)
-    inside = np.clip(errors, edges[0], edges[-1])
-    axis.hist(inside, edges, density=True, color=_COLOR, alpha=0.75)
+    axis.hist(np.clip(errors, edges[0], edges[-1]), edges, density=True, color=_COLOR, alpha=0.75)
     x = np.linspace(edges[0], edges[-1], 241)
-    normal = np.exp(-0.5 * (x / sigma) ** 2) / (sigma * np.sqrt(2.0 * np.pi))
-    axis.plot(x, normal, color="black", linewidth=1.0)
-    axis.set_yscale("log")
-    axis.set_ylim(1e-4 / sigma, 1.5 / sigma)
+    axis.plot(x, np.exp(-0.5 * (x / sigma) ** 2) / (sigma * np.sqrt(2.0 * np.pi)), color="black", linewidth=1.0)
+    axis.set(yscale="log", ylim=(1e-4 / sigma, 1.5 / sigma))
     axis.tick_params(labelsize=8)
     axis.spines[["top", "right"]].set_visible(False)

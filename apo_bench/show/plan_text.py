@@ -57,15 +57,12 @@ def plan_lines(plan: Plan, scenario: Scenario) -> tuple[PlanLine, ...]:
     """What the robot is asked to do, step by step."""
     everything = nominal_operations(scenario)
     odls = plan.assembly.odls()
-    arcs = plan.assembly.arcs()
-    made_by = [plan.assembly.relations()[arc[0]].made for arc in arcs]
-    lost_at = [plan.assembly.relations()[arc[0]].lost for arc in arcs]
+    relations = [plan.assembly.relations()[arc[0]] for arc in plan.assembly.arcs()]
     lines = []
     for (k, undo), T in zip(plan.schedule, plan.targets, strict=True):
         what = everything[k]
         before = spelled(odls[k - 1][what.main]) if k and what.main in odls[k - 1] else "start"
         leaves, comes = (what.after, what.before) if undo else (what.before, what.after)
-        mine = [i for i in range(len(arcs)) if (lost_at[i] if undo else made_by[i]) == k]
         lines.append(
             PlanLine(
                 operation=k,
@@ -74,7 +71,9 @@ def plan_lines(plan: Plan, scenario: Scenario) -> tuple[PlanLine, ...]:
                 leaves=leaves,
                 comes=comes,
                 came_from=f"T{k + 1}" if undo else before,
-                relations=tuple(f"R{i + 1}" for i in mine),
+                relations=tuple(
+                    f"R{i}" for i, of in enumerate(relations, start=1) if (of.lost if undo else of.made) == k
+                ),
                 grasp=scenario.grasps[k],
                 goal=None if undo else T,
                 back_to=before if undo else "",
@@ -100,8 +99,9 @@ def plan_lines_form(lines: Sequence[PlanLine], scenario: Scenario, notes: Sequen
     stages = (start, *placements(scenario.assembly, start, scenario.goals))
     forms = []
     for line in lines:
-        poses = stages[line.operation if line.undo else line.operation + 1]
-        screw = turning_state(scenario.assembly, line.comes, poses)
+        screw = turning_state(
+            scenario.assembly, line.comes, stages[line.operation if line.undo else line.operation + 1]
+        )
         position, felt, across = line.comes.axes
         goal = {"position_mm": None, "quaternion_wxyz": None} if line.goal is None else pose_form(line.goal)
         forms.append(

@@ -4,7 +4,7 @@ from math import degrees
 from typing import Any
 
 from apo_bench.assembly import Assembly, Contact, Observation
-from apo_bench.recognition.thresholds import Evidence, Recognised
+from apo_bench.recognition.thresholds import Recognised
 from apo_bench.trial.recognised_contacts import count_contacts
 
 _SCHEMA = "apo-bench/recognised/2"
@@ -14,14 +14,11 @@ _SURE = 0.9
 
 def evidence_table(recognised: Recognised, right: Assembly) -> Any:
     """One line per contact, with what was measured and what was allowed."""
-    from rich.table import Table
+    from rich.table import Column, Table
 
-    table = Table(box=None, pad_edge=False, header_style="bold")
-    for name in ("", "manipulated", "environment"):
-        table.add_column(name)
-    for name in ("seen gap mm", "gap mm", "allowed", "angle deg", "allowed", "overlap"):
-        table.add_column(name, justify="right")
-    table.add_column("")
+    names = ("seen gap mm", "gap mm", "allowed", "angle deg", "allowed", "overlap")
+    numbers = (Column(name, justify="right") for name in names)
+    table = Table("", "manipulated", "environment", *numbers, "", box=None, pad_edge=False, header_style="bold")
     in_scenario = {(relation.made, relation.contact) for relation in right.relations()}
     for e in recognised.evidence:
         table.add_row(
@@ -56,10 +53,9 @@ def confidence_line(recognised: Recognised) -> list[str]:
     if recognised.probability is None:
         return []
     sentence = (
-        f"this set of contacts is right with probability {recognised.probability:.2f}, of those that were compared"
+        f"{'not certain: ' * (recognised.probability < _SURE)}this set of contacts is right with probability "
+        f"{recognised.probability:.2f}, of those that were compared"
     )
-    if recognised.probability < _SURE:
-        sentence = f"not certain: {sentence}"
     if recognised.rival is None:
         return [sentence]
     added, gone = _changes(recognised.assembly, recognised.rival.assembly)
@@ -78,43 +74,38 @@ def recognition_form(
 ) -> dict[str, Any]:
     """Everything, in mm and degrees; operations from 1."""
     in_scenario = {(relation.made, relation.contact) for relation in observation.assembly.relations()}
+    rival = recognised.rival
+    added, gone = _changes(recognised.assembly, rival.assembly if rival else recognised.assembly)
     return {
         "schema": _SCHEMA,
         "scenario": name,
         "relations": kind,
         "deviation_assumed": assumed,
         "contacts": [
-            {**_evidence_form(e), "in_scenario": (e.made, e.contact) in in_scenario} for e in recognised.evidence
+            _contact_form(e.made, e.contact)
+            | {
+                "seen_gap_mm": _mm(e.seen_gap_m),
+                "gap_mm": _mm(e.gap_m),
+                "allowed_gap_mm": _mm(e.most.gap_m),
+                "angle_deg": degrees(e.angle_rad),
+                "allowed_angle_deg": degrees(e.most.angle_rad),
+                "overlap": e.share,
+                "in_scenario": (e.made, e.contact) in in_scenario,
+            }
+            for e in recognised.evidence
         ],
-        "missed": [
-            {"operation": k + 1, "manipulated": str(contact.manipulated), "environment": str(contact.environment)}
-            for k, contact in _missed(observation.assembly, recognised)
-        ],
+        "missed": [_contact_form(*missed) for missed in _missed(observation.assembly, recognised)],
         **count_contacts(observation.assembly, recognised.assembly),
         "probability": recognised.probability,
-        "next": _rival_form(recognised),
+        "next": rival and {"probability": rival.probability, "with": added, "without": gone},
     }
 
 
-def _rival_form(recognised: Recognised) -> dict[str, Any] | None:
-    """The next best set: how likely it is, and in what it differs."""
-    if recognised.rival is None:
-        return None
-    added, gone = _changes(recognised.assembly, recognised.rival.assembly)
-    return {"probability": recognised.rival.probability, "with": added, "without": gone}
-
-
-def _evidence_form(e: Evidence) -> dict[str, Any]:
+def _contact_form(operation: int, contact: Contact) -> dict[str, Any]:
     return {
-        "operation": e.made + 1,
-        "manipulated": str(e.contact.manipulated),
-        "environment": str(e.contact.environment),
-        "seen_gap_mm": _mm(e.seen_gap_m),
-        "gap_mm": _mm(e.gap_m),
-        "allowed_gap_mm": _mm(e.most.gap_m),
-        "angle_deg": degrees(e.angle_rad),
-        "allowed_angle_deg": degrees(e.most.angle_rad),
-        "overlap": e.share,
+        "operation": operation + 1,
+        "manipulated": str(contact.manipulated),
+        "environment": str(contact.environment),
     }
 
 

@@ -35,16 +35,15 @@ def robot_form(
         lines: Of the plan, step by step.
         notes: What is to be said with it.
     """
-    poses = dict(plan.start)
+    poses: Mapping[str, Array] = plan.start
     to_base = pose.inverse(frames.T_world_base)
     steps = []
     history: list[Mapping[str, Array]] = []
     for line in lines:
         after = history.pop() if line.undo else _after(plan, line, poses)
-        if not line.undo:
-            history.append(dict(poses))
-        steps.append(_step(line, poses, after, plan, scenario, frames))
-        poses = dict(after)
+        history += [] if line.undo else [poses]
+        steps.append(_step(line, poses, after, plan, frames))
+        poses = after
     return {
         "schema": _SCHEMA,
         "scenario": scenario.name,
@@ -69,9 +68,11 @@ def robot_form(
 def _after(plan: Plan, line: PlanLine, poses: Mapping[str, Array]) -> Mapping[str, Array]:
     """Where every part is when a step is done."""
     assert line.goal is not None
-    operation = plan.assembly.operations[line.operation]
-    alone = type(plan.assembly)(plan.assembly.solids, (operation,), plan.assembly.fixed)
-    return placements(alone, poses, line.goal[None])[0]
+    return placements(
+        type(plan.assembly)(plan.assembly.solids, (plan.assembly.operations[line.operation],), plan.assembly.fixed),
+        poses,
+        line.goal[None],
+    )[0]
 
 
 def _step(
@@ -79,15 +80,13 @@ def _step(
     poses: Mapping[str, Array],
     after: Mapping[str, Array],
     plan: Plan,
-    scenario: Scenario,
     frames: RobotFrames,
 ) -> dict[str, Any]:
     part = line.what.main
     here = poses[part]
     goal = after[part]
     grip = tip_in_part(line.grasp, here)
-    low, high = plan.assembly.solids[part].bounds
-    width = float(np.abs(line.grasp.across) @ (high - low))
+    width = float(np.abs(line.grasp.across) @ np.ptp(plan.assembly.solids[part].bounds, axis=0))
     tip = here @ grip
     end = goal @ grip
     contacts = () if line.undo else plan.assembly.operations[line.operation].contacts
@@ -119,22 +118,19 @@ def tip_in_part(grasp: Grasp, T_world_part: Array) -> Array:
     across = grasp.across - (grasp.across @ down) * down
     across = across / np.linalg.norm(across)
     T = np.eye(4)
-    T[:3, 0] = across
-    T[:3, 1] = np.cross(down, across)
-    T[:3, 2] = down
-    T[:3, 3] = grasp.point
+    T[:3] = np.column_stack([across, np.cross(down, across), down, grasp.point])
     return T
 
 
 def _departs(line: PlanLine, here: Array, grip: Array, frames: RobotFrames) -> list[dict[str, Any]]:
     """The motions by which the part leaves the contacts that it is in, one after the other."""
     motions = []
-    at = here
+    to = here
     for macro in line.leaves.departs:
+        at = to
         way = here[:3, :3] @ line.leaves.own(macro.direction)
         to = _shifted(at, way, macro.length_m or _GUARDED_FROM_M)
         motions.append(_motion(macro.name, False, at, to, way, grip, frames))
-        at = to
     return motions
 
 
@@ -143,20 +139,18 @@ def _arrives(line: PlanLine, goal: Array, grip: Array, frames: RobotFrames) -> l
     way_in = goal[:3, :3] @ line.comes.line.direction
     macros = list(line.comes.macros)
     if not macros:
-        at = _shifted(goal, way_in, -line.comes.line.travel_m)
-        return [_motion("put down", False, at, goal, way_in, grip, frames)]
-    motions = list[dict[str, Any]]()
-    end = goal
-    for i, macro in reversed(list(enumerate(macros))):
-        way = goal[:3, :3] @ line.comes.own(macro.direction)
-        # the first motion along the way in is as long as the plan's own way; others as long as their macro says
-        first_along = way @ way_in > _ALONG and not any(
-            goal[:3, :3] @ line.comes.own(other.direction) @ way_in > _ALONG for other in macros[:i]
-        )
-        length = line.comes.line.travel_m if first_along else macro.length_m or _GUARDED_FROM_M
-        begin = _shifted(end, way, -length)
-        motions.append(_motion(macro.name, macro.guarded, begin, end, way, grip, frames))
+        return [
+            _motion("put down", False, _shifted(goal, way_in, -line.comes.line.travel_m), goal, way_in, grip, frames)
+        ]
+    motions = []
+    begin = goal
+    ways = [goal[:3, :3] @ line.comes.own(macro.direction) for macro in macros]
+    # the first motion along the way in is as long as the plan's own way; others as long as their macro says
+    along = next((i for i, way in enumerate(ways) if way @ way_in > _ALONG), None)
+    for i, (macro, way) in reversed(list(enumerate(zip(macros, ways, strict=True)))):
         end = begin
+        begin = _shifted(end, way, -(line.comes.line.travel_m if i == along else macro.length_m or _GUARDED_FROM_M))
+        motions.append(_motion(macro.name, macro.guarded, begin, end, way, grip, frames))
     return motions[::-1]
 
 
@@ -188,6 +182,4 @@ def _pose(T: Array, frames: RobotFrames) -> dict[str, Any]:
 
 
 def _shifted(T: Array, way: Array, far: float) -> Array:
-    out = np.array(T)
-    out[:3, 3] += far * way
-    return out
+    return pose.at(far * way) @ T

@@ -124,24 +124,23 @@ def _operation_form(event: Event | None, run: SensorRun, k: int) -> dict[str, An
 
 def sensor_lines(form: dict[str, Any]) -> list[str]:
     """A form of `sensor_form` as lines to be read."""
-    lines = [
+    return [
         f"{form['scenario']}: seed {form['seed']}, careless {form['careless']:g}, "
         f"{form['level_mm']:g} mm per ray, {len(form['firings_s'])} range images",
         "",
+        *(f"{o['operation']} {' + '.join(o['moves'])}: {_seen(o)}" for o in form["operations"]),
     ]
-    for operation in form["operations"]:
-        head = f"{operation['operation']} {' + '.join(operation['moves'])}: "
-        if not operation["found"]:
-            lines.append(head + "not recognised")
-            continue
-        mm = ", ".join(f"{x:.2f}" for x in operation["deviation_mm"])
-        deg = ", ".join(f"{x:.2f}" for x in operation["deviation_deg"])
-        models = ", ".join(f"{name} {100 * share:.0f} %" for name, share in operation["explained"].items())
-        lines.append(
-            f"{head}at {operation['time_s']:.2f} s; off by {operation['error_mm']:.2f} mm, "
-            f"{operation['error_deg']:.2f} deg; known to {mm} mm, {deg} deg; explained by {models}"
-        )
-    return lines
+
+
+def _seen(operation: dict[str, Any]) -> str:
+    if not operation["found"]:
+        return "not recognised"
+    mm, deg = (", ".join(f"{x:.2f}" for x in operation[f"deviation_{unit}"]) for unit in ("mm", "deg"))
+    models = ", ".join(f"{name} {100 * share:.0f} %" for name, share in operation["explained"].items())
+    return (
+        f"at {operation['time_s']:.2f} s; off by {operation['error_mm']:.2f} mm, {operation['error_deg']:.2f} deg; "
+        f"known to {mm} mm, {deg} deg; explained by {models}"
+    )
 
 
 @default_looks()
@@ -156,13 +155,15 @@ def draw_sensor(run: SensorRun, out: Path, view: int = 0) -> None:
     for axes, title in zip(rows[0], _TITLES, strict=True):
         axes.set_title(title, fontsize=11)
     for axes in rows.ravel():
-        axes.set_xticks([])
-        axes.set_yticks([])
+        axes.set(xticks=[], yticks=[])
     for row, event in zip(rows, events, strict=False):
         row[0].set_ylabel(_label(assembly, event), fontsize=9)
         _draw_row(row, run.watched, run.images, event, view)
-    for axes in rows[:, 1:].ravel():
-        _crop(axes, events, view)
+    # only where anything ever changed is shown
+    changed = [event.regions[view].appeared | event.regions[view].vanished for event in events]
+    v, u = np.nonzero(np.any(changed, axis=0)) if changed else (np.zeros(0), np.zeros(0))
+    for axes in rows[:, 1:].ravel() if len(u) else ():
+        axes.set(xlim=(u.min() - _AROUND, u.max() + _AROUND), ylim=(v.max() + _AROUND, v.min() - _AROUND))
     save_figure(figure, out, dpi=72, given="--out ")
 
 
@@ -170,18 +171,8 @@ def _label(assembly: Assembly, event: Event) -> str:
     moved = ", ".join(sorted(event.moved)) or "nothing"
     if event.operation is None:
         return f"{moved}: not expected"
-    if event.found is None:
-        return f"{event.operation + 1}: {moved}, not recognised"
-    return f"{event.operation + 1}: {moved}, {100 * event.found.explained:.0f} % explained"
-
-
-def _crop(axes: Any, events: Sequence[Event], view: int) -> None:
-    """Show only where anything ever changed."""
-    changed = [event.regions[view].appeared | event.regions[view].vanished for event in events]
-    if np.any(changed):
-        v, u = np.nonzero(np.any(changed, axis=0))
-        axes.set_xlim(u.min() - _AROUND, u.max() + _AROUND)
-        axes.set_ylim(v.max() + _AROUND, v.min() - _AROUND)
+    ended = "not recognised" if event.found is None else f"{100 * event.found.explained:.0f} % explained"
+    return f"{event.operation + 1}: {moved}, {ended}"
 
 
 def _draw_row(row: Any, watched: DemonstrationImages, images: Sequence[Array], event: Event, view: int) -> None:
@@ -199,9 +190,11 @@ def _draw_row(row: Any, watched: DemonstrationImages, images: Sequence[Array], e
     row[4].imshow(after, cmap="gray_r", vmin=np.nanmin(after), vmax=2.0 * np.nanmax(after))
     if event.found is not None and event.shape is not None:
         expected = _expected(watched.finder.views[view], event.found.T, event.shape)
-        agreeing = regions.appeared & (np.abs(after - expected) < 0.02)
         drawn = row[4].imshow(
-            np.where(agreeing, 1e3 * (after - expected), np.nan), cmap="coolwarm", vmin=-_RESIDUAL_MM, vmax=_RESIDUAL_MM
+            np.where(regions.appeared & (np.abs(after - expected) < 0.02), 1e3 * (after - expected), np.nan),
+            cmap="coolwarm",
+            vmin=-_RESIDUAL_MM,
+            vmax=_RESIDUAL_MM,
         )
         row[4].contour(np.isfinite(expected), levels=[0.5], colors=_OUTLINE, linewidths=1.2)
         bar = row[4].figure.colorbar(drawn, ax=row[4], shrink=0.85)
@@ -212,6 +205,5 @@ def _draw_row(row: Any, watched: DemonstrationImages, images: Sequence[Array], e
 def _expected(view: PinholeView, T: Array, shape: Any) -> Array:
     """The range image of the fitted model alone, (height, width), [m]."""
     # rays in the frame of the model, where its faces are known
-    origin = pose.apply(pose.inverse(T), view.origin[None])[0]
-    distance, _ = strike_distances(shape, origin, view.rays @ T[:3, :3])
+    distance, _ = strike_distances(shape, pose.apply(pose.inverse(T), view.origin[None])[0], view.rays @ T[:3, :3])
     return distance.reshape(view.height, view.width)

@@ -1,11 +1,12 @@
 """Where somebody is who steps through a trial, and what is shown there: the same in a window and in a browser."""
 
+from bisect import bisect_right
 from dataclasses import dataclass, field
 from typing import Literal, final
 
 import numpy as np
 
-from apo_bench.assembly import PartFace, Poses, placements
+from apo_bench.assembly import Assembly, PartFace, placements
 from apo_bench.geometry import pose
 from apo_bench.simulation.film.film import operation_words
 from apo_bench.simulation.film.still import Chapter, Color, FilmMoment, Ghost, Still, part_poses
@@ -39,6 +40,10 @@ class Cursor:
     @property
     def at(self) -> FilmMoment:
         return self.current.moments[self.moment]
+
+    @property
+    def _assembly(self) -> Assembly:
+        return self.story.scene.scenario.assembly
 
     def still(self) -> Still:
         """What is to be seen here."""
@@ -78,73 +83,62 @@ class Cursor:
         if not self.playing:
             return
         self._played_s += seconds
-        moments = self.current.moments
-        k = self.moment
-        while k + 1 < len(moments) and moments[k + 1].time_s <= self._played_s:
-            k += 1
-        self.moment = k
-        self.playing = k + 1 < len(moments)
+        times = [moment.time_s for moment in self.current.moments]
+        self.moment = max(self.moment, bisect_right(times, self._played_s) - 1)
+        self.playing = self.moment + 1 < len(times)
 
     def words(self) -> tuple[str, ...]:
         """What is done here, the force, how far goals and the part are from the true goal; at the end, how it ended."""
         moment = self.at
-        assembly = self.story.scene.scenario.assembly
-        words = [f"{moment.time_s:.2f} s, {operation_words(assembly, moment)}"]
-        if self.current.world is self.story.scene.work and self.current.ending:
-            words.append(f"force {moment.doing.force_n:.1f} N")
-        if moment.doing.operation is not None:
-            words += map(str, assembly.operations[moment.doing.operation].contacts)
-            words += self._offsets(moment.doing.operation)
-        if self.moment == len(self.current.moments) - 1 and self.current.ending:
-            words.append(self.current.ending)
-        return tuple(words)
+        k = moment.doing.operation
+        is_replay = self.current.world is self.story.scene.work and bool(self.current.ending)
+        is_last = self.moment == len(self.current.moments) - 1 and bool(self.current.ending)
+        return (
+            f"{moment.time_s:.2f} s, {operation_words(self._assembly, moment)}",
+            *[f"force {moment.doing.force_n:.1f} N"] * is_replay,
+            *([] if k is None else [*map(str, self._assembly.operations[k].contacts), *self._offsets(k)]),
+            *[self.current.ending] * is_last,
+        )
 
     def _offsets(self, k: int) -> list[str]:
-        true = self.story.goals.get(AS_TRUE)
+        goals = {name: goals[k] for name, goals in self.story.goals.items()}
+        true = goals.pop(AS_TRUE, None)
         if true is None:
             return []
-        part = self.story.scene.scenario.assembly.operations[k].main
-        named = {name: goals[k] for name, goals in self.story.goals.items() if name != AS_TRUE}
-        named["as it is now"] = part_poses(self.current, self.at)[part]
-        offsets = []
-        for name, T in named.items():
-            # T_true^-1 T = Exp(twist): how far off in the part's own frame
-            twist = pose.log(pose.inverse(true[k]) @ T)
-            mm = 1e3 * np.linalg.norm(twist[:3])
-            deg = np.degrees(np.linalg.norm(twist[3:]))
-            offsets.append(f"{name}: {mm:.2f} mm, {deg:.2f} degrees off")
-        return offsets
+        goals["as it is now"] = part_poses(self.current, self.at)[self._assembly.operations[k].main]
+        # T_true^-1 T = Exp(twist): how far off in the part's own frame
+        twists = {name: pose.log(pose.inverse(true) @ T) for name, T in goals.items()}
+        return [
+            f"{name}: {1e3 * np.linalg.norm(t[:3]):.2f} mm, {np.degrees(np.linalg.norm(t[3:])):.2f} degrees off"
+            for name, t in twists.items()
+        ]
 
     def _go_operation(self, way: int) -> None:
         """To the first moment of the next operation, or of the one before."""
-        begins = [0] + [
-            i
-            for i, (a, b) in enumerate(zip(self.current.moments, self.current.moments[1:], strict=False), start=1)
-            if a.doing.operation != b.doing.operation
-        ]
-        beyond = [i for i in begins if (i > self.moment if way > 0 else i < self.moment)]
-        self.go((beyond[0] if way > 0 else beyond[-1]) if beyond else (len(self.current.moments) if way > 0 else 0))
+        doing = [moment.doing.operation for moment in self.current.moments]
+        begins = [i for i in range(len(doing)) if i == 0 or doing[i] != doing[i - 1]]
+        if way > 0:
+            self.go(next((i for i in begins if i > self.moment), len(doing)))
+        else:
+            self.go(next((i for i in reversed(begins) if i < self.moment), 0))
 
     def _faces(self) -> tuple[PartFace, ...]:
-        assembly = self.story.scene.scenario.assembly
         k = self.at.doing.operation
         if self.faces == "all":
-            return tuple(PartFace(s, f) for s, solid in assembly.solids.items() for f in (*solid.faces, *solid.rounds))
-        if self.faces == "none" or k is None:
-            return ()
-        return tuple(dict.fromkeys(of for contact in assembly.operations[k].contacts for of in contact))
+            solids = self._assembly.solids.items()
+            return tuple(PartFace(part, face) for part, solid in solids for face in (*solid.faces, *solid.rounds))
+        contacts = () if self.faces == "none" or k is None else self._assembly.operations[k].contacts
+        return tuple(dict.fromkeys(of for contact in contacts for of in contact))
 
     def _ghosts(self) -> tuple[Ghost, ...]:
         """What was moved up to here, where goals put it."""
         k = self.at.doing.operation
-        assembly = self.story.scene.scenario.assembly
         if k is None:
             return ()
-        moved = {part for operation in assembly.operations[: k + 1] for part in operation.moves}
-
-        def placed(name: str) -> Poses:
-            goals = self.story.goals[name]
-            poses = placements(assembly.first(k + 1), self.current.start, goals[: k + 1])[-1]
-            return {part: T for part, T in poses.items() if part in moved}
-
-        return tuple(Ghost(name, placed(name), COLORS[name]) for name in self.story.goals if name in self.goals)
+        begun = self._assembly.first(k + 1)
+        moved = {part for operation in begun.operations for part in operation.moves}
+        goals = {name: goals for name, goals in self.story.goals.items() if name in self.goals}
+        placed = {name: placements(begun, self.current.start, of[: k + 1])[-1] for name, of in goals.items()}
+        return tuple(
+            Ghost(name, {p: T for p, T in poses.items() if p in moved}, COLORS[name]) for name, poses in placed.items()
+        )

@@ -36,18 +36,17 @@ def choose_display(port: int | None) -> Display:
     """
     if port is not None and not 1 <= port <= 65535:
         raise InputError(f"--port {port} was given; a whole number from 1 to 65535 is allowed.")
-    missing = "" if port is None else no_browser()
-    if missing:
+    if port is None and not no_window():
+        return "window"
+    missing = no_browser()
+    if missing and port is not None:
         raise InputError(f"--port {port} was given, which is for a browser, but {missing}.")
-    if port is not None or no_window():
-        missing = no_browser()
-        if missing:
-            raise InputError(
-                f"{no_window()}, and for a browser {missing}. `apo-bench replay .. --video FILE.mp4` "
-                "and `apo-bench show` need neither."
-            )
-        return "browser"
-    return "window"
+    if missing:
+        raise InputError(
+            f"{no_window()}, and for a browser {missing}. `apo-bench replay .. --video FILE.mp4` "
+            "and `apo-bench show` need neither."
+        )
+    return "browser"
 
 
 def view(story: Story, display: Display, port: int | None, say: Callable[[str], None]) -> None:
@@ -102,12 +101,11 @@ def _chosen(folder: Path, number: int | None) -> tuple[int, Row]:
     first = None
     k = 0
     for k, line in each_line(path, "table of trials"):
-        if number is not None and k != number:
-            continue
-        row = row_of(line, f"{path}, line {k}")
-        if number is not None or (row["success"] is False and row["sim_seconds"] is not None):
-            return k, row
-        first = first or (k, row)
+        if number in (None, k):
+            row = row_of(line, f"{path}, line {k}")
+            if number is not None or (row["success"] is False and row["sim_seconds"] is not None):
+                return k, row
+            first = first or (k, row)
     if first is None:
         wanted = "there is no trial" if number is None else f"--trial {number} was given; 1 to {k} are there"
         raise InputError(f"{path}: {wanted}.")

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
+from apo_bench.io.grouping import grouped
 from apo_bench.records import RECOGNISED, Row, knows_relations, look_up
 from apo_bench.statistics.forecasts import ALL
 from apo_bench.statistics.rates import Place, Rate, order, place_of
@@ -61,32 +62,28 @@ class Recognition:
     @property
     def precision(self) -> float | None:
         """Share of the recognised contacts that are right; None if there are none."""
-        return self.right / (self.right + self.false) if self.right + self.false else None
+        return Rate(self.right, self.right + self.false).rate
 
     @property
     def recall(self) -> float | None:
         """Share of the right contacts that were recognised."""
-        return self.right / (self.right + self.missed) if self.right + self.missed else None
+        return Rate(self.right, self.right + self.missed).rate
 
     @property
     def all_right(self) -> Rate:
+        """Of the demonstrations, those that are complete."""
         return Rate(self.complete, self.demonstrations)
-
-    @property
-    def completeness(self) -> float | None:
-        """Share of the demonstrations that are complete."""
-        return self.all_right.rate
 
 
 def gaps(rows: Iterable[Row]) -> tuple[GapSummary, ...]:
     """One per cell of a method that corrects, sorted as `tally` sorts."""
-    groups: dict[Place, list[tuple[float, float]]] = {}
-    for row in rows:
-        place = place_of(row)
-        both = (row.get("gap_before_mm"), row.get("gap_after_mm"))
-        if place is not None and knows_relations(place.method) and None not in both:
-            groups.setdefault(place, []).append((float(both[0] or 0.0), float(both[1] or 0.0)))
-    return tuple(_gap(place, groups[place]) for place in sorted(groups, key=order))
+    both = ((place_of(row), (row.get("gap_before_mm"), row.get("gap_after_mm"))) for row in rows)
+    groups = grouped((at, gap) for at, gap in both if at and knows_relations(at.method) and None not in gap)
+    summaries = []
+    for place in sorted(groups, key=order):
+        seen, planned = (Quantiles(*q.tolist()) for q in np.percentile(np.array(groups[place]), _CUTS, axis=0).T)
+        summaries.append(GapSummary(place, len(groups[place]), seen, planned))
+    return tuple(summaries)
 
 
 def recognitions(rows: Iterable[Row]) -> tuple[Recognition, ...]:
@@ -100,16 +97,8 @@ def recognitions(rows: Iterable[Row]) -> tuple[Recognition, ...]:
             place = ObservationPlace(*(look_up(row, name) for name in ObservationPlace._fields))
             seen.setdefault((place, row["seed"], row["clearance_mm"]), (place, row))
     several = len({place.scenario for place, _ in seen.values()}) > 1
-    groups: dict[ObservationPlace, list[Row]] = {}
-    for place, row in seen.values():
-        for where in (place, place._replace(scenario=ALL)) if several else (place,):
-            groups.setdefault(where, []).append(row)
+    groups = grouped([*seen.values(), *[(place._replace(scenario=ALL), row) for place, row in seen.values()] * several])
     return tuple(_counted(place, groups[place]) for place in sorted(groups, key=_order))
-
-
-def _gap(place: Place, both: Sequence[tuple[float, float]]) -> GapSummary:
-    seen, planned = (Quantiles(*map(float, q)) for q in np.percentile(np.array(both), _CUTS, axis=0).T)
-    return GapSummary(place, len(both), seen, planned)
 
 
 def _counted(place: ObservationPlace, rows: Sequence[Row]) -> Recognition:

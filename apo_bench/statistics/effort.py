@@ -2,7 +2,7 @@
 were pushed; wall times of trials, and what workers did, out of `timing.jsonl`."""
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean, median
@@ -10,6 +10,7 @@ from typing import Any, final
 
 import numpy as np
 
+from apo_bench.io.grouping import grouped
 from apo_bench.io.ordinary_files import each_line
 from apo_bench.records import Row
 from apo_bench.records.run.validation import timing_of
@@ -66,8 +67,16 @@ class Work:
 
 def efforts(rows: Iterable[Row]) -> tuple[Effort, ...]:
     """One per scenario and method that had a success, sorted as `tally` sorts."""
-    groups = by_method(row for row in rows if row["success"])
-    return tuple(_effort(*key, own) for key, own in groups.items())
+    return tuple(
+        Effort(
+            *key,
+            trials=len(own),
+            extra_operations=fmean(row["extra_operations"] or 0 for row in own),
+            sim_seconds=median(row["sim_seconds"] or 0.0 for row in own),
+            pushed_mm=max(row["pushed_mm"] or 0.0 for row in own),
+        )
+        for key, own in by_method(row for row in rows if row["success"]).items()
+    )
 
 
 def read_timing(folder: Path) -> list[dict[str, Any]]:
@@ -85,31 +94,21 @@ def read_timing(folder: Path) -> list[dict[str, Any]]:
 
 def trial_times(lines: Iterable[Mapping[str, Any]]) -> tuple[TrialTimes, ...]:
     """One per scenario and method, sorted as `tally` sorts."""
-    groups = by_method(lines)
-    return tuple(_times(*key, [float(line["trial_s"]) for line in own]) for key, own in groups.items())
+    seconds = {key: [float(line["trial_s"]) for line in own] for key, own in by_method(lines).items()}
+    return tuple(
+        TrialTimes(scenario, method, len(own), *map(float, np.percentile(own, (5, 50, 95))), sum(own))  # type: ignore[call-arg]
+        for (scenario, method), own in seconds.items()
+    )
 
 
 def work(lines: Iterable[Mapping[str, Any]]) -> tuple[Work, ...]:
     """One per host and worker."""
-    groups: dict[tuple[str, str], list[float]] = {}
-    for line in lines:
-        busy = sum(float(line.get(part) or 0.0) for part in _PARTS)
-        host, worker = ("" if line.get(key) is None else str(line[key]) for key in ("host", "worker"))
-        groups.setdefault((host, worker), []).append(busy)
-    return tuple(Work(*key, len(groups[key]), sum(groups[key])) for key in sorted(groups))
 
+    def named(line: Mapping[str, Any], key: str) -> str:
+        return "" if line.get(key) is None else str(line[key])
 
-def _effort(scenario: str, method: str, rows: Sequence[Row]) -> Effort:
-    return Effort(
-        scenario=scenario,
-        method=method,
-        trials=len(rows),
-        extra_operations=fmean(row["extra_operations"] or 0 for row in rows),
-        sim_seconds=median(row["sim_seconds"] or 0.0 for row in rows),
-        pushed_mm=max(row["pushed_mm"] or 0.0 for row in rows),
+    busy = grouped(
+        ((named(line, "host"), named(line, "worker")), sum(float(line.get(part) or 0.0) for part in _PARTS))
+        for line in lines
     )
-
-
-def _times(scenario: str, method: str, seconds: Sequence[float]) -> TrialTimes:
-    low, middle, high = map(float, np.percentile(seconds, (5, 50, 95)))
-    return TrialTimes(scenario, method, len(seconds), low, middle, high, float(sum(seconds)))
+    return tuple(Work(host, worker, len(own), sum(own)) for (host, worker), own in sorted(busy.items()))

@@ -2,10 +2,12 @@
 test finds wrong, and which plans were predicted to fail."""
 
 import math
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import final
 
+from apo_bench.io.grouping import grouped
 from apo_bench.records import Row, knows_truth
 from apo_bench.statistics.rates import Rate, by_method, rank, rank_relations
 
@@ -68,15 +70,16 @@ class Confusion:
     @property
     def agreement(self) -> float | None:
         """Share of the executed trials that ended as predicted; None if there are none."""
-        return self.right / self.executed if self.executed else None
+        return Rate(self.right, self.executed).rate
 
 
 def calibrations(rows: Iterable[Row]) -> tuple[Calibration, ...]:
     """One per scenario, noise, relations and method; the oracle has nothing to be calibrated."""
-    groups: dict[tuple[str, str, str, str], list[Row]] = {}
-    for row in rows:
-        if row["level"] is not None and row["success"] is not None and not knows_truth(row["method"]):
-            groups.setdefault((row["scenario"], row["noise"], row["relations"], row["method"]), []).append(row)
+    groups = grouped(
+        ((row["scenario"], row["noise"], row["relations"], row["method"]), row)
+        for row in rows
+        if row["level"] is not None and row["success"] is not None and not knows_truth(row["method"])
+    )
     order = sorted(groups, key=lambda k: (k[0], k[1], rank_relations(k[2]), rank(k[3]), k[3]))
     return tuple(_calibration(*key, groups[key]) for key in order)
 
@@ -84,8 +87,10 @@ def calibrations(rows: Iterable[Row]) -> tuple[Calibration, ...]:
 def confusions(rows: Iterable[Row]) -> tuple[Confusion, ...]:
     """One per scenario and method, sorted as `tally` sorts, and one of them all at the end."""
     groups = by_method(rows)
-    everything = [row for own in groups.values() for row in own]
-    return (*(_confusion(*key, own) for key, own in groups.items()), _confusion(ALL, ALL, everything))
+    return (
+        *(_confusion(*key, own) for key, own in groups.items()),
+        _confusion(ALL, ALL, [row for own in groups.values() for row in own]),
+    )
 
 
 def _calibration(scenario: str, noise: str, relations: str, method: str, rows: Sequence[Row]) -> Calibration:
@@ -119,16 +124,14 @@ def _confusion(scenario: str, method: str, rows: Sequence[Row]) -> Confusion:
     executed = [(row, forecast) for row in counted if (forecast := row["predicted"]) is not None]
     caught = [(row, forecast) for row, forecast in executed if forecast["fails"] and not row["as_demonstrated"]]
     stopped = [(row, forecast) for row, forecast in caught if row["failure_operation"] is not None]
-
-    def count(fails: bool, fitted: bool) -> int:
-        return sum((forecast["fails"], row["as_demonstrated"]) == (fails, fitted) for row, forecast in executed)
-
+    # predicted to fail, and made as demonstrated
+    ends = Counter((forecast["fails"], row["as_demonstrated"]) for row, forecast in executed)
     return Confusion(
         scenario=scenario,
         method=method,
-        fit_fitted=count(False, True),
-        fit_failed=count(False, False),
-        fail_fitted=count(True, True),
+        fit_fitted=ends[False, True],
+        fit_failed=ends[False, False],
+        fail_fitted=ends[True, True],
         fail_failed=len(caught),
         same_operation=sum(forecast["operation"] == row["failure_operation"] for row, forecast in stopped),
         stopped=len(stopped),

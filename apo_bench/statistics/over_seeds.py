@@ -19,6 +19,7 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
+from apo_bench.io.grouping import grouped
 from apo_bench.statistics.paired import mcnemar, tango
 from apo_bench.statistics.power import ERROR, least_discordant, paired_trials
 from apo_bench.statistics.rates import CONFIDENCE, Interval, wilson
@@ -65,9 +66,8 @@ class Contrast(NamedTuple):
     @property
     def sure(self) -> bool:
         """Whether it is beyond chance: 0 is outside the interval, and seeds enough for a sign test differ."""
-        differ = self.better + self.worse >= FEWEST_SEEDS
-        if self.trials == self.seeds:
-            differ = mcnemar(self.better, self.worse) <= ERROR
+        by_chance = mcnemar(self.better, self.worse) > ERROR
+        differ = not by_chance if self.trials == self.seeds else self.better + self.worse >= FEWEST_SEEDS
         return differ and not self.interval.low <= 0.0 <= self.interval.high
 
     @property
@@ -85,13 +85,10 @@ class Contrast(NamedTuple):
 
 def pooled_rate(results: Results) -> PooledRate:
     """The rate of one method over all its trials, of which there is one at least."""
-    by_seed = _by_seed({key: float(value) for key, value in results.items()})
+    values, most = _by_seed({key: float(value) for key, value in results.items()})
     right = sum(results.values())
-    trials = len(results)
-    if len(by_seed.values) == trials:
-        return PooledRate(right, trials, trials, wilson(right, trials))
-    interval = mean_interval(by_seed.values, 0.0, by_seed.most)
-    return PooledRate(right, trials, len(by_seed.values), Interval(interval.low, min(1.0, interval.high)))
+    interval = wilson(right, len(results)) if len(values) == len(results) else mean_interval(values, 0.0, most)
+    return PooledRate(right, len(results), len(values), Interval(interval.low, min(1.0, interval.high)))
 
 
 def contrast(first: Results, second: Results) -> Contrast | None:
@@ -99,22 +96,21 @@ def contrast(first: Results, second: Results) -> Contrast | None:
     both = {key: float(first[key]) - float(second[key]) for key in first if key in second}
     if not both:
         return None
-    by_seed = _by_seed(both)
+    values, most = _by_seed(both)
     apart = list(both.values())
-    if len(by_seed.values) == len(both):
+    if len(values) == len(both):
         interval = tango(apart.count(1.0), apart.count(-1.0), len(both))
     else:
         # a seed that was not seen may differ in all of its trials
-        low, high = mean_interval(by_seed.values, -by_seed.most, by_seed.most)
-        interval = Interval(max(-1.0, low), min(1.0, high))
+        interval = Interval(*np.clip(mean_interval(values, -most, most), -1.0, 1.0).tolist())
     return Contrast(
         ours=sum(first[key] for key in both),
         theirs=sum(second[key] for key in both),
         trials=len(both),
-        seeds=len(by_seed.values),
+        seeds=len(values),
         interval=interval,
-        better=int((by_seed.values > 0.0).sum()),
-        worse=int((by_seed.values < 0.0).sum()),
+        better=int((values > 0.0).sum()),
+        worse=int((values < 0.0).sum()),
     )
 
 
@@ -184,18 +180,11 @@ def _end(values: Array, counts: Array, low: float, high: float, inside: float, o
     return float(inside)
 
 
-class _Seeds(NamedTuple):
-    values: Array
-    """(seeds,) Sum over the trials of a seed, over the mean number of trials of a seed: their mean is that of all
-    trials."""
-    most: float
-    """The largest such value that a seed could have."""
-
-
-def _by_seed(values: Mapping[tuple[Any, ...], float]) -> _Seeds:
-    seeds: dict[int, list[float]] = {}
-    for key, value in values.items():
-        seeds.setdefault(key[-1], []).append(value)
+def _by_seed(values: Mapping[tuple[Any, ...], float]) -> tuple[Array, float]:
+    """(seeds,) the sum over the trials of a seed, over the mean number of trials of a seed, so that their mean is that
+    of all trials; and the largest such value that a seed could have."""
+    seeds = grouped((key[-1], value) for key, value in values.items())
     usual = len(values) / len(seeds)
-    sums = np.array([sum(seeds[seed]) / usual for seed in sorted(seeds)])
-    return _Seeds(np.round(sums, _DIGITS), max(map(len, seeds.values())) / usual)
+    return np.round(np.array([sum(seeds[seed]) / usual for seed in sorted(seeds)]), _DIGITS), max(
+        map(len, seeds.values())
+    ) / usual

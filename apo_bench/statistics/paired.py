@@ -1,6 +1,6 @@
 """Paired comparison: two methods over the same seeds, so that layout, hand and noise cancel."""
 
-import math
+from collections import Counter
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -83,7 +83,10 @@ def paired(rows: Iterable[Row], references: Sequence[str] = REFERENCES) -> tuple
     Raises:
         InputError: A trial is there twice.
     """
-    counted = {place: _counted(seeds) for place, seeds in by_place(rows).items()}
+    counted = {
+        place: {seed: row for seed, row in seeds.items() if row["success"] is not None}
+        for place, seeds in by_place(rows).items()
+    }
     cells = {place: counted[place] for place in sorted(counted, key=order) if counted[place]}
     pairs = [
         _paired(place, reference, cells[place], cells[place_of_reference(place, reference)])
@@ -112,10 +115,6 @@ def place_of_reference(place: _Where, reference: str) -> _Where:
     """What a cell, or a curve, is compared with: `none` asks for no relations, and few methods for looks."""
     other = place._replace(method=reference, looks=place.looks if may_look(reference) else 0)
     return other if knows_relations(reference) else other._replace(relations="given")
-
-
-def _counted(seeds: Mapping[int, Mapping[str, Any]]) -> dict[int, Mapping[str, Any]]:
-    return {seed: row for seed, row in seeds.items() if row["success"] is not None}
 
 
 def _comparison(pair: Paired) -> frozenset[Place]:
@@ -184,16 +183,15 @@ def _paired(
     pairs = [(ours[seed], theirs[seed]) for seed in sorted(set(ours) & set(theirs))]
     free = [(a["planned_error_free_mm"], b["planned_error_free_mm"]) for a, b in pairs]
     apart = [a - b for a, b in free if a is not None and b is not None]
-    only_method = sum(a["success"] and not b["success"] for a, b in pairs)
-    only_reference = sum(b["success"] and not a["success"] for a, b in pairs)
+    ends = Counter((bool(a["success"]), bool(b["success"])) for a, b in pairs)
     return Paired(
         place=place,
         reference=reference,
         pairs=len(pairs),
-        only_method=only_method,
-        only_reference=only_reference,
-        both=sum(a["success"] and b["success"] for a, b in pairs),
-        p=mcnemar(only_method, only_reference) if pairs else None,
+        only_method=ends[True, False],
+        only_reference=ends[False, True],
+        both=ends[True, True],
+        p=mcnemar(ends[True, False], ends[False, True]) if pairs else None,
         p_adjusted=None,
         planned=len(apart),
         free_mm=sum(apart) / len(apart) if apart else None,
@@ -203,10 +201,9 @@ def _paired(
 
 def _student(x: Sequence[float]) -> Interval | None:
     """Student's t interval of a mean at 95 %: mean -+ t(n - 1) s / sqrt(n), s with n - 1 degrees of freedom."""
-    from scipy.stats import t
+    from scipy.stats import sem, t
 
     if len(x) < 2:
         return None
-    half = float(t.ppf((1 + CONFIDENCE) / 2, len(x) - 1) * np.std(x, ddof=1) / math.sqrt(len(x)))
-    mean = float(np.mean(x))
-    return Interval(mean - half, mean + half)
+    ends = t.interval(CONFIDENCE, len(x) - 1, loc=np.mean(x), scale=sem(x)) if np.ptp(x) else (x[0], x[0])
+    return Interval(*map(float, ends))

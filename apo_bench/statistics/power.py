@@ -106,17 +106,16 @@ def paired_power(pairs: int, win: float, lose: float, error: float = ERROR) -> f
     """
     from scipy.stats import binom
 
-    better = max(win, lose)
-    worse = min(win, lose)
-    if better == 0.0:
+    apart = win + lose
+    if apart == 0.0:
         return 0.0
-    m = _likely(pairs, better + worse)
+    m = _likely(pairs, apart)
     # ppf is the first count that is reached with error / 2: one less where it is passed
     k = np.asarray(binom.ppf(error / 2, m, 0.5))
     k = np.where(binom.cdf(k, m, 0.5) <= error / 2, k, k - 1)
-    # of m discordant pairs each falls the other way with worse / (better + worse)
-    rejects = np.where(k >= 0, binom.cdf(k, m, worse / (better + worse)), 0.0)
-    return float(np.sum(binom.pmf(m, pairs, better + worse) * rejects))
+    # of m discordant pairs each falls the other way with the smaller share of both
+    rejects = np.where(k >= 0, binom.cdf(k, m, min(win, lose) / apart), 0.0)
+    return float(np.sum(binom.pmf(m, pairs, apart) * rejects))
 
 
 def margin_trials(margin: float, win: float = 0.0, lose: float = 0.0, power: float = _POWER) -> int:
@@ -145,25 +144,33 @@ def margin_power(pairs: int, margin: float, win: float = 0.0, lose: float = 0.0)
     rest = np.where(fits, pairs - b, 0)
     # a trinomial: wins out of all pairs, then losses out of those that are left
     weight = binom.pmf(b, pairs, win) * binom.pmf(c, rest, min(1.0, lose / (1 - win)) if win < 1 else 0.0)
-    rejects = score(b, np.where(fits, c, 0), pairs, -margin) > normal_quantile()
-    return float(np.sum(np.where(fits & rejects, weight, 0.0)))
+    return float(
+        np.sum(np.where(fits & (score(b, np.where(fits, c, 0), pairs, -margin) > normal_quantile()), weight, 0.0))
+    )
 
 
 def evidence(trials: int, power: float = _POWER, comparisons: int = 1) -> PowerEvidence:
     """What so many trials can show; see `PowerEvidence`."""
+    from scipy.optimize import brentq
+
     if not 1 <= trials <= _MOST:
         raise InputError(f"{trials} trials were given; a whole number from 1 to {_MOST} is allowed.")
     _inside(power, "power", 0.0, 1.0)
     error = _error(comparisons)
     z2 = normal_quantile() ** 2
     discordant = least_discordant(error)
+    least_win = (
+        float(brentq(lambda win: paired_power(trials, win, 0.0, error) - power, 1e-9, 1.0, xtol=1e-9))
+        if discordant <= trials
+        else None
+    )
     return PowerEvidence(
         trials=trials,
         half_width_50=wilson_half_width(0.5, trials),
         half_width_90=wilson_half_width(0.9, trials),
         all_right=wilson(trials, trials),
         discordant=discordant if discordant <= trials else None,
-        least_win=_least_win(trials, power, error) if discordant <= trials else None,
+        least_win=least_win,
         margin=float(z2 / (trials + z2)),
     )
 
@@ -171,12 +178,6 @@ def evidence(trials: int, power: float = _POWER, comparisons: int = 1) -> PowerE
 def least_discordant(error: float) -> int:
     """The fewest discordant pairs, all in favour of one, at which a sign test rejects: 2 / 2^n <= error."""
     return math.ceil(1 - math.log2(error) - 1e-9)
-
-
-def _least_win(trials: int, power: float, error: float) -> float:
-    from scipy.optimize import brentq
-
-    return float(brentq(lambda win: paired_power(trials, win, 0.0, error) - power, 1e-9, 1.0, xtol=1e-9))
 
 
 def _least(enough: Callable[[int], bool], what: str) -> int:

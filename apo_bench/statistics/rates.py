@@ -3,13 +3,14 @@ fidelity, number of looks and robot error."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from operator import itemgetter
 from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar, final
 
 from apo_bench.errors import InputError
+from apo_bench.io.grouping import grouped
 from apo_bench.records import Row, TrialSettings, one_salt, parsed
 
 CONFIDENCE = 0.95
@@ -19,7 +20,8 @@ NOT_EXECUTED = ("observe", "correct", "worker")
 """Stages of failures at which no plan was carried out to its end: there was none, or its process died."""
 
 
-class Place(NamedTuple):
+@dataclass(frozen=True)
+class Place:
     """What the trials of a cell have in common: all but the seed."""
 
     scenario: str
@@ -34,6 +36,8 @@ class Place(NamedTuple):
     fidelity: str = TrialSettings.fidelity
     looks: int = TrialSettings.looks
     robot_error: str = TrialSettings.robot_error
+    _replace = replace
+    """The place with other values of some fields, as of a named tuple."""
 
 
 class Interval(NamedTuple):
@@ -61,22 +65,10 @@ class Rate(NamedTuple):
 
 
 @final
-@dataclass(frozen=True)
-class Cell:
+@dataclass(frozen=True, kw_only=True)
+class Cell(Place):
     """What came out where only seeds differ."""
 
-    scenario: str
-    clearance_mm: float
-    noise: str
-    relations: str
-    careless: float
-    level: float
-    level_deg: float
-    method: str
-    grasp: str
-    fidelity: str
-    looks: int
-    robot_error: str
     trials: int
     """Trials that count: those whose demonstration was right."""
     successes: int
@@ -148,12 +140,11 @@ def rank_relations(relations: str) -> tuple[int, str]:
 
 def place_of(row: Row) -> Place | None:
     """The cell of a row; None for a measured demonstration, which has no level."""
-    if row["level"] is None:
-        return None
-    return Place._make(_PLACE(row if row.keys() >= _USUAL.keys() else {**_USUAL, **row}))
+    return None if row["level"] is None else Place(*_PLACE({**_USUAL, **row}))
 
 
-_PLACE = itemgetter(*Place._fields)
+PLACE_FIELDS = Place.__match_args__
+_PLACE = itemgetter(*PLACE_FIELDS)
 _USUAL = {"fidelity": TrialSettings.fidelity, "looks": TrialSettings.looks, "robot_error": TrialSettings.robot_error}
 
 
@@ -168,24 +159,20 @@ def by_place(rows: Iterable[Row]) -> dict[Place, dict[int, Row]]:
     rows = list(rows)
     one_salt(rows)
     for row in rows:
-        place = place_of(row)
-        if place is None:
-            continue
-        seeds = cells.setdefault(place, {})
-        if row["seed"] in seeds:
-            raise InputError(
-                f"the rows hold a trial twice ({place.scenario}, {place.method}, level {place.level:g}, seed "
-                f"{row['seed']}); every trial counts once, so leave one of the two out."
-            )
-        seeds[row["seed"]] = row
+        if place := place_of(row):
+            seeds = cells.setdefault(place, {})
+            if row["seed"] in seeds:
+                raise InputError(
+                    f"the rows hold a trial twice ({place.scenario}, {place.method}, level {place.level:g}, seed "
+                    f"{row['seed']}); every trial counts once, so leave one of the two out."
+                )
+            seeds[row["seed"]] = row
     return cells
 
 
 def by_method(rows: Iterable[Line]) -> dict[tuple[str, str], list[Line]]:
     """Scenario and method -> rows, sorted as `tally` sorts."""
-    groups: dict[tuple[str, str], list[Line]] = {}
-    for row in rows:
-        groups.setdefault((str(row["scenario"]), str(row["method"])), []).append(row)
+    groups = grouped(((str(row["scenario"]), str(row["method"])), row) for row in rows)
     return {key: groups[key] for key in sorted(groups, key=lambda key: (key[0], rank(key[1]), key[1]))}
 
 
@@ -206,7 +193,7 @@ def _cell(key: Place, rows: list[Row]) -> Cell:
     failed = [row for row in counted if not row["success"]]
     why = Counter(f"{row['failure_stage']}: {row['failure_code']}" for row in failed)
     return Cell(
-        **key._asdict(),
+        **vars(key),
         trials=len(counted),
         successes=len(counted) - len(failed),
         demonstrated=sum(bool(row["as_demonstrated"]) for row in counted),
@@ -219,6 +206,8 @@ def _cell(key: Place, rows: list[Row]) -> Cell:
 
 def order(k: Place) -> tuple[Any, ...]:
     """How cells are sorted: by what is asked, then by method (`oracle` first), then by level."""
-    where = (k.scenario, k.clearance_mm, k.noise, rank_relations(k.relations), k.careless)
-    robot = (k.grasp, k.robot_error != TrialSettings.robot_error, k.robot_error, k.fidelity != "full")
-    return (*where, *robot, k.looks, rank(k.method), k.method, k.level, k.level_deg)
+    return (
+        *(k.scenario, k.clearance_mm, k.noise, rank_relations(k.relations), k.careless),
+        *(k.grasp, k.robot_error != TrialSettings.robot_error, k.robot_error, k.fidelity != "full"),
+        *(k.looks, rank(k.method), k.method, k.level, k.level_deg),
+    )

@@ -3,9 +3,10 @@
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
+from apo_bench.io.grouping import grouped
 from apo_bench.records import NO_ROBOT_ERROR, RANGE, USUAL, knows_relations, knows_truth, may_look
 from apo_bench.statistics.rate_text import level_label
-from apo_bench.statistics.rates import Place, rank_relations
+from apo_bench.statistics.rates import PLACE_FIELDS, Place, rank_relations
 
 _Item = TypeVar("_Item")
 
@@ -29,10 +30,9 @@ class Setting(NamedTuple):
         The oracle meets neither noise nor carelessness, plans without a corrector are not told any relations, and few
         methods can ask to look again.
         """
-        ceiling = knows_truth(cell.method)
         return (
             _site(cell) == _site(self)
-            and (ceiling or (cell.noise, cell.careless) == (self.noise, self.careless))
+            and (knows_truth(cell.method) or (cell.noise, cell.careless) == (self.noise, self.careless))
             and (not knows_relations(cell.method) or cell.relations == self.relations)
             and (not may_look(cell.method) or cell.looks == self.looks)
         )
@@ -44,26 +44,21 @@ class Setting(NamedTuple):
     def conditions(self, clearance: bool = True) -> list[str]:
         """All but the scenario, as a person says it; the clearance can be left out."""
         human = {0.0: "careful human", 1.0: "careless human"}.get(self.careless, f"carelessness {self.careless:g}")
-        words = [human, *[f"{self.clearance_mm:g} mm clearance"] * clearance]
-        if self.noise != USUAL:
-            words.append("range finder" if self.noise == RANGE else f"{self.noise} noise")
-        if self.relations != "given":
-            words.append(f"relations {self.relations}")
-        if self.grasp != "friction":
-            words.append(f"{self.grasp} grasp")
-        if self.robot_error != NO_ROBOT_ERROR:
-            words.append(f"robot error {self.robot_error}")
-        if self.fidelity != "full":
-            words.append(f"fidelity {self.fidelity}")
-        if self.looks:
-            words.append(f"{self.looks} more look{'s' * (self.looks > 1)}")
-        return words
+        unusual = {
+            "range finder" if self.noise == RANGE else f"{self.noise} noise": self.noise != USUAL,
+            f"relations {self.relations}": self.relations != "given",
+            f"{self.grasp} grasp": self.grasp != "friction",
+            f"robot error {self.robot_error}": self.robot_error != NO_ROBOT_ERROR,
+            f"fidelity {self.fidelity}": self.fidelity != "full",
+            f"{self.looks} more look{'s' * (self.looks > 1)}": self.looks > 0,
+        }
+        place = [human, *[f"{self.clearance_mm:g} mm clearance"] * clearance]
+        return place + [words for words, here in unusual.items() if here]
 
 
 def cell_place(item: Any) -> Place:
     """The place of a cell; of anything that has one, that."""
-    place = getattr(item, "place", None)
-    return place if place is not None else Place(*(getattr(item, name) for name in Place._fields))
+    return item.place if hasattr(item, "place") else Place(*(getattr(item, name) for name in PLACE_FIELDS))
 
 
 def settings(cells: Iterable[Any]) -> list[Setting]:
@@ -72,18 +67,18 @@ def settings(cells: Iterable[Any]) -> list[Setting]:
     chosen = set[Setting]()
     # who meets most of what a setting says goes first, so that others find the setting that they belong to
     for meets_it in (may_look, knows_relations, lambda method: not knows_truth(method), knows_truth):
-        own = {setting_of(p): p for p in places if meets_it(p.method)}
-        chosen |= {s for s, p in own.items() if not any(other.holds(p) for other in chosen)}
+        chosen |= {
+            s
+            for s, p in {setting_of(p): p for p in places if meets_it(p.method)}.items()
+            if not any(other.holds(p) for other in chosen)
+        }
     return sorted(chosen, key=lambda s: (s[:2], s.noise != USUAL, s.noise, rank_relations(s.relations), s[4:]))
 
 
 def members(settings: Sequence[Setting], items: Iterable[_Item]) -> dict[Setting, list[_Item]]:
     """The cells, or whatever has a place, of every setting, in their order; of several oracles the one most tried."""
-    near: dict[tuple[Any, ...], list[_Item]] = {}
-    for item in items:
-        near.setdefault(_site(cell_place(item)), []).append(item)
-    grouped = {s: [item for item in near.get(_site(s), ()) if s.holds(cell_place(item))] for s in settings}
-    return {s: _one_ceiling(inside) for s, inside in grouped.items()}
+    near = grouped((_site(cell_place(item)), item) for item in items)
+    return {s: _one_ceiling([x for x in near.get(_site(s), ()) if s.holds(cell_place(x))]) for s in settings}
 
 
 def levels_of(items: Iterable[Any]) -> list[tuple[float, float]]:

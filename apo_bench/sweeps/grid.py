@@ -8,6 +8,7 @@ from numbers import Real
 from typing import Any, final
 
 from apo_bench.errors import InputError
+from apo_bench.io.grouping import grouped
 from apo_bench.io.plain_text import UNSHOWN
 from apo_bench.records import (
     LEVEL,
@@ -93,8 +94,10 @@ class SweepSettings:
                 level_pair(level, eye)
             else:
                 check("level_mm", level, eye, "level")
-        several = {name: getattr(self, info.axis) for name, info in SETTINGS.items() if info.axis}
-        for name, values in (several | {name: (getattr(self, name),) for name in SHARED}).items():
+        for name, values in (
+            {name: getattr(self, info.axis) for name, info in SETTINGS.items() if info.axis}
+            | {name: (getattr(self, name),) for name in SHARED}
+        ).items():
             for value in values:
                 check(name, value)
                 if SETTINGS[name].is_text and name != "scenario" and UNSHOWN.search(value):
@@ -153,19 +156,24 @@ def units(grids: Sequence[SweepSettings], loaded: Mapping[str, Scenario], salt: 
 
 def described(grids: Sequence[SweepSettings], loaded: Mapping[str, Scenario]) -> list[dict[str, Any]]:
     """The grids as they stand in `run.json`, with scenarios by name and clearances filled in."""
-    return [_described(grid, loaded) for grid in grids]
+    forms = []
+    for grid in grids:
+        values = {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(grid).items()}
+        own = {loaded[source].name: loaded[source].clearance_mm for source in grid.scenarios}
+        clearances = {name: list(grid.clearances_mm or (clearance,)) for name, clearance in own.items()}
+        forms.append({**values, "scenarios": list(own), "clearances_mm": clearances})
+    return forms
 
 
 def _per_seed(grid: SweepSettings) -> int:
     """How many trials a grid has for one seed, if none is the same as another."""
     ways = len(_ways(grid))
     inputs = sum(len(_corrector_inputs(grid, method)) for method in grid.methods if not knows_truth(method))
-    trials = len(grid.careless) * len(grid.levels) * ways * inputs + sum(map(knows_truth, grid.methods))
     return (
         len(grid.scenarios)
         * max(1, len(grid.clearances_mm))
         * math.prod(len(getattr(grid, info.axis)) for info in _PLAIN)
-        * trials
+        * (len(grid.careless) * len(grid.levels) * ways * inputs + sum(map(knows_truth, grid.methods)))
     )
 
 
@@ -173,12 +181,14 @@ def _units(
     grids: Sequence[SweepSettings], source: str, scenario: Scenario, seed: int, salt: Salt | None
 ) -> Iterator[Unit]:
     """The trials of a scenario and a seed, by what they share."""
-    together: dict[tuple[float, float, str], dict[TrialSettings, None]] = {}
-    for grid in grids:
-        for clearance in (grid.clearances_mm or (scenario.clearance_mm,)) if source in grid.scenarios else ():
-            for trial in _trials(grid, source, clearance, seed, salt):
-                together.setdefault((clearance, trial.careless, trial.eye), {})[trial] = None
-    return (Unit(tuple(trials)) for trials in together.values())
+    together = grouped(
+        ((clearance, trial.careless, trial.eye), trial)
+        for grid in grids
+        if source in grid.scenarios
+        for clearance in grid.clearances_mm or (scenario.clearance_mm,)
+        for trial in _trials(grid, source, clearance, seed, salt)
+    )
+    return (Unit(tuple(dict.fromkeys(trials))) for trials in together.values())
 
 
 def _trials(
@@ -187,8 +197,9 @@ def _trials(
     same: dict[str, Any] = {name: getattr(grid, name) for name in SHARED}
     same |= {"scenario": source, "clearance_mm": clearance_mm, "seed": seed, "salt": salt}
     names = [info.name for info in _PLAIN]
-    values = product(*(getattr(grid, info.axis) for info in _PLAIN))
-    plain: list[dict[str, Any]] = [dict(zip(names, each, strict=True)) for each in values]
+    plain: list[dict[str, Any]] = [
+        dict(zip(names, each, strict=True)) for each in product(*(getattr(grid, info.axis) for info in _PLAIN))
+    ]
     ways = _ways(grid)
     truth: dict[str, Any] = {"level_mm": 0.0, "level_deg": 0.0, "careless": 0.0}
     for method, others in product(filter(knows_truth, grid.methods), plain):
@@ -206,22 +217,17 @@ def _corrector_inputs(grid: SweepSettings, method: str) -> list[tuple[str, int]]
 
     Once the right contacts if it asks for none; never again if it cannot ask.
     """
-    relations = grid.relations if knows_relations(method) else (TrialSettings.relations,)
-    looks = grid.looks if may_look(method) else (TrialSettings.looks,)
-    return list(product(relations, looks))
+    return list(
+        product(
+            grid.relations if knows_relations(method) else (TrialSettings.relations,),
+            grid.looks if may_look(method) else (TrialSettings.looks,),
+        )
+    )
 
 
 def _ways(grid: SweepSettings) -> list[dict[str, Any]]:
     """Eye and noise model, of every way of seeing; a range finder has no noise model."""
-    noises = {eye: (RANGE,) if eye == RANGE else grid.noises for eye in grid.eyes}
-    return [{"eye": eye, "noise": noise} for eye in grid.eyes for noise in noises[eye]]
-
-
-def _described(grid: SweepSettings, loaded: Mapping[str, Scenario]) -> dict[str, Any]:
-    values = {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(grid).items()}
-    own = {loaded[source].name: loaded[source].clearance_mm for source in grid.scenarios}
-    clearances = {name: list(grid.clearances_mm or (clearance,)) for name, clearance in own.items()}
-    return {**values, "scenarios": list(own), "clearances_mm": clearances}
+    return [{"eye": eye, "noise": x} for eye in grid.eyes for x in ((RANGE,) if eye == RANGE else grid.noises)]
 
 
 def _whole(value: Any) -> Any:

@@ -55,17 +55,14 @@ def progress(total: int) -> Iterator[Count]:
     task = bar.add_task("", total=total)
     rates = Rates()
 
-    class Picture:
-        """Drawn anew whenever the terminal is."""
-
-        def __rich__(self) -> Any:
-            return Group(bar.get_renderable(), rates.table(max(1, console.size.height - FRAME)))
+    def picture() -> Group:
+        return Group(bar.get_renderable(), rates.table(max(1, console.size.height - FRAME)))
 
     def count(row: Row) -> None:
         rates.count(row)
         bar.advance(task)
 
-    with Live(Picture(), console=console, refresh_per_second=PER_SECOND, transient=True):
+    with Live(get_renderable=picture, console=console, refresh_per_second=PER_SECOND, transient=True):
         yield count
 
 
@@ -121,13 +118,10 @@ class Rates:
             name = f"{mm:g}" if mm == deg or deg == 0.0 else f"{mm:g}, {deg:g}"
             table.add_column(f"level {name}" if (mm, deg) == levels[0] else name, justify="right", no_wrap=True)
         for line, cells in lines.items():
-            words = [f"{line[i]:g}" if isinstance(line[i], float) else clean(str(line[i])) for i in varying]
-            table.add_row(*words, *(_fraction(cells.get(level)) for level in levels))
-        left = len(self._lines) - len(lines)
-        if left:
-            table.add_row(f"and {left} more", style="dim")
+            table.add_row(
+                *[f"{line[i]:g}" if isinstance(line[i], float) else clean(str(line[i])) for i in varying],
+                *("{}/{}".format(*cells[level]) if level in cells else "" for level in levels),
+            )
+        if len(self._lines) > len(lines):
+            table.add_row(f"and {len(self._lines) - len(lines)} more", style="dim")
         return table
-
-
-def _fraction(cell: tuple[int, int] | None) -> str:
-    return "" if cell is None else f"{cell[0]}/{cell[1]}"

@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from apo_bench.errors import InputError, unknown
+from apo_bench.io.grouping import grouped
 from apo_bench.records import CORRECTOR, CORRECTOR_LIMIT_S, Limits, Row, level_pair, salt_of_sweep, trial_key
 from apo_bench.records.run.run_file import run_record
 from apo_bench.records.run.run_folder import RunFolder
@@ -73,15 +74,20 @@ def run_sweep(
     here = workers is None and backend == "local"
     check_grids(grids)
     names = names_of(grids)
-    loaded, arm = _checked(names, grids, corrector_limit_s)
+    # everything that has a name is found before a folder is made or a process started
+    loaded = load_all(grids)
+    names.check(corrector_limit_s)
+    physics(grids[0].timestep_s)
+    arm = find_arm(names.arm)
     # the whole path of the folder of demonstrations, as every worker finds it
     cache = None if cache is None else str(KeptDemonstrations(cache).folder.resolve())
     lock = replace(environment_lock(names, loaded, arm.files, corrector_limit_s), cache=cache)
     files = {loaded[source].name: source for source in loaded if source not in scenario_names()}
     salt = None if salt_file is None else salt_of_sweep(salt_file, out)
     limits = Limits(None if here else limit_s, corrector_limit_s)
-    made_of = _content(lock, loaded, arm)
-    run = run_record(described(grids, loaded), made_of, code_files(), lock.versions, files, command, salt, limits)
+    run = run_record(
+        described(grids, loaded), _content(lock, loaded, arm), code_files(), lock.versions, files, command, salt, limits
+    )
     with listening() as check, RunFolder(Path(out), run) as store:
         work = _left(units(grids, loaded, salt), loaded, lock, store, check)
         with progress(sum(len(unit.trials) for unit in work)) as count:
@@ -91,32 +97,27 @@ def run_sweep(
                 store.append(kept, timing)
                 count(kept)
 
-            execute = _executor(backend, address)
+            execute: Executor = run_locally
+            if backend == "ray":
+                from apo_bench.sweeps.ray.backend import run_on_ray
+
+                execute = partial(run_on_ray, address=address)
             execute(work, lock, workers=workers, limit_s=limit_s, emit=emit, check=check)
         return store.rows()
 
 
 def names_of(grids: Sequence[SweepSettings]) -> Names:
     """What grids name; all have the same arm."""
-    noises: dict[str, float] = {}
-    for grid in grids:
-        highest = max(max(level_pair(level)) for level in grid.levels)
-        noises |= {noise: max(highest, noises.get(noise, 0.0)) for noise in grid.noises}
+    levels = grouped(
+        (noise, max(level_pair(level))) for grid in grids for noise in grid.noises for level in grid.levels
+    )
     return Names(
         arm=grids[0].arm,
         scenarios=tuple(dict.fromkeys(name for grid in grids for name in grid.scenarios)),
         methods=tuple(dict.fromkeys(name for grid in grids for name in grid.methods)),
         relations=tuple(dict.fromkeys(name for grid in grids for name in grid.relations)),
-        noises=noises,
+        noises={noise: max(highest) for noise, highest in levels.items()},
     )
-
-
-def _executor(backend: str, address: str | None) -> Executor:
-    if backend == "local":
-        return run_locally
-    from apo_bench.sweeps.ray.backend import run_on_ray
-
-    return partial(run_on_ray, address=address)
 
 
 def _left(
@@ -127,23 +128,18 @@ def _left(
     hashes = {}
     for unit in work:
         check()
-        trials = []
-        for trial in unit.trials:
-            row_hash = store.finished.get(trial_key(trial, loaded[trial.scenario].name))
-            if row_hash is None:
-                trials.append(trial)
-                continue
+        row_hashes = {trial: store.finished.get(trial_key(trial, loaded[trial.scenario].name)) for trial in unit.trials}
+        for trial, row_hash in row_hashes.items():
             cell = replace(trial, method=CORRECTOR, seed=0)
-            if cell not in hashes:
+            if row_hash is not None and cell not in hashes:
                 hashes[cell] = spec_hash(trial, lock.content[trial.scenario])
-            if row_hash != hashes[cell]:
+            if row_hash is not None and row_hash != hashes[cell]:
                 raise InputError(
                     f"'{store.folder}' holds a row of {loaded[trial.scenario].name}, method {trial.method}, seed "
                     f"{trial.seed}, that was made with other code or settings; choose another folder."
                 )
-        if trials:
-            left.append(Unit(tuple(trials)))
-    return left
+        left.append(Unit(tuple(trial for trial, row_hash in row_hashes.items() if row_hash is None)))
+    return [unit for unit in left if unit.trials]
 
 
 def _check_executor(workers: int | None, limit_s: float, backend: str, address: str | None) -> None:
@@ -160,20 +156,11 @@ def _check_executor(workers: int | None, limit_s: float, backend: str, address: 
         check_ray(address)
 
 
-def _checked(
-    names: Names, grids: Sequence[SweepSettings], corrector_limit_s: float
-) -> tuple[Mapping[str, Scenario], Arm]:
-    """Everything that has a name, found before a folder is made or a process started."""
-    loaded = load_all(grids)
-    names.check(corrector_limit_s)
-    physics(grids[0].timestep_s)
-    return loaded, find_arm(names.arm)
-
-
 def _content(lock: EnvironmentLock, loaded: Mapping[str, Scenario], arm: Arm) -> dict[str, str]:
     """What the trials are made of besides the package, piece by piece, so that a change can be named."""
-    pieces: dict[str, str] = {}
-    for source, scenario in loaded.items():
-        made_of = content_pieces(scenario, source, arm.files)
-        pieces |= {f"{scenario.name}, {piece}": hashed for piece, hashed in made_of.items()}
+    pieces = {
+        f"{scenario.name}, {piece}": hashed
+        for source, scenario in loaded.items()
+        for piece, hashed in content_pieces(scenario, source, arm.files).items()
+    }
     return {**pieces, **lock.hashes}

@@ -55,11 +55,11 @@ def read_sweep(path: str | Path, overrides: Mapping[str, Any] | None = None) -> 
     top = read_toml(path, "sweep file").fields(("scenarios",), (*SWEEP_KEYS[1:], *_ALONE, "also"))
     tables = [entry.fields((), SWEEP_KEYS) for entry in _tables(top["also"])] if "also" in top else []
     first = {key: _value(key, node) for key, node in top.items() if key != "also"}
-    further = [first | {key: _value(key, node) for key, node in table.items()} for table in tables]
-    names = [str(path), *(f"{path}, also {i}" for i in range(1, len(tables) + 1))]
-    return tuple(
-        _grid(name, {**values, **(overrides or {})}) for name, values in zip(names, (first, *further), strict=True)
-    )
+    grids = {str(path): first} | {
+        f"{path}, also {i}": first | {key: _value(key, node) for key, node in table.items()}
+        for i, table in enumerate(tables, start=1)
+    }
+    return tuple(_grid(name, {**values, **(overrides or {})}) for name, values in grids.items())
 
 
 def _tables(node: JsonNode) -> Sequence[JsonNode]:
@@ -90,10 +90,9 @@ def _value(key: str, node: JsonNode) -> Any:
 
 
 def _entries(node: JsonNode, key: str, of: str) -> Sequence[JsonNode]:
-    if not isinstance(node.value, list):
-        node.fail(f"a list of {of} is needed", f"write {key} = [...]")
-    if not node.value:
-        node.fail(f"a list of {of} is needed", "an empty grid has no trials, so name at least one or leave the key out")
+    if not isinstance(node.value, list) or not node.value:
+        empty = "an empty grid has no trials, so name at least one or leave the key out"
+        node.fail(f"a list of {of} is needed", empty if node.value == [] else f"write {key} = [...]")
     return _few(
         [JsonNode(entry, node.file, f"{node.key}, entry {i}") for i, entry in enumerate(node.value, start=1)], node
     )

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, final
 
 from apo_bench.errors import InputError
+from apo_bench.io.grouping import grouped
 from apo_bench.records import SETTINGS, Key, Row, one_salt, row_key, with_salt
 from apo_bench.records.run.report_rows import NUMBERS, report_rows
 from apo_bench.records.run.run_file import read_run
@@ -37,9 +38,29 @@ class Difference(NamedTuple):
     second: Any
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Pairs:
+    """Trials that both sweeps have and count."""
+
+    shared: int
+    only_first: int
+    """Of these, those that were right in the first alone."""
+    only_second: int
+
+    @property
+    def difference(self) -> float | None:
+        """Success of the second minus that of the first, over the trials that they share."""
+        return (self.only_second - self.only_first) / self.shared if self.shared else None
+
+    @property
+    def interval(self) -> Interval:
+        """Tango's, of that difference."""
+        return tango(self.only_second, self.only_first, self.shared)
+
+
 @final
-@dataclass(frozen=True)
-class Agreement:
+@dataclass(frozen=True, kw_only=True)
+class Agreement(_Pairs):
     """Verdicts of the trials that both have, of one scenario or of all."""
 
     scenario: str
@@ -50,22 +71,8 @@ class Agreement:
     same_everywhere: Rate
     """Seeds with which every trial has the same verdict in both. All random numbers of a trial are drawn from its seed,
     in every scenario the same, so that seeds, and not trials, are independent."""
-    only_first: int
-    """Trials that were right in the first alone."""
-    only_second: int
     excluded_in_one: int
     """Trials whose demonstration was right in one of the two alone."""
-
-    @property
-    def difference(self) -> float | None:
-        """Success of the second minus that of the first, over trials that both count."""
-        n = self.same.trials - self.excluded_in_one
-        return (self.only_second - self.only_first) / n if n else None
-
-    @property
-    def interval(self) -> Interval:
-        """Tango's, of that difference."""
-        return tango(self.only_second, self.only_first, self.same.trials - self.excluded_in_one)
 
 
 class NumberChange(NamedTuple):
@@ -82,26 +89,14 @@ class NumberChange(NamedTuple):
     """Trials in which one of the two alone has it."""
 
 
-class CellPair(NamedTuple):
+@final
+@dataclass(frozen=True, kw_only=True)
+class CellPair(_Pairs):
     """Cells of both at the same place, whatever the fidelity; None where one has none."""
 
+    place: Place
     first: Cell | None
     second: Cell | None
-    shared: int
-    """Trials that both have and both count."""
-    only_first: int
-    """Of these, those that were right in the first alone."""
-    only_second: int
-
-    @property
-    def difference(self) -> float | None:
-        """Success of the second minus that of the first, over the trials that they share."""
-        return (self.only_second - self.only_first) / self.shared if self.shared else None
-
-    @property
-    def interval(self) -> Interval:
-        """Tango's, of that difference."""
-        return tango(self.only_second, self.only_first, self.shared)
 
 
 @final
@@ -140,10 +135,10 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
     for side in sides:
         if not side.rows:
             raise InputError(f"'{side.folder}' holds no finished trial yet; run the sweep before it is compared.")
-    salts = [one_salt(side.rows) for side in sides]
-    if salts[0] != salts[1]:
+    salt, other_salt = (one_salt(side.rows) for side in sides)
+    if salt != other_salt:
         raise InputError(
-            f"'{first}' was drawn {with_salt(salts[0])} and '{second}' {with_salt(salts[1])}, so that they have no "
+            f"'{first}' was drawn {with_salt(salt)} and '{second}' {with_salt(other_salt)}, so that they have no "
             "trial in common, whatever their seeds; compare sweeps of one salt."
         )
     ours, theirs = (_by_key(side) for side in sides)
@@ -174,29 +169,26 @@ def differences(first: Side, second: Side) -> tuple[Difference, ...]:
     Where one of them has no `run.json` that can be read, nothing that only stands there is compared.
     """
     if not (first.run and second.run):
-        read = [bool(side.run) or None for side in (first, second)]
-        first = first._replace(run={RUN: read[0]})
-        second = second._replace(run={RUN: read[1]})
+        first, second = (side._replace(run={RUN: bool(side.run) or None}) for side in (first, second))
     ours, theirs = (_settings_of(side) for side in (first, second))
-    names = dict.fromkeys([*ours, *theirs])
-    return tuple(Difference(n, ours.get(n), theirs.get(n)) for n in names if ours.get(n) != theirs.get(n))
+    return tuple(
+        Difference(n, ours.get(n), theirs.get(n))
+        for n in dict.fromkeys([*ours, *theirs])
+        if ours.get(n) != theirs.get(n)
+    )
 
 
-def agreements(pairs: Iterable[tuple[Row, Row]]) -> tuple[Agreement, ...]:
+def agreements(pairs: Sequence[tuple[Row, Row]]) -> tuple[Agreement, ...]:
     """Per scenario, and over all."""
-    groups: dict[str, list[tuple[Row, Row]]] = {}
-    for pair in pairs:
-        groups.setdefault(pair[0]["scenario"], []).append(pair)
-    everything = [pair for own in groups.values() for pair in own]
-    return (*(_agreement(name, groups[name]) for name in sorted(groups)), _agreement(ALL, everything))
+    groups = grouped((pair[0]["scenario"], pair) for pair in pairs)
+    return (*(_agreement(name, groups[name]) for name in sorted(groups)), _agreement(ALL, pairs))
 
 
 def number_changes(pairs: Sequence[tuple[Row, Row]]) -> tuple[NumberChange, ...]:
     """One per number that is in any row."""
     changes = []
     for name in NUMBERS:
-        value = itemgetter(name)
-        values = [(value(a), value(b)) for a, b in pairs]
+        values = [tuple(map(itemgetter(name), pair)) for pair in pairs]
         both = [(x, y) for x, y in values if x is not None and y is not None]
         alone = sum((x is None) != (y is None) for x, y in values)
         if both or alone:
@@ -222,44 +214,40 @@ def _by_key(side: Side) -> dict[Key, Row]:
 def _agreement(name: str, pairs: Sequence[tuple[Row, Row]]) -> Agreement:
     counted = [(a, b) for a, b in pairs if (a["success"], b["success"]) != (None, None)]
     verdicts = [(a["success"], b["success"]) for a, b in counted]
-    seeds: dict[int, bool] = {}
-    for a, b in counted:
-        seeds[a["seed"]] = seeds.get(a["seed"], True) and a["success"] == b["success"]
+    seeds = grouped((a["seed"], a["success"] == b["success"]) for a, b in counted)
     return Agreement(
         scenario=name,
         same=Rate(sum(a == b for a, b in verdicts), len(verdicts)),
         same_ending=Rate(sum(_ENDED(a) == _ENDED(b) for a, b in counted), len(counted)),
-        same_everywhere=Rate(sum(seeds.values()), len(seeds)),
-        only_first=sum((a, b) == (True, False) for a, b in verdicts),
-        only_second=sum((a, b) == (False, True) for a, b in verdicts),
-        excluded_in_one=sum((a is None) != (b is None) for a, b in verdicts),
+        same_everywhere=Rate(sum(map(all, seeds.values())), len(seeds)),
+        **_pairs(verdicts),
+        excluded_in_one=sum(None in both for both in verdicts),
     )
 
 
 def _place_and_seed(pair: tuple[Row, Row]) -> tuple[Any, ...]:
-    place = place_of(pair[0])
-    assert place is not None
-    return (*order(place), pair[0]["seed"])
+    return (*order(_anywhere(place_of(pair[0]))), pair[0]["seed"])
+
+
+def _pairs(verdicts: Sequence[tuple[Any, Any]]) -> dict[str, int]:
+    """What `_Pairs` counts."""
+    alone = {"only_first": verdicts.count((True, False)), "only_second": verdicts.count((False, True))}
+    return {"shared": sum(None not in both for both in verdicts)} | alone
 
 
 def _cells(first: Side, second: Side, pairs: Iterable[tuple[Row, Row]]) -> tuple[CellPair, ...]:
     """Cells by place, whatever the fidelity; sorted as `tally` sorts."""
     ours, theirs = ({_anywhere(cell_place(cell)): cell for cell in tally(side.rows)} for side in (first, second))
-    verdicts: dict[Place, list[tuple[Any, Any]]] = {}
-    for a, b in pairs:
-        place = place_of(a)
-        if place is not None and a["success"] is not None and b["success"] is not None:
-            verdicts.setdefault(_anywhere(place), []).append((a["success"], b["success"]))
-    pairs_of_cells = []
-    for place in sorted({**ours, **theirs}, key=order):
-        both = verdicts.get(place, [])
-        alone = (both.count((True, False)), both.count((False, True)))
-        pairs_of_cells.append(CellPair(ours.get(place), theirs.get(place), len(both), *alone))
-    return tuple(pairs_of_cells)
+    verdicts = grouped((_anywhere(place_of(a)), (a["success"], b["success"])) for a, b in pairs)
+    return tuple(
+        CellPair(place=place, first=ours.get(place), second=theirs.get(place), **_pairs(verdicts.get(place, [])))
+        for place in sorted({**ours, **theirs}, key=order)
+    )
 
 
-def _anywhere(place: Place) -> Place:
-    """Whatever the fidelity."""
+def _anywhere(place: Place | None) -> Place:
+    """Whatever the fidelity, of a row that has a place: one with a level."""
+    assert place is not None
     return place._replace(fidelity="full")
 
 
@@ -274,6 +262,7 @@ def _settings_of(side: Side) -> dict[str, Any]:
                 settings |= {f"{name} {i}: {key}": x for key, x in inner.items()}
         else:
             settings[name] = value
-    for name in ("schema", *(info.column for info in SETTINGS.values() if info.shared)):
-        settings[f"rows: {name}"] = sorted(set(map(itemgetter(name), side.rows)))
-    return settings
+    return settings | {
+        f"rows: {name}": sorted(set(map(itemgetter(name), side.rows)))
+        for name in ("schema", *(info.column for info in SETTINGS.values() if info.shared))
+    }

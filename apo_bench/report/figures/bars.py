@@ -1,12 +1,13 @@
 """Figures in which one unit is a px: where trials ended (for every method and level a bar of shares, success first,
 then the stages that failed), predicted against real failure (squares whose shade is a share), wall times of trials."""
 
-from collections import Counter
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any
 
+from apo_bench.io.grouping import grouped
 from apo_bench.records import STAGES, knows_truth
-from apo_bench.report.figures.sheet import SAMPLE, WIDTH, Entry, Figure, Panel, Tips
+from apo_bench.report.figures.sheet import WIDTH, Entry, Figure, Panel, Tips
 from apo_bench.report.figures.styles import INK, SOFT, STAGE_COLORS, SUCCESS
 from apo_bench.statistics import ALL, Cell, Confusion, Setting, TrialTimes, level_of, level_words, percent
 
@@ -30,6 +31,8 @@ _TIMES_RIGHT = 16
 _TIMES_STEP = 20
 """Where the axis of times begins and ends, and from one line to the next, px."""
 _MARGINS = (0, 0, 0, 0)
+_SAMPLE = (4.0, 1.0, 18.0, 12.0)
+"""The box of a legend."""
 _SMALL = {"fontsize": 9, "color": SOFT}
 _Box = tuple[float, float, float, float]
 _RIGHT_COLOR = "#0072b2"
@@ -42,35 +45,34 @@ def outcome_figure(grouped: Mapping[Setting, Sequence[Cell]]) -> Figure:
     """A panel per setting that has a trial that counts."""
     counted = {setting: [c for c in cells if c.trials] for setting, cells in grouped.items()}
     stages = _in_order({stage for cells in counted.values() for cell in cells for stage in _stages_of(cell)})
-    legend = [Entry(name, _patch(_color_of(name))) for name in ("success", *stages)]
-    return Figure("Where trials failed", [_outcome_panel(s, cells) for s, cells in counted.items() if cells], legend)
+    return Figure(
+        "Where trials failed",
+        [_outcome_panel(s, cells) for s, cells in counted.items() if cells],
+        [Entry(name, partial(_boxes, places=[_SAMPLE], colors=[_color_of(name)])) for name in ("success", *stages)],
+    )
 
 
 def prediction_figure(confusions: Sequence[Confusion]) -> Figure:
     """A panel per method of which something was predicted, over all scenarios, and one of all methods."""
-    groups: dict[str, list[Confusion]] = {}
-    for confusion in confusions:
-        groups.setdefault("all methods" if confusion.method == ALL else confusion.method, []).append(confusion)
+    groups = grouped(("all methods" if c.method == ALL else c.method, c) for c in confusions)
     summed = {method: _sum(own) for method, own in groups.items()}
-    panels = [_prediction_panel(method, counts) for method, counts in summed.items() if sum(map(sum, counts))]
-    return Figure("Predicted against real failure", panels)
+    return Figure(
+        "Predicted against real failure",
+        [_prediction_panel(method, counts) for method, counts in summed.items() if sum(map(sum, counts))],
+    )
 
 
 def time_figure(times: Sequence[TrialTimes]) -> Figure:
     """A panel per scenario, with one axis for all."""
     most = _round_up(max((t.high for t in times), default=0.0))
-    by_scenario: dict[str, list[TrialTimes]] = {}
-    for t in times:
-        by_scenario.setdefault(t.scenario, []).append(t)
+    by_scenario = grouped((t.scenario, t) for t in times)
     return Figure("Wall time of a trial", [_time_panel(scenario, own, most) for scenario, own in by_scenario.items()])
 
 
-def _stages_of(cell: Cell) -> Counter[str]:
+def _stages_of(cell: Cell) -> dict[str, int]:
     """Stage -> failures."""
-    stages: Counter[str] = Counter()
-    for why, count in cell.failures.items():
-        stages[why.partition(":")[0]] += count
-    return stages
+    counts = grouped((why.partition(":")[0], count) for why, count in cell.failures.items())
+    return {stage: sum(own) for stage, own in counts.items()}
 
 
 def _color_of(ending: str) -> str:
@@ -90,15 +92,6 @@ def _boxes(axis: Any, places: Sequence[_Box], colors: Sequence[Any]) -> Any:
 
     corners = [[(x, y), (x + w, y), (x + w, y + h), (x, y + h)] for x, y, w, h in places]
     return axis.add_collection(PolyCollection(corners, facecolors=colors, linewidths=0, clip_on=False), autolim=False)
-
-
-def _patch(color: str) -> Callable[[Any], None]:
-    def draw(axis: Any) -> None:
-        axis.set_axis_off()
-        axis.set(xlim=(0, SAMPLE[0]), ylim=(SAMPLE[1], 0))
-        _boxes(axis, [(4, 1, 18, 12)], [color])
-
-    return draw
 
 
 def _outcome_panel(setting: Setting, cells: Sequence[Cell]) -> Panel:
@@ -123,8 +116,8 @@ def _outcome_panel(setting: Setting, cells: Sequence[Cell]) -> Panel:
             axis.text(_LEFT - 6, top + _HIGH - 2, _level(cell, setting), ha="right", **_SMALL)
             axis.text(WIDTH - _RIGHT + 5, top + _HIGH - 2, f"n {cell.trials}", **_SMALL)
         pieces = [piece for top, cell in bars for piece in _bar(cell, setting, top)]
-        drawn = _boxes(axis, [box for box, _, _ in pieces], [color for _, color, _ in pieces])
-        tip(drawn, [words for _, _, words in pieces])
+        boxes, colors, words = zip(*pieces, strict=True)
+        tip(_boxes(axis, boxes, colors), words)
         for share in (0.0, 0.5, 1.0):
             axis.text(_x(share), y + 12, f"{100 * share:.0f} %", ha="center", **_SMALL)
         axis.text(_x(0.5), y + 26, "share of trials", ha="center", **_SMALL)
@@ -139,12 +132,11 @@ def _bar(cell: Cell, setting: Setting, y: float) -> Iterable[tuple[_Box, str, st
     level = _level(cell, setting)
     at = f"{cell.method}{f', level {level}' if level else ''}"
     for ending, count in (("success", cell.successes), *((stage, failures[stage]) for stage in _in_order(failures))):
+        left = _x(done / cell.trials)
+        done += count
         if count:
-            left = _x(done / cell.trials)
-            right = _x((done + count) / cell.trials)
             words = f"{at}: {ending} {count} of {cell.trials} ({percent(count / cell.trials)})"
-            yield (left, y, right - left, _HIGH), _color_of(ending), words
-            done += count
+            yield (left, y, _x(done / cell.trials) - left, _HIGH), _color_of(ending), words
 
 
 def _in_order(stages: Iterable[str]) -> list[str]:
@@ -161,9 +153,10 @@ def _x(share: float) -> float:
 
 
 def _sum(own: Sequence[Confusion]) -> _Counts:
-    fits = sum(c.fit_fitted for c in own), sum(c.fit_failed for c in own)
-    fails = sum(c.fail_fitted for c in own), sum(c.fail_failed for c in own)
-    return fits, fails
+    return (
+        (sum(c.fit_fitted for c in own), sum(c.fit_failed for c in own)),
+        (sum(c.fail_fitted for c in own), sum(c.fail_failed for c in own)),
+    )
 
 
 def _prediction_panel(method: str, counts: _Counts) -> Panel:
@@ -171,22 +164,21 @@ def _prediction_panel(method: str, counts: _Counts) -> Panel:
 
     def draw(axis: Any, tip: Tips) -> None:
         _canvas(axis, _SQUARES_HEIGHT)
+        ends = ("fitted", "failed")
         for i, words in enumerate(("predicted to fit", "predicted to fail")):
-            axis.text(_SQUARES_LEFT - 8, _SQUARES_TOP + _SIDE * (i + 0.5) + 4, words, ha="right")
-            for j, word in enumerate(("fitted", "failed")):
+            y = _SQUARES_TOP + _SIDE * i
+            axis.text(_SQUARES_LEFT - 8, y + _SIDE * 0.5 + 4, words, ha="right")
+            for j, (word, count) in enumerate(zip(ends, counts[i], strict=True)):
                 x = _SQUARES_LEFT + _SIDE * j
-                y = _SQUARES_TOP + _SIDE * i
-                count = counts[i][j]
-                color = _RIGHT_COLOR if i == j else _WRONG_COLOR
-                square = _boxes(axis, [(x, y, _SIDE - 2, _SIDE - 2)], [color])
+                square = _boxes(axis, [(x, y, _SIDE - 2, _SIDE - 2)], [_RIGHT_COLOR if i == j else _WRONG_COLOR])
                 square.set_alpha(0.08 + 0.55 * count / n)
                 tip(square, [f"{words}, {word}: {count} of {n}"])
                 axis.text(x + _SIDE / 2 - 1, y + _SIDE / 2, f"{count:,}", ha="center")
                 axis.text(x + _SIDE / 2 - 1, y + _SIDE / 2 + 14, f"{100 * count / n:.1f} %", ha="center", **_SMALL)
-        for j, word in enumerate(("fitted", "failed")):
+        for j, word in enumerate(ends):
             axis.text(_SQUARES_LEFT + _SIDE * (j + 0.5), _SQUARES_TOP - 8, word, ha="center")
-        agreed = (counts[0][0] + counts[1][1]) / n
-        axis.text(_SQUARES_LEFT + 2 * _SIDE + 8, _SQUARES_TOP + _SIDE, f"{100 * agreed:.1f} % right", **_SMALL)
+        agreed = f"{100 * (counts[0][0] + counts[1][1]) / n:.1f} % right"
+        axis.text(_SQUARES_LEFT + 2 * _SIDE + 8, _SQUARES_TOP + _SIDE, agreed, **_SMALL)
 
     return Panel(f"{method}; n {n:,}", draw, _SQUARES_HEIGHT, _MARGINS)
 
@@ -211,9 +203,8 @@ def _time_panel(scenario: str, own: Sequence[TrialTimes], most: float) -> Panel:
             axis.text(x(most * share), bottom + 8, f"{most * share:g}", ha="center", **_SMALL)
         axis.text(x(most / 2), bottom + 22, "wall time of a trial [s]", ha="center", **_SMALL)
 
-    low = min(t.trials for t in own)
-    high = max(t.trials for t in own)
-    return Panel(f"{scenario}; n {low if low == high else f'{low} to {high}'}", draw, height, _MARGINS)
+    ends = dict.fromkeys((min(t.trials for t in own), max(t.trials for t in own)))
+    return Panel(f"{scenario}; n {' to '.join(map(str, ends))}", draw, height, _MARGINS)
 
 
 def _round_up(x: float) -> float:

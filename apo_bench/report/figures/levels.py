@@ -2,8 +2,10 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from typing import TypeVar
+from operator import attrgetter
+from typing import Any, TypeVar
 
+from apo_bench.io.grouping import grouped
 from apo_bench.records import RANGE, knows_truth
 from apo_bench.report.figures.lines import Axis, MethodLine, Point, RuleLine, dodges, entries, levels_axis, line_panel
 from apo_bench.report.figures.sheet import Figure, Panel
@@ -28,11 +30,11 @@ from apo_bench.statistics import (
 from apo_bench.statistics.settings import settings
 
 _Item = TypeVar("_Item")
-SHARES = tuple((x / 100, f"{x} %") for x in (0, 25, 50, 75, 100))
+SUCCESS_AXIS = Axis("success", 0.0, 1.0, tuple((x / 100, f"{x} %") for x in (0, 25, 50, 75, 100)))
 _STEPS = (1, 2, 5, 10, 20, 25, 50, 100)
 _FLOOR_MM = 1e-3
 """Gaps below this are drawn here: what solvers leave of zero says nothing."""
-_RECOGNITION = {"precision": "precision", "recall": "recall", "completeness": "demonstrations all right"}
+_RECOGNITION = {"precision": "precision", "recall": "recall", "demonstrations all right": "all_right.rate"}
 
 
 def success_figure(cells: Sequence[Cell]) -> Figure:
@@ -40,23 +42,32 @@ def success_figure(cells: Sequence[Cell]) -> Figure:
     looks = styles(methods_of(cells))
     grouped = {s: own for s, own in members(settings(cells), cells).items() if levels_of(own)}
     varied = {s: own for s, own in grouped.items() if len(levels_of(own)) > 1}
-    panels = [_success(setting, own, looks) for setting, own in (varied or grouped).items()]
-    return Figure("Success over level", panels, entries(looks, any(cell.method == "oracle" for cell in cells)))
+    return Figure(
+        "Success over level",
+        [_success(setting, own, looks) for setting, own in (varied or grouped).items()],
+        entries(looks, any(cell.method == "oracle" for cell in cells)),
+    )
 
 
 def difference_figure(pairs: Mapping[Setting, Sequence[Paired]], reference: str, looks: Mapping[str, Style]) -> Figure:
     """Differences to a reference: a panel per setting in which methods are compared with it."""
     compared = {m: look for m, look in looks.items() if m not in (reference, "none")}
     here = {s: [p for p in own if p.reference == reference and p.pairs] for s, own in pairs.items()}
-    panels = [_differences(setting, own, compared) for setting, own in here.items() if own]
-    return Figure(f"Difference of success to {reference}, same seeds", panels, entries(compared))
+    return Figure(
+        f"Difference of success to {reference}, same seeds",
+        [_differences(setting, own, compared) for setting, own in here.items() if own],
+        entries(compared),
+    )
 
 
 def gap_figure(gaps: Mapping[Setting, Sequence[GapSummary]], looks: Mapping[str, Style]) -> Figure:
     """Gaps as seen and as planned: a panel per setting in which a method corrected."""
     compared = {m: look for m, look in looks.items() if any(g.place.method == m for own in gaps.values() for g in own)}
-    panels = [_gaps(setting, own, compared) for setting, own in gaps.items() if own]
-    return Figure("Gap of the contacts as seen and as planned", panels, entries({"as seen": SEEN, **compared}))
+    return Figure(
+        "Gap of the contacts as seen and as planned",
+        [_gaps(setting, own, compared) for setting, own in gaps.items() if own],
+        entries({"as seen": SEEN, **compared}),
+    )
 
 
 def recognition_figure(recognitions: Sequence[Recognition]) -> Figure:
@@ -67,12 +78,9 @@ def recognition_figure(recognitions: Sequence[Recognition]) -> Figure:
     for row in rows:
         here = [r for r in drawn if (r.place.noise, r.place.eye, r.place.careless) == row]
         where = f"{'range finder' if row[1] == RANGE else row[0]}, carelessness {row[2]:g}"
-        panels += [_recognised(f"{name}; {where}", here, what) for what, name in _RECOGNITION.items()]
-    kinds = {
-        kind: style
-        for kind, style in RECOGNITION_STYLES.items()
-        if any(r.place.relations == kind for r in recognitions)
-    }
+        panels += [_recognised(f"{name}; {where}", here, attrgetter(what)) for name, what in _RECOGNITION.items()]
+    met = {r.place.relations for r in recognitions}
+    kinds = {kind: style for kind, style in RECOGNITION_STYLES.items() if kind in met}
     return Figure("Recognised contacts over level", panels, entries(kinds))
 
 
@@ -81,11 +89,15 @@ def methods_of(cells: Sequence[Cell]) -> list[str]:
     return [m for m in dict.fromkeys(c.method for c in cells) if not knows_truth(m)]
 
 
+def rate_words(c: Cell) -> str:
+    """`97.0 % (91.5 to 99.0 %), n 100`."""
+    return f"{percent(c.rate)} ({percents(c.interval)}), n {c.trials}"
+
+
 def counted(numbers: Sequence[int], what: str = "") -> str:
     """`n 40`, or `n 38 to 160` where it differs, and of what."""
-    low = min(numbers, default=0)
-    high = max(numbers, default=0)
-    return f"n\u00a0{low if low == high else f'{low} to {high}'}{f' {what}' if what else ''}"
+    ends = dict.fromkeys((min(numbers, default=0), max(numbers, default=0)))
+    return f"n\u00a0{' to '.join(map(str, ends))}{f' {what}' if what else ''}"
 
 
 def scale(values: Sequence[float]) -> Axis:
@@ -100,42 +112,31 @@ def scale(values: Sequence[float]) -> Axis:
 
 
 def _success(setting: Setting, cells: Sequence[Cell], looks: Mapping[str, Style]) -> Panel:
-    def point(c: Cell) -> tuple[float, float, float]:
-        return c.rate or 0.0, *c.interval
-
-    def tip(c: Cell) -> str:
-        return f"{percent(c.rate)} ({percents(c.interval)}), n {c.trials}"
-
     known = [c for c in cells if c.rate is not None]
-    lines = _lines(setting, known, looks, point, tip)
+    lines = _lines(setting, known, looks, lambda c: (c.rate or 0.0, *c.interval), rate_words)
     best = next((c for c in known if c.method == "oracle"), None)
     rule = None if best is None else RuleLine(best.rate or 0.0, True, f"oracle: {percent(best.rate)}, n {best.trials}")
     title = f"{setting.title()}; {counted([c.trials for c in cells])}"
-    return line_panel(title, _levels(setting, cells), Axis("success", 0.0, 1.0, SHARES), lines, rule)
+    return line_panel(title, _levels(setting, cells), SUCCESS_AXIS, lines, rule)
 
 
 def _differences(setting: Setting, pairs: Sequence[Paired], looks: Mapping[str, Style]) -> Panel:
-    def point(p: Paired) -> tuple[float, float, float]:
-        return p.difference or 0.0, *p.interval
-
     def tip(p: Paired) -> str:
-        d = p.difference or 0.0
-        low, high = p.interval
-        return f"{100 * d:+.1f} points ({100 * low:+.1f} to {100 * high:+.1f}), n {p.pairs} pairs"
+        words = "{:+.1f} points ({:+.1f} to {:+.1f})".format(*(100 * x for x in (p.difference or 0.0, *p.interval)))
+        return f"{words}, n {p.pairs} pairs"
 
+    lines = _lines(setting, pairs, looks, lambda p: (p.difference or 0.0, *p.interval), tip)
     y = scale([x for p in pairs for x in p.interval])
     title = f"{setting.title()}; {counted([p.pairs for p in pairs], 'pairs')}"
-    return line_panel(title, _levels(setting, pairs), y, _lines(setting, pairs, looks, point, tip), RuleLine(0.0))
+    return line_panel(title, _levels(setting, pairs), y, lines, RuleLine(0.0))
 
 
 def _gaps(setting: Setting, summaries: Sequence[GapSummary], looks: Mapping[str, Style]) -> Panel:
     def point(q: Quantiles) -> tuple[float, float, float]:
         return max(q.median, _FLOOR_MM), max(q.low, _FLOOR_MM), max(q.high, _FLOOR_MM)
 
-    def tip(g: GapSummary) -> str:
-        return f"as planned: median {g.planned.median:.3f} mm, 95 % below {g.planned.high:.3f} mm, n {g.trials}"
-
-    planned = _lines(setting, summaries, looks, lambda g: point(g.planned), tip)
+    words = "as planned: median {0.planned.median:.3f} mm, 95 % below {0.planned.high:.3f} mm, n {0.trials}"
+    planned = _lines(setting, summaries, looks, lambda g: point(g.planned), words.format)
     most_tried = [max((g for g in summaries if level_of(g) == x), key=lambda g: g.trials) for x in levels_of(summaries)]
     seen = [
         Point(float(i), *point(g.seen), f"median {g.seen.median:.3f} mm, n {g.trials}")
@@ -150,18 +151,17 @@ def _gaps(setting: Setting, summaries: Sequence[GapSummary], looks: Mapping[str,
     return line_panel(title, _levels(setting, summaries), y, [MethodLine("as seen", SEEN, seen), *planned])
 
 
-def _recognised(title: str, here: Sequence[Recognition], what: str) -> Panel:
-    levels = sorted({(r.place.level, r.place.level_deg) for r in here})
+def _recognised(title: str, here: Sequence[Recognition], share: Callable[[Recognition], Any]) -> Panel:
+    levels = sorted({level_of(r) for r in here})
     noise = RANGE if all(r.place.eye == RANGE for r in here) else ""
     kinds = [kind for kind in RECOGNITION_STYLES if any(r.place.relations == kind for r in here)]
     lines = []
     for kind, dodge in zip(kinds, dodges(len(kinds)), strict=True):
-        points = []
-        for r in sorted(here, key=lambda r: r.place.level):
-            share: float | None = getattr(r, what)
-            where = levels.index((r.place.level, r.place.level_deg)) + dodge
-            if r.place.relations == kind and share is not None:
-                points.append(Point(where, share, share, share, percent(share)))
+        points = [
+            Point(levels.index(level_of(r)) + dodge, value, value, value, percent(value))
+            for r in sorted(here, key=lambda r: r.place.level)
+            if r.place.relations == kind and (value := share(r)) is not None
+        ]
         lines.append(MethodLine(kind, RECOGNITION_STYLES[kind], points))
     least = min((p.value for line in lines for p in line.points), default=0.0)
     low = 0.0 if least < 0.6 else 0.6 if least < 0.9 else 0.9
@@ -183,21 +183,20 @@ def _lines(
 ) -> list[MethodLine]:
     """A line per method, by a value with its interval and a sentence of each item."""
     levels = levels_of(items)
-    by_method = {m: [item for item in items if cell_place(item).method == m] for m in looks}
-    drawn = {m: own for m, own in by_method.items() if own}
+    by_method = grouped((cell_place(item).method, item) for item in items)
+    drawn = {m: by_method[m] for m in looks if m in by_method}
+
+    def words(item: _Item) -> str:
+        return f"level {level_words(level_of(item), setting.noise)}: {tip(item)}"
+
     lines = []
     for (method, own), dodge in zip(drawn.items(), dodges(len(drawn)), strict=True):
-        points = []
-        for item in own:
-            level = level_of(item)
-            words = f"level {level_words(level, setting.noise)}: {tip(item)}"
-            points.append(Point(levels.index(level) + dodge, *point(item), words))
+        points = [Point(levels.index(level_of(item)) + dodge, *point(item), tip=words(item)) for item in own]
         lines.append(MethodLine(method, looks[method], points))
     return lines
 
 
 def _power(k: int) -> str:
     """`0.01`, or `10⁻⁴`."""
-    if -3 <= k <= 3:
-        return f"{10.0**k:g}"
-    return "10" + str(k).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    raised = str(k).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))
+    return f"{10.0**k:g}" if -3 <= k <= 3 else f"10{raised}"

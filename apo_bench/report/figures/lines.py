@@ -1,9 +1,10 @@
 """A panel of lines with bands: methods over levels, or whatever else is over whatever else."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
-from apo_bench.report.figures.sheet import DPI, SAMPLE, Entry, Panel, Tips
+from apo_bench.report.figures.sheet import DPI, Entry, Panel, Tips
 from apo_bench.report.figures.styles import INK, RULE, SOFT, Style
 
 _DODGE = 0.08
@@ -57,16 +58,19 @@ def line_panel(title: str, x: Axis, y: Axis, lines: Sequence[MethodLine], rule: 
     def draw(axis: Any, tip: Tips) -> None:
         _scaffold(axis, x, y)
         if rule is not None:
-            look = {"color": SOFT, "linestyle": (0, (4, 3))} if rule.dashed else {"color": INK}
-            drawn = axis.axhline(rule.at, linewidth=1.2, **look)
+            drawn = axis.axhline(
+                rule.at, linewidth=1.2, **{"color": SOFT, "linestyle": (0, (4, 3))} if rule.dashed else {"color": INK}
+            )
             if rule.tip:
                 tip(drawn, [rule.tip])
         for line in lines:
             _band(axis, line)
         step = min(_LIFT, _RANGE / max(len(lines), 1))
         for i, line in enumerate(lines):
-            lift = step * ((len(lines) - 1) / 2 - i)
-            tip(_marks(axis, line, lift), [f"{line.name}, {point.tip}" for point in line.points])
+            tip(
+                _marks(axis, line, step * ((len(lines) - 1) / 2 - i)),
+                [f"{line.name}, {point.tip}" for point in line.points],
+            )
 
     return Panel(title, draw)
 
@@ -82,28 +86,25 @@ def dodges(number: int) -> list[float]:
     return [step * (i - (number - 1) / 2) for i in range(number)]
 
 
-def entries(looks: dict[str, Style], ceiling: bool = False) -> list[Entry]:
+def entries(looks: Mapping[str, Style], ceiling: bool = False) -> list[Entry]:
     """A legend: one per method, and one for the oracle."""
-    oracle = Style(SOFT, "", (0, (4, 3)))
-    methods = [Entry(method, _sample(style)) for method, style in looks.items()]
-    return methods + [Entry("oracle", _sample(oracle))] * ceiling
+    oracle = {"oracle": Style(SOFT, "", (0, (4, 3)))} if ceiling else {}
+    return [Entry(name, partial(_sample, style=style)) for name, style in (*looks.items(), *oracle.items())]
 
 
-def _sample(style: Style) -> Callable[[Any], None]:
-    def draw(axis: Any) -> None:
-        axis.set_axis_off()
-        axis.set(xlim=(0, SAMPLE[0]), ylim=(0, SAMPLE[1]))
-        axis.plot([1, 25], [7, 7], color=style.color, linestyle=style.dashes, linewidth=1.7)
-        axis.plot([13], [7], color=style.color, marker=style.marker, markersize=7)
-
-    return draw
+def _sample(axis: Any, style: Style) -> None:
+    axis.plot([1, 25], [7, 7], color=style.color, linestyle=style.dashes, linewidth=1.7)
+    axis.plot([13], [7], color=style.color, marker=style.marker, markersize=7)
 
 
 def _scaffold(axis: Any, x: Axis, y: Axis) -> None:
     """Grid, labels and names; ticks of matplotlib would take half of the time."""
     axis.set_axis_off()
-    scales = {f"{name}scale": "log" for name, axis_of in (("x", x), ("y", y)) if axis_of.logarithmic}
-    axis.set(xlim=(x.low, x.high), ylim=(y.low, y.high), **scales)
+    axis.set(
+        xlim=(x.low, x.high),
+        ylim=(y.low, y.high),
+        **{f"{name}scale": "log" for name, axis_of in (("x", x), ("y", y)) if axis_of.logarithmic},
+    )
     axis.hlines([at for at, _ in y.ticks], x.low, x.high, color=RULE, linewidth=1, zorder=0)
     crowded = sum(len(label) for _, label in x.ticks) + 2 * len(x.ticks) > 52
     below = axis.get_xaxis_transform()
@@ -131,8 +132,11 @@ def _marks(axis: Any, line: MethodLine, lift: float) -> Any:
     at = [p.x for p in line.points]
     values = [p.value for p in line.points]
     color, marker, dashes = line.style
-    higher = axis.transData + ScaledTranslation(0.0, lift / DPI, axis.figure.dpi_scale_trans)
-    shared = {"color": color, "clip_on": False, "transform": higher}
+    shared = {
+        "color": color,
+        "clip_on": False,
+        "transform": axis.transData + ScaledTranslation(0.0, lift / DPI, axis.figure.dpi_scale_trans),
+    }
     axis.plot(at, values, linestyle=dashes, linewidth=1.7, **shared)
     thin = marker == "1" or isinstance(marker, tuple)  # a white edge would cover most of them
     (marks,) = axis.plot(at, values, marker=marker, linestyle="", markersize=8.0 if thin else 6.5, **shared)

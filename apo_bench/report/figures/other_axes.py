@@ -3,11 +3,11 @@
 from collections.abc import Callable, Sequence
 
 from apo_bench.records import knows_truth, may_look
-from apo_bench.report.figures.levels import SHARES, methods_of
+from apo_bench.report.figures.levels import SUCCESS_AXIS, methods_of, rate_words
 from apo_bench.report.figures.lines import Axis, MethodLine, Point, dodges, entries, levels_axis, line_panel
 from apo_bench.report.figures.sheet import Figure, Panel
 from apo_bench.report.figures.styles import styles
-from apo_bench.statistics import Cell, Setting, level_label, level_of, level_words, members, percent, percents
+from apo_bench.statistics import Cell, Setting, level_label, level_of, level_words, members
 from apo_bench.statistics.settings import settings
 
 _DODGE = 1.03
@@ -19,8 +19,11 @@ def looks_figure(cells: Sequence[Cell]) -> Figure:
     numbers of looks were allowed; a line per method and level."""
     grouped = _together(cells, lambda setting: setting._replace(looks=0), lambda c: c.rate is not None)
     varied = {s: own for s, own in grouped.items() if len({c.looks for c in own if may_look(c.method)}) > 1}
-    panels = [_looks_panel(setting, own) for setting, own in varied.items()]
-    return Figure("Success over the number of looks", panels, entries(styles(methods_of(cells))))
+    return Figure(
+        "Success over the number of looks",
+        [_looks_panel(setting, own) for setting, own in varied.items()],
+        entries(styles(methods_of(cells))),
+    )
 
 
 def tightness_figure(cells: Sequence[Cell]) -> Figure:
@@ -32,8 +35,11 @@ def tightness_figure(cells: Sequence[Cell]) -> Figure:
     grouped = _together(
         cells, lambda setting: setting._replace(clearance_mm=0.0), lambda c: bool(c.tightness) and c.rate is not None
     )
-    panels = [_tightness_panel(setting, own) for setting, own in grouped.items()]
-    return Figure("Success over tightness", panels, entries(styles(methods_of(cells))))
+    return Figure(
+        "Success over tightness",
+        [_tightness_panel(setting, own) for setting, own in grouped.items()],
+        entries(styles(methods_of(cells))),
+    )
 
 
 def _together(
@@ -43,8 +49,11 @@ def _together(
     grouped: dict[Setting, dict[tuple[object, ...], Cell]] = {}
     for setting, own in members(settings(cells), cells).items():
         inside = grouped.setdefault(merged(setting), {})
-        drawn = [c for c in own if not knows_truth(c.method) and has_place(c)]
-        inside |= {(c.method, level_of(c), c.looks, c.clearance_mm): c for c in drawn}
+        inside |= {
+            (c.method, level_of(c), c.looks, c.clearance_mm): c
+            for c in own
+            if not knows_truth(c.method) and has_place(c)
+        }
     return {setting: list(own.values()) for setting, own in grouped.items() if own}
 
 
@@ -52,26 +61,27 @@ def _looks_panel(setting: Setting, cells: Sequence[Cell]) -> Panel:
     looks = sorted({c.looks for c in cells})
     aside = dodges(len({c.method for c in cells}))
 
-    def words(c: Cell) -> str:
-        return f"level {level_words(level_of(c), c.noise)}, looks {c.looks}"
-
-    lines = _lines(cells, lambda c, i: looks.index(c.looks) + aside[i], words)
+    lines = _lines(
+        cells,
+        lambda c, i: looks.index(c.looks) + aside[i],
+        lambda c: f"{level_words(level_of(c), c.noise)}, looks {c.looks}",
+    )
     x = levels_axis([str(n) for n in looks], "looks allowed after the first")
-    return line_panel(setting.title(), x, Axis("success", 0.0, 1.0, SHARES), lines)
+    return line_panel(setting.title(), x, SUCCESS_AXIS, lines)
 
 
 def _tightness_panel(setting: Setting, cells: Sequence[Cell]) -> Panel:
     middle = (len({c.method for c in cells}) - 1) / 2
 
-    def words(c: Cell) -> str:
-        return f"level {level_label(c.level, c.level_deg, c.noise)}, clearance {c.clearance_mm:g} mm"
-
-    lines = _lines(cells, lambda c, i: (c.tightness or 0.0) * _DODGE ** (i - middle), words)
+    lines = _lines(
+        cells,
+        lambda c, i: (c.tightness or 0.0) * _DODGE ** (i - middle),
+        lambda c: f"{level_label(c.level, c.level_deg, c.noise)}, clearance {c.clearance_mm:g} mm",
+    )
     tried = sorted({c.tightness for c in cells if c.tightness})
     ticks = [(t, f"{t:g}") for t in tried]
     x = Axis("clearance per side over level [mm per mm]", tried[0] / 1.3, tried[-1] * 1.3, ticks, logarithmic=True)
-    title = ", ".join([setting.scenario, *setting.conditions(clearance=False)])
-    return line_panel(title, x, Axis("success", 0.0, 1.0, SHARES), lines)
+    return line_panel(", ".join([setting.scenario, *setting.conditions(clearance=False)]), x, SUCCESS_AXIS, lines)
 
 
 def _lines(cells: Sequence[Cell], at: Callable[[Cell, int], float], words: Callable[[Cell], str]) -> list[MethodLine]:
@@ -84,7 +94,7 @@ def _lines(cells: Sequence[Cell], at: Callable[[Cell, int], float], words: Calla
                     at(c, i),
                     c.rate or 0.0,
                     *c.interval,
-                    f"{words(c)}: {percent(c.rate)} ({percents(c.interval)}), n {c.trials}",
+                    f"level {words(c)}: {rate_words(c)}",
                 )
                 for c in sorted(cells, key=lambda c: (c.looks, c.clearance_mm))
                 if c.method == method and level_of(c) == level

@@ -69,7 +69,7 @@ class Entry(NamedTuple):
 
     name: str
     draw: Callable[[Any], None]
-    """Draws a sample into axes of 26 by 14."""
+    """Draws a sample into axes of 26 by 14, from the upper left corner."""
 
 
 class Figure(NamedTuple):
@@ -139,7 +139,10 @@ def draw(figure: Figure) -> DrawnFigure:
         sheet.text(_GAP, 26, figure.title, fontsize=15)
         for i, (entry, (x, y)) in enumerate(zip(figure.legend, samples, strict=True)):
             boxes[f"sample-{i}"] = (x, y, *SAMPLE)
-            entry.draw(sheet.axes(f"sample-{i}", x, y, *SAMPLE))
+            axes = sheet.axes(f"sample-{i}", x, y, *SAMPLE)
+            axes.set_axis_off()
+            axes.set(xlim=(0, SAMPLE[0]), ylim=(SAMPLE[1], 0))
+            entry.draw(axes)
             sheet.text(x + SAMPLE[0] + 5, y + 11, entry.name)
         for i, (panel, (x, y)) in enumerate(zip(figure.panels, places, strict=True)):
             boxes[f"panel-{i}"] = (x, y, WIDTH, panel.height)
@@ -151,7 +154,10 @@ def draw(figure: Figure) -> DrawnFigure:
         file = io.StringIO()
         canvas.savefig(file, format="svg", metadata=dict.fromkeys(("Date", "Creator", "Format", "Type")))
     svg = _with_tips(file.getvalue(), tips)
-    pieces = {name: _piece(body, boxes[name]) for name, body in _PIECE.findall(svg)}
+    pieces = {
+        name: Markup(f'viewBox="{" ".join(f"{x:g}" for x in boxes[name])}">{themed(_small(body))}</svg>')
+        for name, body in _PIECE.findall(svg)
+    }
     return DrawnFigure(
         title=figure.title,
         panels=tuple(PagePiece(p.title, pieces[f"panel-{i}"]) for i, p in enumerate(figure.panels)),
@@ -174,8 +180,9 @@ class _Sheet(NamedTuple):
         self.canvas.text(x / self.width, 1 - y / self.height, words, zorder=-1, **more)
 
     def axes(self, name: str, x: float, y: float, width: float, height: float) -> Any:
-        place = (x / self.width, 1 - (y + height) / self.height, width / self.width, height / self.height)
-        axes = self.canvas.add_axes(place, gid=name)
+        axes = self.canvas.add_axes(
+            (x / self.width, 1 - (y + height) / self.height, width / self.width, height / self.height), gid=name
+        )
         axes.patch.set_visible(False)
         return axes
 
@@ -206,10 +213,8 @@ def _legend_places(entries: Sequence[Entry], width: int) -> tuple[list[tuple[int
 def _with_tips(svg: str, tips: Sequence[Sequence[str]]) -> str:
     """With a `<title>` in every mark of which something is said."""
     head, *rest = re.split(r'<g id="tips-(\d+)">', svg)
-    pieces = [head]
-    for number, segment in zip(rest[::2], rest[1::2], strict=True):
-        pieces += ["<g>", _tipped(segment, tips[int(number)])]
-    return "".join(pieces)
+    marks = zip(rest[::2], rest[1::2], strict=True)
+    return "<g>".join([head, *(_tipped(segment, tips[int(number)]) for number, segment in marks)])
 
 
 def _tipped(segment: str, tips: Sequence[str]) -> str:
@@ -223,12 +228,7 @@ def _tipped(segment: str, tips: Sequence[str]) -> str:
     return _SHAPE.sub(tipped, segment)
 
 
-def _piece(body: str, box: Sequence[float]) -> Markup:
-    return Markup(f'viewBox="{" ".join(f"{x:g}" for x in box)}">{themed(_small(body))}</svg>')
-
-
 def _small(svg: str) -> str:
     """Without names that nothing refers to, without fonts, and without lines."""
-    svg = re.sub(r'<g id="[^"]*">', "<g>", svg)
-    svg = re.sub(r" transform=\"rotate\(-0 [^)]*\)\"| font-family: [^;]*;", "", svg)
-    return re.sub(r"\s*\n\s*", " ", svg)
+    plain = re.sub(r"(?<=<g) id=\"[^\"]*\"(?=>)| transform=\"rotate\(-0 [^)]*\)\"| font-family: [^;]*;", "", svg)
+    return re.sub(r"\s*\n\s*", " ", plain)

@@ -27,8 +27,11 @@ def page(template: str, **values: Any) -> str:
         f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{known}'; "
         "base-uri 'none'; form-action 'none'"
     )
-    shared = {"script": Markup(script), "style": Markup(_file("page.css") + dark), "policy": policy}
-    return _templates().get_template(f"{template}.j2").render(**shared, **values)
+    return (
+        _templates()
+        .get_template(f"{template}.j2")
+        .render(script=Markup(script), style=Markup(_file("page.css") + dark), policy=policy, **values)
+    )
 
 
 def prose(text: str) -> Markup:

@@ -1,9 +1,10 @@
 """The page of a sweep: the answer, who succeeds, where and why not, with every trial under its cell."""
 
 import base64
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from apo_bench.io.grouping import grouped
 from apo_bench.records import RANGE, Limits, Row, knows_truth, look_up, one_salt
 from apo_bench.records.run.replay_command import Files, replay_command
 from apo_bench.report.figures.sheet import DrawnFigure
@@ -37,7 +38,6 @@ _SUCCESS = (
     "does not converge counts as failed; success among the trials that were carried out stands below where it differs. "
     "Demonstrations that were not right themselves are left out of every method."
 )
-_LEVELS = "Bands are Wilson's 95 % intervals; methods stand a little apart so that equal rates do not hide each other."
 
 
 def report_page(
@@ -70,18 +70,20 @@ def report_page(
     limits = limits_of(run)
     files = scenario_files(run)
     numbers = {cell_place(cell): i for i, cell in enumerate(cells)}
-    pictured = {}
-    for k, picture in enumerate(pictures):
-        place = place_of(picture.row)
-        if place in numbers:
-            pictured[numbers[place], picture.row["seed"]] = k
+    shown = [(place_of(picture.row), picture.row["seed"]) for picture in pictures]
+    pictured = {(numbers[place], seed): k for k, (place, seed) in enumerate(shown) if place in numbers}
     return page(
         "report.html",
         title=name if "sweep" in name.lower() else f"Sweep {name}",
         sections=_SECTIONS,
         answer=answer,
         scope=_scope(rows),
-        words={"success": f"{_level_meaning(rows)} {_SUCCESS}", "levels": _LEVELS, "run": _run_words(rows)},
+        words={
+            "success": f"{_level_meaning(rows)} {_SUCCESS}",
+            "levels": "Bands are Wilson's 95 % intervals; methods stand a little apart so that equal rates do not hide "
+            "each other.",
+            "run": _run_words(rows),
+        },
         matrices=matrices(grouped, numbers),
         still=_still(cells),
         figures=figures,
@@ -105,26 +107,18 @@ def report_page(
 def _scope(rows: Sequence[Row]) -> str:
     """What was tried, and what was left out."""
 
-    def demonstrations(some: Sequence[Row]) -> int:
+    def demonstrations(some: Iterable[Row]) -> int:
         return len({(row["scenario"], row["clearance_mm"], row["seed"], row["careless"]) for row in some})
 
-    def many(name: str, called: str) -> str:
-        return _many(len({look_up(row, name) for row in rows}), called)
-
-    excluded = demonstrations([row for row in rows if row["success"] is None])
+    excluded = demonstrations(row for row in rows if row["success"] is None)
     tried = demonstrations(rows)
+    scenarios, methods, seeds = (_many(len({row[x] for row in rows}), x) for x in ("scenario", "method", "seed"))
     fidelity = ", ".join(sorted({str(row["fidelity"]) for row in rows}))
-    return (
-        f"{len(rows):,} trials of {many('scenario', 'scenario')}, {many('method', 'method')} and "
-        f"{many('seed', 'seed')}, fidelity {fidelity}. {_left_out(excluded, tried)}"
-    )
-
-
-def _left_out(excluded: int, tried: int) -> str:
-    if not excluded:
-        return f"{'The 1 demonstration was' if tried == 1 else f'All {tried:,} demonstrations were'} right."
-    were = "was not right itself and is" if excluded == 1 else "were not right themselves and are"
-    return f"{excluded:,} of {_many(tried, 'demonstration')} {were} left out."
+    left_out = f"{'The 1 demonstration was' if tried == 1 else f'All {tried:,} demonstrations were'} right."
+    if excluded:
+        were = "was not right itself and is" if excluded == 1 else "were not right themselves and are"
+        left_out = f"{excluded:,} of {_many(tried, 'demonstration')} {were} left out."
+    return f"{len(rows):,} trials of {scenarios}, {methods} and {seeds}, fidelity {fidelity}. {left_out}"
 
 
 def _level_meaning(rows: Sequence[Row]) -> str:
@@ -141,11 +135,8 @@ def _level_meaning(rows: Sequence[Row]) -> str:
 
 def _still(cells: Sequence[Cell]) -> str:
     """A sentence where no level varies."""
-    levels: dict[Setting, set[float]] = {}
-    for c in cells:
-        if not knows_truth(c.method):
-            levels.setdefault(setting_of(cell_place(c)), set()).add(c.level)
-    if any(len(own) > 1 for own in levels.values()):
+    levels = grouped((setting_of(cell_place(c)), c.level) for c in cells if not knows_truth(c.method))
+    if any(len(set(own)) > 1 for own in levels.values()):
         return ""
     here = sorted({f"{level:g}" for own in levels.values() for level in own})
     what = f"every trial was at level {here[0]}" if len(here) == 1 else "no setting has two levels"
@@ -195,17 +186,10 @@ def _run_words(rows: Sequence[Row]) -> str:
 def _facts_of(rows: Sequence[Row], work: Sequence[Work]) -> dict[str, Any]:
     """What the rows say of how they were made."""
     salt = one_salt(rows)
-
-    def different(column: str) -> list[Any]:
-        return sorted({look_up(row, column) for row in rows})
-
+    names = ("schema", "fidelity", "grasp", "arm", "timestep_s", "clearance_mm")
+    called = {"schema": "schemas", "timestep_s": "time step [s]", "clearance_mm": "clearance [mm]"}
     return {
-        "schemas": different("schema"),
-        "fidelity": different("fidelity"),
-        "grasp": different("grasp"),
-        "arm": different("arm"),
-        "time step [s]": different("timestep_s"),
-        "clearance [mm]": different("clearance_mm"),
+        **{called.get(name, name): sorted({look_up(row, name) for row in rows}) for name in names},
         "seeds": f"{min(r['seed'] for r in rows)} to {max(r['seed'] for r in rows)}",
         "hosts": sorted({w.host for w in work}) or "not known",
         "specifications": f"{len({row.get('spec_hash') for row in rows}):,} by their hash",

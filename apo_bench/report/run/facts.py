@@ -30,8 +30,9 @@ def limits_of(run: Mapping[str, Any]) -> Limits:
     """The limits that a sweep had when it was last started; the usual ones where it does not say."""
     limits = run.get("limits") or {}
     trial_s = limits.get("trial_s", USUAL_LIMITS.trial_s)
-    corrector_s = limits.get("corrector_s") or USUAL_LIMITS.corrector_s
-    return Limits(None if trial_s is None else float(trial_s), float(corrector_s))
+    return Limits(
+        None if trial_s is None else float(trial_s), float(limits.get("corrector_s") or USUAL_LIMITS.corrector_s)
+    )
 
 
 def run_facts(run: Mapping[str, Any], rows: Mapping[str, Any]) -> list[FactTable]:
@@ -41,10 +42,8 @@ def run_facts(run: Mapping[str, Any], rows: Mapping[str, Any]) -> list[FactTable
         rows: What the rows themselves say, by what it is called.
     """
     plain = {k: v for k, v in run.items() if not isinstance(v, (dict, list)) and k != "command"}
-    facts = [
-        FactTable("", _table("rows", rows), False),
-        *([FactTable("", _table("run", plain), False)] if plain else []),
-    ]
+    facts = [FactTable("", _table("rows", rows), False)]
+    facts += [FactTable("", _table("run", plain), False)] if plain else []
     for key, values in run.items():
         name = key.replace("_", " ")
         if isinstance(values, dict) and values:
@@ -55,11 +54,13 @@ def run_facts(run: Mapping[str, Any], rows: Mapping[str, Any]) -> list[FactTable
 
 
 def _table(name: str, values: Mapping[str, Any]) -> Table:
-    columns = (
-        Column("", name, text=lambda item: item[0], words=True),
-        Column("", "value", text=lambda item: value_words(item[1]), words=True),
+    return Table(
+        list(values.items()),
+        (
+            Column("", name, text=lambda item: item[0], words=True),
+            Column("", "value", text=lambda item: value_words(item[1]), words=True),
+        ),
     )
-    return Table(list(values.items()), columns)
 
 
 def _side_by_side(name: str, values: Sequence[Any]) -> Table:
@@ -69,17 +70,14 @@ def _side_by_side(name: str, values: Sequence[Any]) -> Table:
     def entry(record: Mapping[str, Any], number: int) -> Column:
         return Column("", str(number), text=lambda key: value_words(record[key]) if key in record else None, words=True)
 
-    columns = [Column("", name, text=lambda key: key, words=True)]
-    columns += [entry(record, i) for i, record in enumerate(records, start=1)]
-    return Table(list(dict.fromkeys(key for record in records for key in record)), columns)
+    head = Column("", name, text=lambda key: key, words=True)
+    keys = list(dict.fromkeys(key for record in records for key in record))
+    return Table(keys, [head, *(entry(record, i) for i, record in enumerate(records, start=1))])
 
 
 def value_words(value: Any) -> str:
     """A value as a person reads it: lists with commas, the rest as JSON."""
-    if isinstance(value, str):
-        text = value
-    elif isinstance(value, (list, tuple)) and not any(isinstance(x, (dict, list)) for x in value):
+    text = value if isinstance(value, str) else json.dumps(value)
+    if isinstance(value, (list, tuple)) and not any(isinstance(x, (dict, list)) for x in value):
         text = ", ".join(x if isinstance(x, str) else json.dumps(x) for x in value) or "–"
-    else:
-        text = json.dumps(value)
     return text if len(text) <= _LONG else text[:_LONG] + " …"

@@ -1,9 +1,11 @@
 """How trials ended, in a few words, and which failures a report shows as pictures; others can draw them."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from apo_bench.io.grouping import grouped
 from apo_bench.records import Row, Salt
 from apo_bench.records.run.own_code import left_out, own_code
 from apo_bench.records.run.replay_command import Files
@@ -51,8 +53,7 @@ def draw_failures(
     """
     if not most or draw is None:
         return [], []
-    chosen = sample(rows, most, trust_code=trust_code)
-    pictures, missing = draw(chosen, folder, files, salt, trust_code=trust_code)
+    pictures, missing = draw(sample(rows, most, trust_code=trust_code), folder, files, salt, trust_code=trust_code)
     without = "" if trust_code else left_out(rows)
     return pictures, [*missing, *([without] if without else [])]
 
@@ -65,11 +66,12 @@ def sample(rows: Iterable[Row], most: int, *, trust_code: bool = False) -> list[
     Args:
         trust_code: Also trials that name code of somebody's own.
     """
-    ways: dict[tuple[str, str], list[Row]] = {}
-    for row in rows:
-        moved = row.get("sim_seconds") and row["failure_stage"] not in (*NOT_EXECUTED, "plan")
-        if row["success"] is False and moved and row["level"] is not None and (trust_code or not own_code(row)):
-            ways.setdefault((str(row["failure_stage"]), str(row["failure_code"])), []).append(row)
+    failed = (row for row in rows if row["success"] is False and row["level"] is not None and row.get("sim_seconds"))
+    ways = grouped(
+        ((str(row["failure_stage"]), str(row["failure_code"])), row)
+        for row in failed
+        if row["failure_stage"] not in (*NOT_EXECUTED, "plan") and (trust_code or not own_code(row))
+    )
     chosen: list[Row] = []
     for _, alike in sorted(ways.items(), key=lambda way: (-len(way[1]), way[0]))[:most]:
         chosen.append(_least_shown(sorted(alike, key=_order), chosen))
@@ -83,10 +85,5 @@ def _order(row: Row) -> tuple[Any, ...]:
 
 def _least_shown(alike: Sequence[Row], chosen: Sequence[Row]) -> Row:
     """The first one of a method and scenario that was chosen least."""
-    methods = [row["method"] for row in chosen]
-    scenarios = [row["scenario"] for row in chosen]
-    met: dict[tuple[str, str], int] = {}
-    for i, row in enumerate(alike):
-        met.setdefault((row["method"], row["scenario"]), i)
-    best = min(met, key=lambda pair: (methods.count(pair[0]) + scenarios.count(pair[1]), met[pair]))
-    return alike[met[best]]
+    shown = Counter(x for row in chosen for x in (("method", row["method"]), ("scenario", row["scenario"])))
+    return min(alike, key=lambda row: shown["method", row["method"]] + shown["scenario", row["scenario"]])

@@ -15,22 +15,6 @@ from apo_bench.report.tables.table import (
 )
 from apo_bench.statistics import Cell, GapSummary, Paired, failures, percent, percents, points, share, signed
 
-_PAIR_NOTE = (
-    "Over the same seeds: at how many of them both methods were right, one alone, or neither; the difference of their "
-    "success rates in points with Tango's score interval for paired proportions; McNemar's exact p-value, and in "
-    "brackets the same adjusted for all comparisons of the sweep (Holm); *recovered*, the share of the seeds at which "
-    "the other failed that it mended; *harmed*, the share of the seeds at which the other was right that it spoilt; "
-    "and the mean difference of the errors of their planned goals in directions that contacts leave free, over seeds "
-    "at which both had a plan, with Student's t interval (intervals are of 95 %). Negative errors are smaller than the "
-    "other's. With no discordant pair an interval still reaches 384 / (n + 3.84) points to both sides: below 3 from "
-    "125 on."
-)
-_GAP_NOTE = (
-    "The largest distance of any face from the one it should touch, as it was seen and as the method planned it: "
-    "medians, and in the drawing bands from the 5th to the 95th percentile of the trials. What is below 0.001 mm is "
-    "drawn there. `none` plans what was seen."
-)
-
 
 def cell_table(cells: Sequence[Cell]) -> Table:
     """Axes that are as usual in every cell are left to files."""
@@ -84,19 +68,54 @@ def cell_table(cells: Sequence[Cell]) -> Table:
 
 def pair_table(pairs: Sequence[Paired]) -> Table:
     """One line per cell, method and reference."""
-    empty = "No method shares a cell with `none` or `paper`, with which methods are paired."
-    return Table(pairs, _PAIR_COLUMNS, empty, _PAIR_NOTE)
-
-
-def _counts(p: Paired) -> str:
-    return f"{p.both}, {p.only_method}, {p.only_reference}, {p.neither}"
+    return Table(
+        pairs,
+        (
+            *place_columns(),
+            Column("reference", "against", words=True),
+            Column("", "level", text=level_text),
+            Column("pairs", "pairs"),
+            Column("only_method"),
+            Column("only_reference"),
+            Column(
+                "",
+                "right: both, it alone, other alone, neither",
+                text=lambda p: f"{p.both}, {p.only_method}, {p.only_reference}, {p.neither}",
+            ),
+            Column("difference", "difference [points]", text=lambda p: points(p.difference, p.interval)),
+            *interval_columns(lambda p: p.interval),
+            Column("p_mcnemar", "p (adjusted)", lambda p: p.p, _p),
+            Column("p_adjusted"),
+            *rate_columns(
+                lambda p: p.recovered,
+                ("reference_failed", "recovered", "recovery_rate", "recovery_low_95", "recovery_high_95"),
+            ),
+            Column("", "recovered", text=lambda p: share(p.recovered)),
+            *rate_columns(
+                lambda p: p.harmed, ("reference_right", "harmed", "harm_rate", "harm_low_95", "harm_high_95")
+            ),
+            Column("", "harmed", text=lambda p: share(p.harmed)),
+            Column("planned"),
+            Column("free_difference_mm", "free error, difference [mm]", lambda p: p.free_mm, _free),
+            *interval_columns(lambda p: p.free_interval, "free_low_95_mm", "free_high_95_mm"),
+        ),
+        "No method shares a cell with `none` or `paper`, with which methods are paired.",
+        (
+            "Over the same seeds: at how many of them both methods were right, one alone, or neither; the difference "
+            "of their success rates in points with Tango's score interval for paired proportions; McNemar's exact "
+            "p-value, and in brackets the same adjusted for all comparisons of the sweep (Holm); *recovered*, the "
+            "share of the seeds at which the other failed that it mended; *harmed*, the share of the seeds at which "
+            "the other was right that it spoilt; and the mean difference of the errors of their planned goals in "
+            "directions that contacts leave free, over seeds at which both had a plan, with Student's t interval "
+            "(intervals are of 95 %). Negative errors are smaller than the other's. With no discordant pair an "
+            "interval still reaches 384 / (n + 3.84) points to both sides: below 3 from 125 on."
+        ),
+    )
 
 
 def _p(p: Paired) -> str | None:
-    if p.p is None or p.p_adjusted is None:
-        return None
-    both = (f"{x:.3f}" if x >= 0.001 else "< 0.001" for x in (p.p, p.p_adjusted))
-    return "{} ({})".format(*both)
+    both = [f"{x:.3f}" if x >= 0.001 else "< 0.001" for x in (p.p, p.p_adjusted) if x is not None]
+    return "{} ({})".format(*both) if len(both) == 2 else None
 
 
 def _free(p: Paired) -> str | None:
@@ -109,40 +128,29 @@ def _free(p: Paired) -> str | None:
 
 def gap_table(gaps: Sequence[GapSummary]) -> Table:
     """One line per cell."""
-    return Table(gaps, _GAP_COLUMNS, note=_GAP_NOTE)
-
-
-_PAIR_COLUMNS = (
-    *place_columns(),
-    Column("reference", "against", words=True),
-    Column("", "level", text=level_text),
-    Column("pairs", "pairs"),
-    Column("only_method"),
-    Column("only_reference"),
-    Column("", "right: both, it alone, other alone, neither", text=_counts),
-    Column("difference", "difference [points]", text=lambda p: points(p.difference, p.interval)),
-    *interval_columns(lambda p: p.interval),
-    Column("p_mcnemar", "p (adjusted)", lambda p: p.p, _p),
-    Column("p_adjusted"),
-    *rate_columns(
-        lambda p: p.recovered,
-        ("reference_failed", "recovered", "recovery_rate", "recovery_low_95", "recovery_high_95"),
-    ),
-    Column("", "recovered", text=lambda p: share(p.recovered)),
-    *rate_columns(lambda p: p.harmed, ("reference_right", "harmed", "harm_rate", "harm_low_95", "harm_high_95")),
-    Column("", "harmed", text=lambda p: share(p.harmed)),
-    Column("planned"),
-    Column("free_difference_mm", "free error, difference [mm]", lambda p: p.free_mm, _free),
-    *interval_columns(lambda p: p.free_interval, "free_low_95_mm", "free_high_95_mm"),
-)
-_GAP_COLUMNS = (
-    *place_columns(),
-    Column("", "level", text=level_text),
-    Column("trials", "n"),
-    Column("seen_5", value=lambda g: g.seen.low),
-    Column("seen_median_mm", "as seen [mm]", lambda g: g.seen.median, lambda g: millimetres(g.seen.median)),
-    Column("seen_95", value=lambda g: g.seen.high),
-    Column("planned_5", value=lambda g: g.planned.low),
-    Column("planned_median_mm", "as planned [mm]", lambda g: g.planned.median, lambda g: millimetres(g.planned.median)),
-    Column("planned_95", "95 % are below [mm]", lambda g: g.planned.high, lambda g: millimetres(g.planned.high)),
-)
+    return Table(
+        gaps,
+        (
+            *place_columns(),
+            Column("", "level", text=level_text),
+            Column("trials", "n"),
+            Column("seen_5", value=lambda g: g.seen.low),
+            Column("seen_median_mm", "as seen [mm]", lambda g: g.seen.median, lambda g: millimetres(g.seen.median)),
+            Column("seen_95", value=lambda g: g.seen.high),
+            Column("planned_5", value=lambda g: g.planned.low),
+            Column(
+                "planned_median_mm",
+                "as planned [mm]",
+                lambda g: g.planned.median,
+                lambda g: millimetres(g.planned.median),
+            ),
+            Column(
+                "planned_95", "95 % are below [mm]", lambda g: g.planned.high, lambda g: millimetres(g.planned.high)
+            ),
+        ),
+        note=(
+            "The largest distance of any face from the one it should touch, as it was seen and as the method planned "
+            "it: medians, and in the drawing bands from the 5th to the 95th percentile of the trials. What is below "
+            "0.001 mm is drawn there. `none` plans what was seen."
+        ),
+    )

@@ -3,6 +3,7 @@ that several tables share."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple, final
@@ -72,25 +73,19 @@ class Table:
 
     def groups(self) -> list[tuple[str, list[list[str]]]]:
         """What a page says: heading (empty where nothing is grouped), and the lines below it."""
-        groups: list[tuple[str, list[list[str]]]] = []
-        for item in self.items:
-            heading = ", ".join(column.said(item) for column in self.shown if column.group)
-            if not groups or groups[-1][0] != heading:
-                groups.append((heading, []))
-            groups[-1][1].append([column.said(item) for column in self.beside])
-        return groups
+        together = groupby(self.items, lambda item: ", ".join(c.said(item) for c in self.shown if c.group))
+        return [(heading, [[c.said(item) for c in self.beside] for item in own]) for heading, own in together]
 
     def markdown(self) -> list[str]:
         """The table as lines of Markdown, or the sentence where there is none."""
-        if not self.items:
-            return [self.empty]
         heads = [column.head for column in self.shown]
-        return [_line(heads), "|" + "---|" * len(heads), *map(_line, self.lines)]
+        lines = [f"| {' | '.join(cells)} |" for cells in (heads, *self.lines)]
+        return [lines[0], "|" + "---|" * len(heads), *lines[1:]] if self.items else [self.empty]
 
     def write(self, path: Path) -> Path:
         """Write a file, by its ending as CSV, where None is an empty field, or as Parquet."""
-        columns = [[column.of(item) for item in self.items] for column in self.kept]
         names = [column.name for column in self.kept]
+        columns = [[column.of(item) for item in self.items] for column in self.kept]
         if path.suffix == ".parquet":
             write_columns(list(map(_text, names)), [list(map(_text, column)) for column in columns], path)
         else:
@@ -109,18 +104,19 @@ def place_columns(of: Callable[[Any], Any] = cell_place, levels: bool = True) ->
     Args:
         of: From an item to its place, or to the setting of its curve, which has no level.
     """
-
-    def axis(name: str, called: str = "") -> Column:
-        return Column(called or name, value=lambda x: getattr(of(x), name))
-
     return (
-        axis("scenario")._replace(head="scenario", words=True, group=True),
+        axis("scenario", of, head="scenario", words=True, group=True),
         Column("", "conditions", text=lambda x: ", ".join(setting_of(of(x)).conditions()), words=True, group=True),
-        *map(axis, ("clearance_mm", "noise", "relations", "careless")),
-        *((axis("level", "level_mm"), axis("level_deg")) if levels else ()),
-        axis("method")._replace(head="method", words=True),
-        *map(axis, ("grasp", "fidelity", "looks", "robot_error")),
+        *(axis(name, of) for name in ("clearance_mm", "noise", "relations", "careless")),
+        *((axis("level", of, name="level_mm"), axis("level_deg", of)) if levels else ()),
+        axis("method", of, head="method", words=True),
+        *(axis(name, of) for name in ("grasp", "fidelity", "looks", "robot_error")),
     )
+
+
+def axis(field: str, of: Callable[[Any], Any] = cell_place, **more: Any) -> Column:
+    """A column of one field of a place or setting, called like it; `more` are other fields of the column."""
+    return Column(field, value=lambda x: getattr(of(x), field))._replace(**more)
 
 
 def level_text(x: Any) -> str:
@@ -133,30 +129,20 @@ def interval_columns(
     of: Callable[[Any], Interval | None], low: str = "low_95", high: str = "high_95"
 ) -> tuple[Column, ...]:
     """Both ends of an interval, for files."""
-
-    def end(x: Any, i: int) -> float | None:
-        interval = of(x)
-        return None if interval is None else interval[i]
-
-    return Column(low, value=lambda x: end(x, 0)), Column(high, value=lambda x: end(x, 1))
+    return (
+        Column(low, value=lambda x: (of(x) or (None, None))[0]),
+        Column(high, value=lambda x: (of(x) or (None, None))[1]),
+    )
 
 
 def rate_columns(of: Callable[[Any], Rate], names: tuple[str, str, str, str, str]) -> tuple[Column, ...]:
     """Trials, successes, rate and its interval, for files; an empty name is left out."""
     trials, successes, rate, low, high = names
-    columns = (
-        Column(trials, value=lambda x: of(x).trials),
-        Column(successes, value=lambda x: of(x).successes),
-        Column(rate, value=lambda x: of(x).rate),
-        *interval_columns(lambda x: of(x).interval, low, high),
-    )
-    return tuple(column for column in columns if column.name)
+    ends = interval_columns(lambda x: of(x).interval, low, high)
+    counts = zip((trials, successes, rate), ("trials", "successes", "rate"), strict=True)
+    return (*(axis(field, of, name=name) for name, field in counts if name), *ends)
 
 
 def _text(x: Any) -> Any:
     """A text without what is no letter in UTF-8 (names of folders may have some); anything else as it is."""
     return x.encode("utf-8", "replace").decode() if isinstance(x, str) else x
-
-
-def _line(cells: Sequence[str]) -> str:
-    return f"| {' | '.join(cells)} |"

@@ -64,8 +64,7 @@ def _canvas(figure: Any, layout: GraphLayout, width: float, height: float, words
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     left = (width - layout.width) / 2
     below = _MARGIN + (_FOOT if words else 0.0)
-    axes.set_xlim(-left, width - left)
-    axes.set_ylim(-below, height - below)
+    axes.set(xlim=(-left, width - left), ylim=(-below, height - below))
     axes.axis("off")
     return axes
 
@@ -118,9 +117,8 @@ def _arrow(axes: Any, layout: GraphLayout, i: int, arc: Arc, text: str, alarming
 
 
 def _label(arc: Arc, residual: float | None, measured: bool) -> str:
-    if not measured:
-        return arc.name
-    return f"{arc.name}\n{'not seen' if residual is None else f'{residual * 1e3:.2f} mm'}"
+    size = "not seen" if residual is None else f"{residual * 1e3:.2f} mm"
+    return f"{arc.name}\n{size}" if measured else arc.name
 
 
 def _formula(node: Node) -> str:
@@ -131,10 +129,12 @@ def _formula(node: Node) -> str:
 
 def _words(graph: Graph, measured: bool, gap_m: float) -> str:
     """What dashes and colours mean, if there are any."""
-    words = ["dashed: disappeared"] if any(arc.lost is not None for arc in graph.arcs) else []
-    words += ["dash-dot: about an axis"] if any(arc.axial and arc.lost is None for arc in graph.arcs) else []
-    words += [f"red: above {gap_m * 1e3:g} mm"] if measured else []
-    return "; ".join(words)
+    words = {
+        "dashed: disappeared": any(arc.lost is not None for arc in graph.arcs),
+        "dash-dot: about an axis": any(arc.axial and arc.lost is None for arc in graph.arcs),
+        f"red: above {gap_m * 1e3:g} mm": measured,
+    }
+    return "; ".join(text for text, holds in words.items() if holds)
 
 
 def _pale(color: tuple[float, float, float] | None) -> Any:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Arc, Graph, Node
-from apo_bench.geometry import Array
+from apo_bench.io.grouping import grouped
 
 
 class Passing(NamedTuple):
@@ -50,7 +50,9 @@ class Layers(NamedTuple):
 
 def arrange_layers(graph: Graph) -> Layers:
     """Put every node into a row and order the rows."""
-    ground = _ground(graph)
+    # the part that never moved and that most arcs end on
+    resting = [node for node in graph.nodes if node.placed is None]
+    ground = max(resting, key=lambda node: sum(arc.environment == node for arc in graph.arcs), default=None)
     heights = _heights(graph, ground)
     chains = tuple(_chain(i, arc, heights, ground) for i, arc in enumerate(graph.arcs))
     rows: list[list[LayerItem]] = [[] for _ in range(1 + max(heights.values(), default=-1))]
@@ -73,21 +75,23 @@ def abscissas(layers: Layers, rounds: int = 60) -> dict[LayerItem, float]:
     Rows take turns: each moves as little as possible, in squares, from the means of its neighbours; what has none
     closes up with the others. The leftmost item stands at half its width.
     """
-    near: dict[LayerItem, list[LayerItem]] = {item: [] for row in layers.rows for item in row}
-    for a, b in links_of(layers.chains):
-        near[a].append(b)
-        near[b].append(a)
+    near = grouped(pair for a, b in links_of(layers.chains) for pair in ((a, b), (b, a)))
+    from scipy.optimize import isotonic_regression
+
     x: dict[LayerItem, float] = {}
-    offsets = [_offsets(row) for row in layers.rows]
+    # how far right of the first item of its row each one stands at least
+    steps = ([(width(a) + width(b)) / 2 + _SPACE for a, b in pairwise(row)] for row in layers.rows)
+    offsets = [np.concatenate([[0.0], np.cumsum(step)]) for step in steps]
     for row, offset in zip(layers.rows, offsets, strict=True):
         x.update(zip(row, offset - offset[-1] / 2, strict=True))
     for _ in range(rounds):
         for row, offset in zip(layers.rows, offsets, strict=True):
             # towards the mean of what each is linked with, in the rows above and below
             middle = float(np.mean([x[item] for item in row]))
-            wanted = np.array([np.mean([x[other] for other in near[item]] or [middle]) for item in row])
-            weight = np.array([1.0 if near[item] else _LOOSE for item in row])
-            x.update(zip(row, _apart(wanted, offset, weight), strict=True))
+            wanted = np.array([np.mean([x[other] for other in near.get(item, ())] or [middle]) for item in row])
+            weights = [1.0 if item in near else _LOOSE for item in row]
+            # x_i - offset_i may not fall from left to right: the nearest such numbers in weighted squares
+            x.update(zip(row, isotonic_regression(wanted - offset, weights=weights).x + offset, strict=True))
     left = min((x[item] - width(item) / 2 for item in x), default=0.0)
     return {item: float(at - left) for item, at in x.items()}
 
@@ -95,12 +99,6 @@ def abscissas(layers: Layers, rounds: int = 60) -> dict[LayerItem, float]:
 def width(item: LayerItem) -> float:
     """How much room an item takes, in widths of a node."""
     return _PASSING_WIDTH if isinstance(item, Passing) else _NODE_WIDTH
-
-
-def _ground(graph: Graph) -> Node | None:
-    """The part that never moved and that most arcs end on."""
-    resting = [node for node in graph.nodes if node.placed is None]
-    return max(resting, key=lambda node: sum(arc.environment == node for arc in graph.arcs), default=None)
 
 
 def _heights(graph: Graph, ground: Node | None) -> dict[Node, int]:
@@ -115,9 +113,11 @@ def _heights(graph: Graph, ground: Node | None) -> dict[Node, int]:
 
 def _chain(i: int, arc: Arc, heights: dict[Node, int], ground: Node | None) -> ArcChain:
     end = () if arc.environment == ground else (arc.environment,)
-    below = heights[arc.environment] if end else -1
-    passing = (Passing(i, row) for row in range(heights[arc.manipulated] - 1, below, -1))
-    return (arc.manipulated, *passing, *end)
+    return (
+        arc.manipulated,
+        *(Passing(i, row) for row in range(heights[arc.manipulated] - 1, heights[arc.environment] if end else -1, -1)),
+        *end,
+    )
 
 
 def _ordered(rows: _Rows, links: Links) -> _Rows:
@@ -149,23 +149,8 @@ def _cost(rows: _Rows, links: Links) -> tuple[int, float]:
     place = {item: (j, k - (len(row) - 1) / 2) for j, row in enumerate(rows) for k, item in enumerate(row)}
     ends = [(place[a][0], place[a][1], place[b][1]) for a, b in links]
     # two links between the same rows cross if their ends stand in opposite order above and below
-    crossings = sum(
+    return sum(
         row == other and (top - top_other) * (end - end_other) < 0
         for i, (row, top, end) in enumerate(ends)
         for other, top_other, end_other in ends[:i]
-    )
-    return crossings, sum((top - end) ** 2 for _, top, end in ends)
-
-
-def _offsets(row: tuple[LayerItem, ...]) -> Array:
-    """How far right of the first item each one stands at least."""
-    steps = [(width(a) + width(b)) / 2 + _SPACE for a, b in pairwise(row)]
-    return np.concatenate([[0.0], np.cumsum(steps)])
-
-
-def _apart(wanted: Array, offset: Array, weight: Array) -> Array:
-    """The places nearest to those that are wanted which keep their order and distance (isotonic regression)."""
-    from scipy.optimize import isotonic_regression
-
-    # x_i - offset_i may not fall from left to right: the nearest such numbers in weighted squares
-    return np.asarray(isotonic_regression(wanted - offset, weights=weight).x + offset)
+    ), sum((top - end) ** 2 for _, top, end in ends)

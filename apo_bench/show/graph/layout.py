@@ -9,6 +9,7 @@ import numpy as np
 
 from apo_bench.assembly import Graph, Node
 from apo_bench.geometry import Array
+from apo_bench.io.grouping import grouped
 from apo_bench.show.graph.layers import ArcChain, LayerItem, Layers, Passing, abscissas, arrange_layers, width
 
 _NODE_HEIGHT = 0.5
@@ -51,30 +52,23 @@ class GraphLayout:
 def layout_graph(graph: Graph, texts: Sequence[str]) -> GraphLayout:
     """Lay out a graph whose arcs are labelled with these texts."""
     layers = arrange_layers(graph)
-    unit = max((_room(node) for node in graph.nodes), default=1.0)
+    odls = {node: sum(_TERM + _INVERSE * term.inverse for term in node.odl) for node in graph.nodes}
+    unit = max((max(0.85, _LETTER * len(node.part) + 0.2, odl + 0.2) for node, odl in odls.items()), default=1.0)
     x = {item: unit * at for item, at in abscissas(layers).items()}
     wide = max((at + unit * width(item) / 2 for item, at in x.items()), default=unit)
-    boxes = {item: Rectangle(x[item], _level(j), unit, _NODE_HEIGHT) for j, item in _nodes(layers)}
+    nodes = ((j, item) for j, row in enumerate(layers.rows) for item in row if isinstance(item, Node))
+    boxes = {item: Rectangle(x[item], _level(j), unit, _NODE_HEIGHT) for j, item in nodes}
     if layers.ground is not None:
         boxes[layers.ground] = Rectangle(wide / 2, _level(-1), wide, _NODE_HEIGHT)
     routes = tuple(_routes(layers, x, unit))
-    height = _level(len(layers.rows) - 1) + _NODE_HEIGHT / 2
-    return GraphLayout(wide, height, boxes, routes, tuple(_labels(routes, texts)))
-
-
-def _room(node: Node) -> float:
-    """The width of the box of a node."""
-    odl = sum(_TERM + _INVERSE * term.inverse for term in node.odl)
-    return max(0.85, _LETTER * len(node.part) + 0.2, odl + 0.2)
+    return GraphLayout(
+        wide, _level(len(layers.rows) - 1) + _NODE_HEIGHT / 2, boxes, routes, tuple(_labels(routes, texts))
+    )
 
 
 def _level(row: int) -> float:
     """The middle of a row; the ground is row -1."""
     return _NODE_HEIGHT / 2 + (row + 1) * (_NODE_HEIGHT + _GAP)
-
-
-def _nodes(layers: Layers) -> Iterator[tuple[int, Node]]:
-    return ((j, item) for j, row in enumerate(layers.rows) for item in row if isinstance(item, Node))
 
 
 def _routes(layers: Layers, x: Mapping[LayerItem, float], unit: float) -> Iterator[Array]:
@@ -103,10 +97,11 @@ def _ports(
     neighbour: Callable[[ArcChain], LayerItem],
 ) -> dict[int, float]:
     """Where each arrow meets the box at that end of its chain: side by side, in the order of where they come from."""
-    meeting: dict[LayerItem, list[int]] = {}
-    for i, chain in enumerate(chains):
-        if isinstance(chain[end], Node) and (end == 0 or len(chain) > 1):
-            meeting.setdefault(chain[end], []).append(i)
+    meeting = grouped(
+        (chain[end], i)
+        for i, chain in enumerate(chains)
+        if isinstance(chain[end], Node) and (end == 0 or len(chain) > 1)
+    )
     ports: dict[int, float] = {}
     for node, arcs in meeting.items():
         arcs.sort(key=lambda i: x[neighbour(chains[i])])
@@ -125,7 +120,7 @@ def _labels(routes: Sequence[Array], texts: Sequence[str]) -> Iterator[Rectangle
         lines = text.split("\n")
         size = _LABEL_LETTER * max(map(len, lines)) + 0.06, _LABEL_LINE * len(lines) + 0.06
         room = (Rectangle(*point, *size) for point in _candidates(route))
-        placed.append(min(room, key=lambda r: (_hidden(r, placed), int(_inside(r, others).sum()))))
+        placed.append(min(room, key=lambda r: (sum(shared_area(r, p) for p in placed), _covered(r, others))))
         yield placed[-1]
 
 
@@ -140,22 +135,12 @@ def _candidates(route: Array) -> Iterator[tuple[float, float]]:
 
 def _dots(route: Array, step: float = 0.03) -> Array:
     """Points along an arrow, (k, 2)."""
-    pieces = []
-    for a, b in pairwise(route):
-        share = np.linspace(0.0, 1.0, 2 + int(np.linalg.norm(b - a) / step))[:, None]
-        pieces.append(a + share * (b - a))
-    return np.concatenate(pieces)
+    return np.concatenate([np.linspace(a, b, 2 + int(np.linalg.norm(b - a) / step)) for a, b in pairwise(route)])
 
 
-def _inside(room: Rectangle, points: Array) -> Array:
-    """Which points, (k, 2), lie in a rectangle."""
-    half = np.array([room.width, room.height]) / 2
-    return np.asarray((np.abs(points - [room.x, room.y]) <= half).all(axis=1))
-
-
-def _hidden(room: Rectangle, others: Sequence[Rectangle]) -> float:
-    """The area that a rectangle has in common with others, [square inches]."""
-    return sum(shared_area(room, other) for other in others)
+def _covered(room: Rectangle, points: Array) -> int:
+    """How many points, (k, 2), lie in a rectangle."""
+    return int((np.abs(points - [room.x, room.y]) <= (np.array([room.width, room.height]) / 2)).all(axis=1).sum())
 
 
 def shared_area(a: Rectangle, b: Rectangle) -> float:

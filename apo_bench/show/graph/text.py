@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from apo_bench.assembly import Arc, ArcResiduals, Graph, Node, spelled
+from apo_bench.assembly import ArcResiduals, Graph, Node, spelled
 from apo_bench.io.words import columns
 
 _GRAPH = "apo-bench/graph/1"
@@ -16,9 +16,16 @@ def graph_title(scenario: str, graph: Graph) -> str:
 def graph_lines(scenario: str, graph: Graph, residuals: ArcResiduals | None = None, gap_m: float = 0.0) -> list[str]:
     """Every part at its placements with the ODL, then every arc: when it was made and lost, the faces, the residual."""
     nodes = [(str(node), "" if graph.stands(node) else "moved on") for node in graph.nodes]
-    arcs: list[tuple[str, ...]] = [(str(arc), _times(arc), f"[{' '.join(arc.pairs)}]") for arc in graph.arcs]
-    if residuals is not None:
-        arcs = [(*words, _size(r, gap_m)) for words, r in zip(arcs, residuals, strict=True)]
+    sizes = [()] * len(graph.arcs) if residuals is None else [(_size(r, gap_m),) for r in residuals]
+    arcs = [
+        (
+            str(arc),
+            f"made {arc.made + 1}{'' if arc.lost is None else f', lost at {arc.lost + 1}'}",
+            f"[{' '.join(arc.pairs)}]",
+            *size,
+        )
+        for arc, size in zip(graph.arcs, sizes, strict=True)
+    ]
     return [graph_title(scenario, graph), "", *columns(nodes), "", *columns(arcs)]
 
 
@@ -30,13 +37,19 @@ def graph_form(scenario: str, graph: Graph, residuals: ArcResiduals | None = Non
         "scenario": scenario,
         "step": graph.step,
         "nodes": [{**_node_form(node), "stands": graph.stands(node)} for node in graph.nodes],
-        "arcs": [_arc_form(arc, r) for arc, r in zip(graph.arcs, measured, strict=True)],
+        "arcs": [
+            {
+                "name": arc.name,
+                "manipulated": _node_form(arc.manipulated),
+                "environment": _node_form(arc.environment),
+                "made": arc.made + 1,
+                "lost": None if arc.lost is None else arc.lost + 1,
+                "faces": [[contact.manipulated.face, contact.environment.face] for contact in arc.contacts],
+                "residual_mm": None if residual is None else residual * 1e3,
+            }
+            for arc, residual in zip(graph.arcs, measured, strict=True)
+        ],
     }
-
-
-def _times(arc: Arc) -> str:
-    lost = "" if arc.lost is None else f", lost at {arc.lost + 1}"
-    return f"made {arc.made + 1}{lost}"
 
 
 def _size(residual: float | None, gap_m: float) -> str:
@@ -50,15 +63,3 @@ def _node_form(node: Node) -> dict[str, Any]:
     if node.placed is None:
         return {"part": node.part, "placed": None, "odl": "T0"}
     return {"part": node.part, "placed": node.placed + 1, "odl": spelled(node.odl)}
-
-
-def _arc_form(arc: Arc, residual: float | None) -> dict[str, Any]:
-    return {
-        "name": arc.name,
-        "manipulated": _node_form(arc.manipulated),
-        "environment": _node_form(arc.environment),
-        "made": arc.made + 1,
-        "lost": None if arc.lost is None else arc.lost + 1,
-        "faces": [[contact.manipulated.face, contact.environment.face] for contact in arc.contacts],
-        "residual_mm": None if residual is None else residual * 1e3,
-    }

@@ -8,6 +8,7 @@ levels gives one area.
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple, final
 
 import numpy as np
@@ -45,10 +46,6 @@ class Curve:
     seeds: tuple[int, ...]
     success: Array
     """(n, k): 1 right, 0 wrong, NaN where there is no result."""
-
-    def at(self, levels: Array) -> Array:
-        """(n, ...) the columns of some of the levels."""
-        return np.asarray(self.success[:, np.searchsorted(self.levels, levels)])
 
 
 @final
@@ -92,11 +89,13 @@ def curves(rows: Iterable[Row]) -> tuple[Curve, ...]:
         InputError: A trial is there twice.
     """
     groups: dict[CurveSetting, dict[float, dict[int, bool]]] = {}
-    cells = by_place(rows)
-    for place in sorted(cells, key=order):
-        results = {seed: row["success"] for seed, row in cells[place].items() if row["success"] is not None}
-        on_curve = place.level_deg == (0.0 if place.noise == RANGE else place.level)
-        if results and on_curve and not knows_truth(place.method):
+    for place, seeds in sorted(by_place(rows).items(), key=lambda cell: order(cell[0])):
+        results = {seed: row["success"] for seed, row in seeds.items() if row["success"] is not None}
+        if (
+            results
+            and (place.level_deg == (0.0 if place.noise == RANGE else place.level))
+            and not knows_truth(place.method)
+        ):
             setting = CurveSetting(*(getattr(place, name) for name in CurveSetting._fields))
             groups.setdefault(setting, {})[place.level] = results
     return tuple(_curve(setting, by_level) for setting, by_level in groups.items() if len(by_level) > 1)
@@ -118,13 +117,13 @@ def area(curve: Curve) -> Area:
 def area_differences(curves: Iterable[Curve], references: Sequence[str] = REFERENCES) -> tuple[AreaDifference, ...]:
     """Every curve against every reference, in the same order."""
     known = {curve.setting: curve for curve in filter(_has_area, curves)}
-    differences = []
-    for curve in known.values():
-        for reference in references:
-            other = known.get(place_of_reference(curve.setting, reference))
-            if other is not None and curve.setting.method != reference and len(_common(curve, other)) > 1:
-                differences.append(_difference(curve, other, reference))
-    return tuple(differences)
+    return tuple(
+        _difference(curve, other, reference)
+        for curve, reference in product(known.values(), references)
+        if (other := known.get(place_of_reference(curve.setting, reference))) is not None
+        and curve.setting.method != reference
+        and len(_common(curve, other)) > 1
+    )
 
 
 def weights(levels: Array) -> Array:
@@ -149,7 +148,7 @@ def _curve(setting: CurveSetting, by_level: Mapping[float, Mapping[int, bool]]) 
 
 def _areas_by_seed(curve: Curve, levels: Array) -> Array:
     """(n,) NaN for a seed without a result somewhere; rounded, so that sums in another order are the same number."""
-    return np.asarray(np.round(curve.at(levels) @ weights(levels), 12))
+    return np.asarray(np.round(curve.success[:, np.searchsorted(curve.levels, levels)] @ weights(levels), 12))
 
 
 def _has_area(curve: Curve) -> bool:
@@ -166,8 +165,9 @@ def _difference(ours: Curve, theirs: Curve, reference: str) -> AreaDifference:
     apart = np.round([a[seed] - b[seed] for seed in sorted(set(a) & set(b))], 12)
     apart = apart[~np.isnan(apart)]
     most = float(reach(apart, levels)) if len(apart) else 1.0
-    between = mean_interval(apart, -most, most)
-    return AreaDifference(ours.setting, reference, tuple(levels.tolist()), len(apart), _mean(apart), between)
+    return AreaDifference(
+        ours.setting, reference, tuple(levels.tolist()), len(apart), _mean(apart), mean_interval(apart, -most, most)
+    )
 
 
 def _mean(x: Array) -> float | None:

@@ -100,10 +100,8 @@ def variation(log_levels: Array, right: Array, known: Array, log_half: Array, ot
 
     p = np.clip(at(0.0, 0.0), _LEAST, 1.0 - _LEAST)
     # derivatives of success by the half level and by the steepness, as central differences
-    by_half = at(_STEP, 0.0) - at(-_STEP, 0.0)
-    by_steepness = at(0.0, _STEP) - at(0.0, -_STEP)
-    by_half = by_half / (2 * _STEP)
-    by_steepness = by_steepness / (2 * _STEP)
+    by_half = (at(_STEP, 0.0) - at(-_STEP, 0.0)) / (2 * _STEP)
+    by_steepness = (at(0.0, _STEP) - at(0.0, -_STEP)) / (2 * _STEP)
     # Fisher's information of both, if trials were independent: sum of n dp dp' / (p (1 - p))
     weight = known.sum(axis=-2) / (p * (1.0 - p))
     hh, hs, ss = (
@@ -113,10 +111,10 @@ def variation(log_levels: Array, right: Array, known: Array, log_half: Array, ot
     free = np.where(ss > _LEAST, hs / np.maximum(ss, _LEAST), 0.0)
     direction = (by_half - free * by_steepness) / (p * (1.0 - p))
     scores = (np.where(known, right - p[..., None, :], 0.0) * direction[..., None, :]).sum(axis=-1)
-    # its variance as the likelihood says, and as the seeds say
+    # its variance as the seeds say, over that which the likelihood says
     expected = (hh - free * hs)[..., 0]
-    seen = (scores**2).sum(axis=-1)
-    return np.asarray(np.maximum(1.0, np.where(expected > _LEAST, seen / np.maximum(expected, _LEAST), 1.0)))
+    ratio = (scores**2).sum(axis=-1) / np.maximum(expected, _LEAST)
+    return np.asarray(np.maximum(1.0, np.where(expected > _LEAST, ratio, 1.0)))
 
 
 def misfit(right: Array, wrong: Array, likelihood: Array) -> Array:
@@ -133,16 +131,16 @@ def misfit(right: Array, wrong: Array, likelihood: Array) -> Array:
     trials = np.maximum(right + wrong, 1.0)
     # likelihood of a model with a rate of its own at each level; twice what it is better by is the deviance
     best = (xlogy(right, right / trials) + xlogy(wrong, wrong / trials)).sum(axis=-1)
-    freedom = max(1, right.shape[-1] - _CONSTANTS)
-    return np.asarray(np.maximum(1.0, 2.0 * (best - likelihood) / chdtri(freedom, 0.05)))
+    return np.asarray(np.maximum(1.0, 2.0 * (best - likelihood) / chdtri(max(1, right.shape[-1] - _CONSTANTS), 0.05)))
 
 
 @lru_cache(maxsize=8)
 def _table(log_levels: tuple[float, ...]) -> tuple[Array, Array, Array]:
     """The half levels (m,), and (k, m * others) the logarithms of success and failure of every curve."""
     x = np.array(log_levels)
-    inside = np.linspace(x[0], x[-1], 2 + int(_PER_UNIT * (x[-1] - x[0])))
-    h = np.unique(np.r_[x[0] - _OUTSIDE, inside, x[-1] + _OUTSIDE])
+    h = np.unique(
+        np.r_[x[0] - _OUTSIDE, np.linspace(x[0], x[-1], 2 + int(_PER_UNIT * (x[-1] - x[0]))), x[-1] + _OUTSIDE]
+    )
     p = curve(x[:, None, None], h[:, None], *CURVE_SHAPES)
     p = np.clip(p, _LEAST, 1.0 - _LEAST).reshape(len(x), -1)
     return h, np.log(p), np.log1p(-p)

@@ -140,8 +140,7 @@ def _end(h: Array, surprise: Array, most: float, k: int, step: int) -> float:
     if not 0 <= k + step < len(h):
         return step * float("inf")
     # the surprise is taken for straight between the two
-    part = (most - surprise[k]) / (surprise[k + step] - surprise[k])
-    return float(h[k] + part * (h[k + step] - h[k]))
+    return float(np.interp(most, surprise[[k, k + step]], h[[k, k + step]]))
 
 
 def _range(low: float | None, high: float | None) -> str:

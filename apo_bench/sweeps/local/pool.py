@@ -2,6 +2,8 @@
 
 import time
 from collections.abc import Sequence
+from contextlib import closing
+from itertools import chain
 from multiprocessing import connection
 from typing import Any, final
 
@@ -65,16 +67,12 @@ def run_locally(
 
 
 def _run_here(work: Sequence[Unit], lock: EnvironmentLock, emit: Emit, check: Check) -> None:
-    worker = Worker(0, lock)
-    try:
-        for unit in work:
-            for kind, *content in worker.run(unit):
-                if kind == "row":
-                    emit(*content)
-                else:
-                    check()
-    finally:
-        worker.close()
+    with closing(Worker(0, lock)) as worker:
+        for kind, *content in chain.from_iterable(map(worker.run, work)):
+            if kind == "row":
+                emit(*content)
+            else:
+                check()
     check()
 
 
@@ -155,14 +153,11 @@ def _end_cleanly(members: Sequence[Member], dispatch: Dispatch) -> None:
 
 def _work(number: int, lock: EnvironmentLock, say: Any, pipe: Any) -> None:
     """The life of a worker process: unit after unit."""
-    worker = Worker(number, lock)
-    try:
+    with closing(Worker(number, lock)) as worker:
         while (unit := pipe.recv()) is not None:
             for message in worker.run(unit, stopped=pipe.poll):
                 say(*message)
             say("done")
-    finally:
-        worker.close()
 
 
 def run_request_alone(request: Request, limit_s: float) -> Row:

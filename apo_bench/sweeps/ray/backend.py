@@ -82,14 +82,15 @@ def run_on_ray(
         return
     check_ray(address)
     auth = None if address == "local" or os.environ.get("RAY_AUTH_MODE") == "disabled" else "disabled"
-    files = {} if lock.names is None else runtime_files(lock.names)
-    plan = ClusterPlan(tuple(work), lock, files, address, workers, limit_s, auth)
+    plan = ClusterPlan(
+        tuple(work), lock, {} if lock.names is None else runtime_files(lock.names), address, workers, limit_s, auth
+    )
     while True:
         try:
             _drive(plan, emit, check)
             return
         except _OtherWay as error:
-            plan = error.plan
+            (plan,) = error.args
 
 
 @final
@@ -97,12 +98,8 @@ class _OtherWay(Exception):
     """The cluster wants a token, or there is none: to be tried once more.
 
     Ray tells neither in advance, and one process can try one way: a driver that shows a token to a cluster that wants
-    none never hears of its tasks.
+    none never hears of its tasks. It has the plan of that as its argument.
     """
-
-    def __init__(self, plan: ClusterPlan) -> None:
-        super().__init__()
-        self.plan = plan
 
 
 @final
@@ -145,10 +142,7 @@ class _Joining:
         return f" ({text[:200]})" if text else ""
 
     def _text(self) -> str:
-        try:
-            return self._log.read_text(errors="replace")
-        except OSError:
-            return ""
+        return self._log.read_text(errors="replace") if self._log.is_file() else ""
 
 
 def _drive(plan: ClusterPlan, emit: Emit, check: Check) -> None:

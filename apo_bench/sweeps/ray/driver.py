@@ -102,16 +102,15 @@ def _connect(plan: ClusterPlan, say: Callable[..., None]) -> None:
     from ray.exceptions import RayError
 
     with tempfile.TemporaryDirectory() as folder:
-        runtime: dict[str, Any] = {"env_vars": dict.fromkeys(THREADS, "1")}
-        if "MUJOCO_GL" in os.environ:
-            runtime["env_vars"]["MUJOCO_GL"] = os.environ["MUJOCO_GL"]
         for name, path in plan.files.items():
             (Path(folder) / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copyfile(path, Path(folder) / name)
         if not plan.files:
             (Path(folder) / "no-files").touch()
-        runtime["working_dir"] = folder  # without one, Ray puts the current folder first on the path of its workers
-        quiet = {"runtime_env": runtime, "log_to_driver": False, "logging_level": "error"}
+        rendering = {name: os.environ[name] for name in ("MUJOCO_GL",) if name in os.environ}
+        # without a working folder, Ray puts the current one first on the path of its workers
+        runtime = {"env_vars": dict.fromkeys(THREADS, "1") | rendering, "working_dir": folder}
+        quiet: dict[str, Any] = {"runtime_env": runtime, "log_to_driver": False, "logging_level": "error"}
         try:
             if plan.address != "local":
                 ray.init(address=plan.address or "auto", **quiet)
@@ -133,8 +132,11 @@ def _spread(plan: ClusterPlan, say: Callable[..., None], pipe: Any) -> None:
 
     task = ray.remote(**_ONE_TRY)(made_task())
     packed = pickle.dumps(plan.lock)
-    dispatch = Dispatch(plan.work, plan.lock, plan.limit_s, emit, deaths=DEATHS, false_starts=FALSE_STARTS_OF_TASKS)
-    pool = RayPool(dispatch, lambda unit: task.remote(packed, unit), plan.workers)
+    pool = RayPool(
+        Dispatch(plan.work, plan.lock, plan.limit_s, emit, deaths=DEATHS, false_starts=FALSE_STARTS_OF_TASKS),
+        lambda unit: task.remote(packed, unit),
+        plan.workers,
+    )
     deadline = float("inf")
     while pool.is_busy and time.monotonic() < deadline:
         pool.turn()
@@ -155,13 +157,15 @@ def runtime_files(names: Names) -> dict[str, Path]:
     Scenario files and their parts, noise files, arms, and every Python module that importing what is named brought in.
     """
     brought = names.check()
-    files = [Path(name) for name in names.scenarios if name not in scenario_names()]
-    files += [part for name in names.scenarios for part in load_scenario(name).part_files.values()]
-    files += [path for name in names.noises if (path := noise_path(name)) is not None]
     arm = find_arm(names.arm)
-    files += _with_named(arm.mjcf) if arm.model is None else arm.files
-    files += [Path(path) for module in list(sys.modules.values()) if (path := getattr(module, "__file__", None))]
-    files += [path for name in brought if (path := Path(name)).is_file()]
+    files = (
+        *(Path(name) for name in names.scenarios if name not in scenario_names()),
+        *(part for name in names.scenarios for part in load_scenario(name).part_files.values()),
+        *(path for name in names.noises if (path := noise_path(name)) is not None),
+        *(_with_named(arm.mjcf) if arm.model is None else arm.files),
+        *(Path(path) for module in list(sys.modules.values()) if (path := getattr(module, "__file__", None))),
+        *(path for name in brought if (path := Path(name)).is_file()),
+    )
     here = Path.cwd()
     own = [Path(path) for path in _installed()]
     own_files = {}

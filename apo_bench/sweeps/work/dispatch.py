@@ -134,8 +134,7 @@ class Dispatch:
         elif kind == "row":
             del job.trials[0]
             job.since = None
-            job.deaths = 0
-            job.false_starts = 0
+            job.deaths = job.false_starts = 0
             self._emit(*content)
 
     def is_late(self, job: Job) -> bool:

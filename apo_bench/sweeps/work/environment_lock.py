@@ -130,5 +130,6 @@ def environment_lock(
 
 def versions() -> dict[str, str]:
     """Package -> version, as installed here; `none` of an optional one that is not."""
-    installed = {package: metadata.version(package) for package in _PACKAGES}
-    return installed | {package: metadata.version(package) if find_spec(package) else "none" for package in _OPTIONAL}
+    return {package: metadata.version(package) for package in _PACKAGES} | {
+        package: metadata.version(package) if find_spec(package) else "none" for package in _OPTIONAL
+    }

@@ -92,8 +92,7 @@ def listening() -> Iterator[Check]:
 
     ours = SIGNALS if threading.current_thread() is threading.main_thread() else ()
     usual = (signal.SIG_DFL, signal.default_int_handler)
-    before: dict[int, Any] = {number: signal.getsignal(number) for number in ours}
-    before = {number: handler for number, handler in before.items() if handler in usual}
+    before: dict[int, Any] = {number: found for number in ours if (found := signal.getsignal(number)) in usual}
     for number in before:
         signal.signal(number, note)
     try:

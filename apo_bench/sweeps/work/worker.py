@@ -74,8 +74,11 @@ class Worker:
             demonstrate_s = time.perf_counter() - start
             start = time.perf_counter()
             row = trial_row(spec, scene, demonstrations[key], content, method=method, cache=cache)
-            trial_s = time.perf_counter() - start
-            yield "row", row, timing(row, compile_s, demonstrate_s, trial_s, {"worker": self._number})
+            yield (
+                "row",
+                row,
+                timing(row, compile_s, demonstrate_s, time.perf_counter() - start, {"worker": self._number}),
+            )
 
     def close(self) -> None:
         """End the processes of correctors."""
@@ -103,8 +106,11 @@ def row_within_limit(row: Row, timing: Timing, limit_s: float) -> Row:
     took_s = (timing["demonstrate_s"] or 0.0) + (timing["trial_s"] or 0.0)
     if took_s <= limit_s or row["failure_stage"] == "worker":
         return row
-    late = Outcome("worker", "time_limit", None, sentence("time_limit"))
-    return row | {"demonstration": None} | result(late, success=False)
+    return (
+        row
+        | {"demonstration": None}
+        | result(Outcome("worker", "time_limit", None, sentence("time_limit")), success=False)
+    )
 
 
 def timing(
