@@ -146,7 +146,8 @@ class Correction:
     """All that were kept, the likeliest first; empty of correctors that believe one explanation only."""
 
     def __post_init__(self) -> None:
-        freeze(self, goals=(None, 4, 4), covariance=(len(self.goals), 6, 6), targets=(len(self.schedule), 4, 4))
+        n = len(self.goals)
+        freeze(self, goals=(n, 4, 4), covariance=(n, 6, 6), targets=(len(self.schedule), 4, 4))
 
     @property
     def ok(self) -> bool:

@@ -48,10 +48,13 @@ def frozen(value: ArrayLike, *shape: int | None) -> Array:
         ValueError: The shape differs, or a number is complex or not finite.
     """
     array = real(value)
-    if shape and (array.ndim != len(shape) or any(s not in (None, n) for s, n in zip(shape, array.shape, strict=True))):
+    fits = array.shape == shape or (
+        array.ndim == len(shape) and all(s in (None, n) for s, n in zip(shape, array.shape, strict=True))
+    )
+    if shape and not fits:
         wanted = ", ".join("*" if s is None else str(s) for s in shape)
         raise ValueError(f"an array of shape ({wanted}) is needed, {array.shape} was given")
-    if np.count_nonzero(np.isfinite(array)) < array.size:  # twice as quick as `all`
+    if 0 in np.isfinite(array).tobytes():  # three times as quick as `all`
         raise ValueError("every number must be finite, a NaN or an infinity was given")
     array.setflags(write=False)
     return array
@@ -66,10 +69,12 @@ def freeze(record: Any, **shapes: tuple[int | None, ...] | None) -> None:
     """
     for name, shape in shapes.items():
         value = getattr(record, name)
+        if value is None:
+            continue
         if isinstance(value, Mapping):
             kept = value if shape is None else {key: frozen(each, *shape) for key, each in value.items()}
             object.__setattr__(record, name, MappingProxyType(dict(kept)))
-        elif value is not None and shape is not None:
+        elif shape is not None:
             object.__setattr__(record, name, frozen(value, *shape))
 
 

@@ -234,7 +234,7 @@ def change(
         J: (b, m, 6 n); e is (b, m), z (b, 6 n), L (b, n, 6, 6).
         mu: (rows,), above zero; soft2 is (m,).
         rows: Which observations.
-        R: (m, m), scratch, one over each pivot's root on the diagonal; so is y (m,).
+        R: (m, m), scratch, one over each pivot's root on the diagonal, nothing above it; so is y (m,).
         step: (rows, 6 n), overwritten.
         largest: (rows,), overwritten: its largest component.
         angles: (rows,), overwritten: how far a goal is rotated at most, [rad].
@@ -243,25 +243,68 @@ def change(
     size = z.shape[1]
     for x in range(len(rows)):
         o = rows[x]
-        # Row by row: J J^t, its factor, J z - e, and the first substitution.
         for i in range(m):
-            t = -e[o, i]
+            y[i] = -e[o, i]
             for q in range(size):
-                t += J[o, i, q] * z[o, q]
+                y[i] += J[o, i, q] * z[o, q]
+        # Contact by contact: J J^t, its factor, and the first substitution. Three rows by three at once, since what is
+        # read is used three times then; indices are those of contacts, by which the compiler knows that none is below
+        # zero.
+        for i in range(m // 3):
             for j in range(i + 1):
-                s = 0.0
+                r = 3 * i
+                s = 3 * j
+                t00 = 0.0
+                t01 = 0.0
+                t02 = 0.0
+                t10 = 0.0
+                t11 = 0.0
+                t12 = 0.0
+                t20 = 0.0
+                t21 = 0.0
+                t22 = 0.0
                 for q in range(size):
-                    s += J[o, i, q] * J[o, j, q]
-                for q in range(j):
-                    s -= R[i, q] * R[j, q]
-                if j < i:
-                    s *= R[j, j]
-                    t -= s * y[j]
-                else:
-                    # By rounding alone a pivot would be less than what is added.
-                    s = 1.0 / math.sqrt(max(s, 0.0) + mu[x] + soft2[i])
-                R[i, j] = s
-            y[i] = t * R[i, i]
+                    t00 += J[o, r, q] * J[o, s, q]
+                    t01 += J[o, r, q] * J[o, s + 1, q]
+                    t02 += J[o, r, q] * J[o, s + 2, q]
+                    t10 += J[o, r + 1, q] * J[o, s, q]
+                    t11 += J[o, r + 1, q] * J[o, s + 1, q]
+                    t12 += J[o, r + 1, q] * J[o, s + 2, q]
+                    t20 += J[o, r + 2, q] * J[o, s, q]
+                    t21 += J[o, r + 2, q] * J[o, s + 1, q]
+                    t22 += J[o, r + 2, q] * J[o, s + 2, q]
+                for q in range(s):
+                    t00 -= R[r, q] * R[s, q]
+                    t01 -= R[r, q] * R[s + 1, q]
+                    t02 -= R[r, q] * R[s + 2, q]
+                    t10 -= R[r + 1, q] * R[s, q]
+                    t11 -= R[r + 1, q] * R[s + 1, q]
+                    t12 -= R[r + 1, q] * R[s + 2, q]
+                    t20 -= R[r + 2, q] * R[s, q]
+                    t21 -= R[r + 2, q] * R[s + 1, q]
+                    t22 -= R[r + 2, q] * R[s + 2, q]
+                R[r, s] = t00
+                R[r, s + 1] = t01
+                R[r, s + 2] = t02
+                R[r + 1, s] = t10
+                R[r + 1, s + 1] = t11
+                R[r + 1, s + 2] = t12
+                R[r + 2, s] = t20
+                R[r + 2, s + 1] = t21
+                R[r + 2, s + 2] = t22
+                for u in range(3):
+                    for v in range(3):
+                        t = R[r + u, s + v]
+                        for q in range(v):
+                            t -= R[r + u, s + q] * R[s + v, s + q]
+                        if s + v < r + u:
+                            t *= R[s + v, s + v]
+                            y[r + u] -= t * y[s + v]
+                        elif s + v == r + u:
+                            # By rounding alone a pivot would be less than what is added.
+                            t = 1.0 / math.sqrt(max(t, 0.0) + mu[x] + soft2[r + u])
+                            y[r + u] *= t
+                        R[r + u, s + v] = t
         # The second substitution, and J^t y - z.
         for q in range(size):
             step[x, q] = -z[o, q]

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Any, final
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg.lapack import dgeqp3, dorgqr, dpstrf
 
 from apo_bench.correction.solvers import sparse
@@ -108,42 +109,65 @@ def jacobian_rank(Jt: Any) -> int:
 
 
 def projections(Jt: Any) -> tuple[list[int], Array | None]:
-    """The rank of each of b transposed Jacobians at a solution, and the projection onto what it leaves free.
+    """The rank of each of b transposed Jacobians at a solution, and what it leaves free, as `marginals` takes it.
 
     An orthonormal basis Q of what the columns of Jt span comes from its QR decomposition, the longest column that is
-    left next (Businger and Golub, 1965); what is free is all else: P = 1 - Q Q^t, and cov(z) = P = P P^t.
+    left next (Businger and Golub, 1965); what is free is all else: P = 1 - Q Q^t, and cov(z) = P = P P^t. Observations
+    of one assembly mostly agree in which columns those are, so all but the first are decomposed without a search.
 
     Args:
-        Jt: (b, 6 n, 3 c), or a list of sparse matrices.
+        Jt: (b, 6 n, 3 c), or a list of one sparse matrix.
 
     Returns:
-        b numbers, and (b, 6 n, 6 n), None above `LARGEST_POSTERIOR` unknowns.
+        b numbers, and projections (b, 6 n, 6 n), or of a sparse matrix an orthonormal basis (1, 6 n, f); None above
+        `LARGEST_POSTERIOR` unknowns.
     """
     unknowns = Jt[0].shape[0]
     if unknowns > LARGEST_POSTERIOR:
         return [jacobian_rank(matrix) for matrix in Jt], None
-    rank = []
-    P = np.empty((len(Jt), unknowns, unknowns))
-    for i, each in enumerate(Jt):
-        # P = 1 - Q Q^t, of the columns of Q that the rank keeps.
-        matrix = each if isinstance(each, np.ndarray) else each.toarray()
-        basis = _row_space(matrix) if matrix.size else matrix
-        rank.append(basis.shape[1])
-        np.matmul(basis, basis.T, out=P[i])
-    np.negative(P, out=P)
-    P.reshape(len(Jt), -1)[:, :: unknowns + 1] += 1.0
+    if not isinstance(Jt, np.ndarray):
+        free = sparse.free_basis(Jt[0], *UNCLEAR)
+        if free is not None:
+            return [unknowns - free.shape[1]], free[None]
+        Jt = Jt[0].toarray()[None]
+    first, columns = _row_space(Jt[0])
+    rank = [len(columns)] * len(Jt)
+    if len(Jt) == 1:
+        return rank, _across(first)[None]
+    J = np.swapaxes(Jt, 1, 2)
+    Q, R = np.linalg.qr(np.swapaxes(J[:, columns], 1, 2))
+    P = _across(Q)
+    # They are the basis if none of them nearly follows from the others, and all other columns do.
+    lengths = np.square(np.diagonal(R, axis1=1, axis2=2))
+    longest = lengths.max(axis=1, initial=0.0)
+    left = np.square(np.delete(J, columns, axis=1) @ P).sum(axis=2).max(axis=1, initial=0.0)
+    clear = (lengths.min(axis=1, initial=np.inf) > UNCLEAR[1] * longest) & (left <= UNCLEAR[0] * longest)
+    for i in np.flatnonzero(~clear):
+        basis, columns = _row_space(Jt[i])
+        rank[i] = len(columns)
+        P[i] = _across(basis)
     return rank, P
 
 
-def _row_space(Jt: Array) -> Array:
-    """An orthonormal basis of the columns of Jt, (6 n, rank)."""
-    QR, _, reflectors, _, _ = dgeqp3(Jt, lwork=2 * Jt.shape[1] + _BLOCK * (Jt.shape[1] + 1))
+def _across(Q: Array) -> Array:
+    """1 - Q Q^t of orthonormal bases (*, m, r): the projections onto all else."""
+    P = np.negative(Q @ np.swapaxes(Q, -1, -2))
+    P.reshape(*Q.shape[:-2], -1)[..., :: Q.shape[-2] + 1] += 1.0
+    return np.asarray(P)
+
+
+def _row_space(Jt: Array) -> tuple[Array, NDArray[np.intp]]:
+    """An orthonormal basis of the columns of Jt, (6 n, rank), and as many columns that span as much."""
+    if not Jt.size:
+        return np.zeros((len(Jt), 0)), np.zeros(0, dtype=np.intp)
+    QR, order, reflectors, _, _ = dgeqp3(Jt, lwork=2 * Jt.shape[1] + _BLOCK * (Jt.shape[1] + 1))
     lengths = np.square(QR.diagonal())
     rank = int(np.count_nonzero(lengths > UNCLEAR[0] * lengths[0]))
     if rank and not lengths[rank - 1] > UNCLEAR[1] * lengths[0]:
         U, w, _ = np.linalg.svd(Jt, full_matrices=False)
-        return np.asarray(U[:, w > RANK_CUT_OFF * w[0]])
-    return np.asarray(dorgqr(QR[:, :rank], reflectors[:rank], lwork=_BLOCK * max(rank, 1))[0])
+        rank = int(np.count_nonzero(w > RANK_CUT_OFF * w[0]))
+        return U[:, :rank], order[:rank] - 1
+    return dorgqr(QR[:, :rank], reflectors[:rank], lwork=_BLOCK * max(rank, 1))[0], order[:rank] - 1
 
 
 def marginals(B: Array, free: Array) -> Array:

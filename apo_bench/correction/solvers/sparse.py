@@ -154,6 +154,36 @@ def sparse_rank(Jt: Any) -> int:
     return int(np.count_nonzero(sign * factor.U.diagonal() > 0.0))
 
 
+def free_basis(Jt: Any, rounding: float, sure: float) -> Array | None:
+    """An orthonormal basis of what no equation of a sparse matrix sees at a solution, (6 n, f).
+
+    With R^t R = J^t J, pivoted (Cholesky), columns F of J are independent, and one of the others moves freely if those
+    follow by -R_FF^-1 R_F. As J^t J squares the condition of J, that is corrected once by what J makes of it
+    (seminormal equations; Bjorck, 1987).
+
+    Args:
+        rounding: Pivots below this part of the largest entry are none; with some below `sure` the rank is not clear.
+
+    Returns:
+        None if the rank is not clear.
+    """
+    from scipy.linalg import cho_solve, solve_triangular
+    from scipy.linalg.lapack import dpstrf
+
+    G = (Jt @ Jt.T).toarray()
+    largest = G.diagonal().max()
+    R, order, rank, _ = dpstrf(G, tol=rounding * largest)
+    if not rank or not R[rank - 1, rank - 1] ** 2 > sure * largest:
+        return None
+    fixed = order[:rank] - 1
+    follows = R[:rank, :rank]
+    N = np.zeros((len(G), len(G) - rank))
+    N[order[rank:] - 1, np.arange(len(G) - rank)] = 1.0
+    N[fixed] = -solve_triangular(follows, R[:rank, rank:], check_finite=False)
+    N[fixed] -= cho_solve((follows, False), (Jt @ (Jt.T @ N))[fixed], check_finite=False)
+    return np.linalg.qr(N)[0]
+
+
 def _largest(Jt: Any) -> float:
     """The largest eigenvalue of J J^t, roughly: twenty iterations of the power method from a fixed start."""
     y = np.cos(np.arange(Jt.shape[1]))
