@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator, Mapping
@@ -17,7 +18,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 
 BLAS = ("Haswell", "Zen", "SkylakeX", "Nehalem")
-"""Names that OPENBLAS_CORETYPE knows; one that it does not know or cannot run is passed over in silence."""
+"""Names that OPENBLAS_CORETYPE knows. One that it does not know is passed over in silence; one whose instructions the
+processor lacks is taken all the same, and the first of them ends the process."""
 EXPECTED = "APO_BENCH_KERNELS"
 AT_ONCE = 2
 """Kernels whose commands run together."""
@@ -80,6 +82,8 @@ def under(environment: Mapping[str, str]) -> Kernels | str:
         timeout=120,
         check=False,
     )
+    if ran.returncode == -signal.SIGILL:
+        return "this processor lacks instructions that it needs"
     if ran.returncode != 0:
         return f"a process under it ended with {ran.returncode}"
     return Kernels(**{name: tuple(value) for name, value in json.loads(ran.stdout).items()})

@@ -70,7 +70,7 @@ class ContactCorrector:
         """
         # For who calls this directly: what `correctors.correct` has lowered already comes back as it is.
         observations = lowered_together(observations)
-        results = [None if observation.seen.all() else refused_correction(observation) for observation in observations]
+        results = [None if all(each.seen.tolist()) else refused_correction(each) for each in observations]
         whole = [i for i, correction in enumerate(results) if correction is None]
         alone = any(
             6 * len(observation.goals) > LARGEST_DENSE or observation.shared or observation.tails

@@ -1,6 +1,7 @@
 """Correct many observations of one assembly at once: what they share is worked out once, the rest is one array."""
 
 from collections.abc import Sequence
+from math import ceil
 
 import numpy as np
 
@@ -9,8 +10,8 @@ from apo_bench.correction.contact import ContactCorrector, contact
 from apo_bench.correction.observation_checks import check_observations
 from apo_bench.errors import InputError
 
-BATCH = 128
-"""Observations that are solved together: more would leave the cache of the processor."""
+BATCH = 100
+"""Observations that are solved together, at most: more would leave the cache of the processor."""
 
 
 def correct_many(observations: Sequence[Observation], corrector: ContactCorrector = contact) -> tuple[Correction, ...]:
@@ -36,7 +37,8 @@ def correct_many(observations: Sequence[Observation], corrector: ContactCorrecto
             f"observation {odd + 1} is of another assembly, start or play than observation 1; "
             "correct those together that share them."
         )
-    batches = (observations[i : i + BATCH] for i in range(0, len(observations), BATCH))
+    size = ceil(len(observations) / ceil(len(observations) / BATCH))
+    batches = (observations[i : i + size] for i in range(0, len(observations), size))
     return tuple(correction for some in batches for correction in corrector.together(some))
 
 

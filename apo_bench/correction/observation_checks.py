@@ -29,7 +29,7 @@ def check_observations(observations: Sequence[Any]) -> None:
             raise InputError(
                 f"an Observation is needed, {kind(observation)} was given; make one, or read it from a file."
             )
-        _check_lengths(observation, _name(observations, i))
+        _check_lengths(observations, i)
     if not observations:
         return
     first = observations[0]
@@ -58,7 +58,8 @@ def check_observations(observations: Sequence[Any]) -> None:
         )
 
 
-def _check_lengths(observation: Observation, name: str) -> None:
+def _check_lengths(observations: Sequence[Observation], i: int) -> None:
+    observation = observations[i]
     if (
         type(observation.gap_m) is type(observation.play_m) is float
         and 0.0 < observation.gap_m < inf
@@ -68,6 +69,7 @@ def _check_lengths(observation: Observation, name: str) -> None:
     for field, x, low in (("gap_m", observation.gap_m, "above"), ("play_m", observation.play_m, "from")):
         number = isinstance(x, float | int | np.floating | np.integer) and not isinstance(x, bool)
         if not number or not np.isfinite(x) or x < 0.0 or (low == "above" and x == 0.0):
+            name = _name(observations, i)
             raise InputError(f"{name} states {field}={x!r}; a finite length {low} 0 is needed, in metres.")
 
 

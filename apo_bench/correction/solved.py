@@ -110,23 +110,11 @@ def _solved(problem: Problem, kept: NDArray[np.bool_], nearest: NearestGoals, ch
     finite = nearest.finite.tolist()
     rank, free_projection = projections(nearest.Jt)
     covariance = [None] * len(rank) if free_projection is None else marginals(nearest.B, free_projection)
+    tests = [Consistency(x, r, p_value(x, r), problem.level) for x, r in zip(chi_square, rank, strict=True)]
+    before = goals, nearest.z, at_rest, finite, nearest.trace, tests
     return [
-        Solved(
-            goals[i],
-            nearest.z[i],
-            at_rest[i],
-            finite[i],
-            nearest.trace[i],
-            Consistency(chi_square[i], rank[i], p_value(chi_square[i], rank[i]), problem.level),
-            gaps[i],
-            worst_m[i],
-            kept_m[i],
-            away[i],
-            rank[i],
-            covariance[i],
-            far[i],
-        )
-        for i in range(len(rank))
+        Solved._make(fields)
+        for fields in zip(*before, gaps, worst_m, kept_m, away, rank, covariance, far, strict=True)
     ]
 
 

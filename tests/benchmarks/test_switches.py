@@ -6,6 +6,7 @@ import json
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -32,15 +33,30 @@ def test_a_switch_is_one_whose_kernels_run_in_both_libraries(monkeypatch: pytest
         "Zen": replace(OWN, blas=("Haswell", "Haswell")),
         "SkylakeX": OWN,
         "Nehalem": replace(OWN, blas=("Nehalem", "SkylakeX")),
-        "Cooperlake": "a process under it ended with -4",
+        "Cooperlake": "this processor lacks instructions that it needs",
     }
     plain, haswell, zen, own, half, dead = found(monkeypatch, OWN, kernels, BARE)
     assert haswell == Switch("OpenBLAS Haswell", {"OPENBLAS_CORETYPE": "Haswell"}, kernels["Haswell"])
     assert zen == "Zen is not run: OpenBLAS takes Haswell for it on this processor"
     assert own == "SkylakeX is not run again: it is what OpenBLAS takes on this processor by itself"
     assert half == "Nehalem is not run: OpenBLAS takes Nehalem and SkylakeX for it on this processor"
-    assert dead == "Cooperlake is not run: a process under it ended with -4"
+    assert dead == "Cooperlake is not run: this processor lacks instructions that it needs"
     assert plain.environment == {"NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4", "NUMBA_CPU_NAME": "generic"}
+
+
+@pytest.mark.parametrize(
+    ("program", "words"),
+    [
+        ("import os, signal; os.kill(os.getpid(), signal.SIGILL)", "this processor lacks instructions that it needs"),
+        ("raise SystemExit(3)", "a process under it ended with 3"),
+    ],
+)
+def test_a_kernel_whose_instructions_are_missing_is_named_as_such(
+    program: str, words: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    (tmp_path / "program.py").write_text(program)
+    monkeypatch.setattr(switches, "__file__", str(tmp_path / "program.py"))
+    assert switches.under({}) == words
 
 
 @pytest.mark.parametrize(

@@ -317,14 +317,14 @@ def change(
         largest[x] = 0.0
         angles[x] = 0.0
         for k in range(size // 6):
-            s = 0.0
+            square = 0.0
             for i in range(6):
                 largest[x] = max(largest[x], abs(step[x, 6 * k + i]))
                 t = 0.0
                 for q in range(6):
                     t += L[o, k, i, q] * step[x, 6 * k + q]
-                s += t * t if i > 2 else 0.0
-            angles[x] = max(angles[x], math.sqrt(s))
+                square += t * t if i > 2 else 0.0
+            angles[x] = max(angles[x], math.sqrt(square))
 
 
 PLAIN = Kernels(linearised, change)

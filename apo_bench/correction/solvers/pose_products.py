@@ -10,7 +10,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.geometry import Array
+from apo_bench.geometry import Array, remembered
 
 _ONE = np.eye(4)
 
@@ -32,7 +32,7 @@ class Words:
 
     def among(self, contacts: NDArray[np.bool_]) -> "Words":
         """The words of these contacts, (c,), alone."""
-        return Words(self.letters[contacts], self.inverse[contacts], self.p, self.n)
+        return _among(self, contacts.tobytes())
 
     @cached_property
     def columns(self) -> NDArray[np.intp]:
@@ -97,6 +97,13 @@ class Words:
     def _rows(self) -> NDArray[np.intp]:
         """(c, w): where each letter stands among all matrices and then their inverses."""
         return self.letters + self.inverse * (self.p + self.n + 1)
+
+
+@remembered
+def _among(words: Words, contacts: bytes) -> Words:
+    """As of `Words.among`: relations are left out in turn of one assembly, again and again."""
+    kept = np.frombuffer(contacts, dtype=np.bool_)
+    return Words(words.letters[kept], words.inverse[kept], words.p, words.n)
 
 
 def _invert(T: Array, out: Array) -> None:

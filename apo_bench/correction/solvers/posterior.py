@@ -151,9 +151,10 @@ def projections(Jt: Any) -> tuple[list[int], Array | None]:
 
 def _across(Q: Array) -> Array:
     """1 - Q Q^t of orthonormal bases (*, m, r): the projections onto all else."""
-    P = np.negative(Q @ np.swapaxes(Q, -1, -2))
+    P = np.asarray(Q @ np.swapaxes(Q, -1, -2))
+    np.negative(P, out=P)
     P.reshape(*Q.shape[:-2], -1)[..., :: Q.shape[-2] + 1] += 1.0
-    return np.asarray(P)
+    return P
 
 
 def _row_space(Jt: Array) -> tuple[Array, NDArray[np.intp]]:
