@@ -113,8 +113,7 @@ def _solved(problem: Problem, kept: NDArray[np.bool_], nearest: NearestGoals, ch
     tests = [Consistency(x, r, p_value(x, r), problem.level) for x, r in zip(chi_square, rank, strict=True)]
     before = goals, nearest.z, at_rest, finite, nearest.trace, tests
     return [
-        Solved._make(fields)
-        for fields in zip(*before, gaps, worst_m, kept_m, away, rank, covariance, far, strict=True)
+        Solved._make(fields) for fields in zip(*before, gaps, worst_m, kept_m, away, rank, covariance, far, strict=True)
     ]
 
 
