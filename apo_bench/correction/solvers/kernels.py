@@ -82,7 +82,7 @@ def linearised(
         soft2: (3 c,), the variance of each equation, 0 of those that are demanded.
         rows: Which observations.
         series: `geometry.twist.SERIES`; `adjoints` is `geometry.twist.ADJOINTS`.
-        small: (6, 6, 6), scratch: xi and coefficients, ad, ad^2, a sum, J_r, exp(xi) - 1, of one goal.
+        small: (6, 6, 6), zeros, then scratch: xi and coefficients, ad, ad^2, a sum, J_r, exp(xi) - 1, of one goal.
         behind: (w + 1, 3, 4), scratch, what stands behind each letter of one contact times its points; so is before,
             (w + 1, 4), its plane times what stands before.
         T: (b, n, 4, 4), overwritten, as are B (b, n, 6, 6), J_r L, e (b, 3 c), J (b, 3 c, 6 n), forms (b, c, 4),
@@ -108,28 +108,35 @@ def linearised(
                 for i in range((_SHORT if square < 1.0 else len(series)) - 1, -1, -1):
                     t = t * square + series[i, 2 + j]
                 small[0, 1, j] = t
-            # ad, then ad^2 and b + c ad + d ad^2, then J_r = 1 + a ad + (b + c ad + d ad^2) ad^2.
-            for i in range(6):
+            # ad, then ad^2 and b + c ad + d ad^2, then J_r = 1 + a ad + (b + c ad + d ad^2) ad^2: the upper three rows.
+            # Of a, b; 0, a the lower three are copies, and their zeros stay.
+            for i in range(3):
                 for j in range(6):
                     t = 0.0
                     for q in range(6):
                         t += small[0, 0, q] * adjoints[q, i, j]
                     small[1, i, j] = t
-            for i in range(6):
+                    if j < 3:
+                        small[1, 3 + i, 3 + j] = t
+            for i in range(3):
                 for j in range(6):
                     t = 0.0
                     for q in range(6):
                         t += small[1, i, q] * small[1, q, j]
                     small[2, i, j] = t
+                    if j < 3:
+                        small[2, 3 + i, 3 + j] = t
                     small[3, i, j] = small[0, 1, 2] * small[1, i, j] + small[0, 1, 3] * t
                 small[3, i, i] += small[0, 1, 1]
-            for i in range(6):
+            for i in range(3):
                 for j in range(6):
                     t = small[0, 1, 0] * small[1, i, j]
                     for q in range(6):
                         t += small[3, i, q] * small[2, q, j]
                     small[4, i, j] = t
                 small[4, i, i] += 1.0
+                for j in range(3):
+                    small[4, 3 + i, 3 + j] = small[4, i, j]
             for i in range(6):
                 for j in range(6):
                     t = 0.0

@@ -87,7 +87,7 @@ class DenseStep:
             self._contacts = system.words.table, np.array(system.constants), owned(system.plane), owned(points)
             width = system.words.letters.shape[1]
             # small, behind, before
-            self._scratch = np.empty((6, 6, 6)), np.empty((width + 1, 3, 4)), np.empty((width + 1, 4))
+            self._scratch = np.zeros((6, 6, 6)), np.empty((width + 1, 3, 4)), np.empty((width + 1, 4))
             # R, y
             self._factor = np.empty((m, m)), np.empty(m)
             self._forms = np.empty((b, len(system), 4))
