@@ -10,8 +10,10 @@ from apo_bench.correction.contact import ContactCorrector, contact
 from apo_bench.correction.observation_checks import check_observations
 from apo_bench.errors import InputError
 
-BATCH = 100
-"""Observations that are solved together, at most: more would leave the cache of the processor."""
+BATCH = 150
+"""Observations that are solved together, at most."""
+LARGEST_JACOBIANS = 96_000
+"""Entries of all their Jacobians: more would leave the cache of the processor."""
 
 
 def correct_many(observations: Sequence[Observation], corrector: ContactCorrector = contact) -> tuple[Correction, ...]:
@@ -37,7 +39,11 @@ def correct_many(observations: Sequence[Observation], corrector: ContactCorrecto
             f"observation {odd + 1} is of another assembly, start or play than observation 1; "
             "correct those together that share them."
         )
-    size = ceil(len(observations) / ceil(len(observations) / BATCH))
+    one = observations[0].assembly
+    entries = 3 * len(one.relations()) * 6 * len(one)
+    most = min(BATCH, max(1, LARGEST_JACOBIANS // max(1, entries)))
+    # Batches of equal size, since a small last one takes nearly as long as others.
+    size = ceil(len(observations) / ceil(len(observations) / most))
     batches = (observations[i : i + size] for i in range(0, len(observations), size))
     return tuple(correction for some in batches for correction in corrector.together(some))
 

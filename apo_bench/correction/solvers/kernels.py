@@ -163,8 +163,9 @@ def linearised(
                     matrices[1, first + k, i, j] = T[o, k, j, i]
                     t -= T[o, k, j, i] * T[o, k, j, 3]
                 matrices[1, first + k, i, 3] = t
-        for i in range(3):
-            sizes[i, o] = 0.0
+        largest = 0.0
+        gaps = 0.0
+        squares = 0.0
         for i in range(c):
             last = w
             while last > 0 and words[0, i, last - 1] == first + n:  # padding
@@ -189,8 +190,8 @@ def linearised(
                 for q in range(4):
                     t += plane[i, q] * behind[0, r, q]
                 e[o, 3 * i + r] = t
-                sizes[0, o] = max(sizes[0, o], abs(t))
-                sizes[1, o] += t * t / (3 * c) if soft2[3 * i + r] == 0.0 else 0.0
+                largest = max(largest, abs(t))
+                gaps += t * t if soft2[3 * i + r] == 0.0 else 0.0
             # before[j] = n F_1 .. F_j = (a, .). A letter T has p behind and a before itself: its rows are
             # (a h, p x a) B of points p with last number h; T^-1 stays on the other side, with the opposite sign.
             for d in range(4):
@@ -218,7 +219,10 @@ def linearised(
                 forms[o, i, d] = before[last, d]
             for r in range(3 * i, 3 * i + 3):
                 for q in range(6 * n):
-                    sizes[2, o] += J[o, r, q] * J[o, r, q] / (3 * c)
+                    squares += J[o, r, q] * J[o, r, q]
+        sizes[0, o] = largest
+        sizes[1, o] = gaps / max(3 * c, 1)
+        sizes[2, o] = squares / max(3 * c, 1)
 
 
 def change(
