@@ -23,7 +23,7 @@ def candidates(
         known: (c,): the contacts that the graph holds; None stands for all, those that disappeared too.
     """
     arcs = _arcs(assembly)
-    graph = [arc for arc, kept in zip(arcs, _all(arcs) if known is None else known, strict=True) if kept]
+    graph = arcs if known is None else [arc for arc, kept in zip(arcs, known, strict=True) if kept]
     chosen = frozenset[int]().union(*(arc for arc, fails in zip(arcs, failing, strict=True) if fails))
     return tuple(sorted(_connected(chosen, graph), reverse=True))
 
@@ -44,7 +44,3 @@ def _arcs(assembly: Assembly) -> list[frozenset[int]]:
         frozenset(term.operation for end in relation.contact for term in history[relation.made].get(end.part, ()))
         for relation in assembly.relations()
     ]
-
-
-def _all(arcs: Sequence[frozenset[int]]) -> NDArray[np.bool_]:
-    return np.ones(len(arcs), dtype=np.bool_)

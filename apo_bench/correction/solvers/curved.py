@@ -7,10 +7,11 @@ derivative of the Lagrangian |z|^2 / 2 + l f(z) along the free directions says w
 
 import numpy as np
 
-from apo_bench.correction.solvers.compact import CompactEquations
+from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
 from apo_bench.correction.solvers.gauss_newton import STEP, shortened_step
+from apo_bench.correction.solvers.linear_step import goals_at
 from apo_bench.correction.solvers.whitened import correction_to
-from apo_bench.geometry import Array, exp_and_jacobian
+from apo_bench.geometry import Array
 
 _ITERATIONS = 30
 _RANK = 1e-5
@@ -30,7 +31,7 @@ def descended(system: CompactEquations, observed: Array, L: Array, goals: Array)
     """
     z = correction_to(observed, L, goals)
     for _ in range(_ITERATIONS):
-        e, Jt = _linearised(system, observed, L, z)
+        (e,), (Jt,) = _linearised(system, observed, L, z[None])
         # N spans the free directions; multipliers l solve z + J^t l = 0 in the others, and `towards` closes e there.
         U, w, Vt = np.linalg.svd(Jt)
         rank = int(np.count_nonzero(w > _RANK * w[0]))
@@ -50,11 +51,9 @@ def descended(system: CompactEquations, observed: Array, L: Array, goals: Array)
         z = z + shortened_step(step, L)
         if np.abs(step).max() < STEP:
             break
-    return np.asarray(observed @ exp_and_jacobian((L @ z.reshape(-1, 6, 1))[..., 0])[0])
+    return goals_at(observed, L[None], z[None])[0][0]
 
 
 def _linearised(system: CompactEquations, observed: Array, L: Array, z: Array) -> tuple[Array, Array]:
-    """e, (*, 3 c), [m], and its derivative by z, transposed, (*, 6 n, 3 c)."""
-    D, Jr = exp_and_jacobian((L @ z.reshape(*z.shape[:-1], len(L), 6, 1))[..., 0])
-    e, blocks = system.blocks(observed @ D, Jr @ L)
-    return e, system.gathered(blocks)
+    """e, (b, 3 c), [m], and its derivative by z, (b, 6 n), transposed, (b, 6 n, 3 c)."""
+    return linearised_by(system, *goals_at(observed, np.broadcast_to(L, (len(z), *L.shape)), z))

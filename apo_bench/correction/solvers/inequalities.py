@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Assembly, Equations, lowered
 from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
 from apo_bench.correction.solvers.gauss_newton import FALL, NearestGoals, damping, settles, shortened_step
-from apo_bench.correction.solvers.linear_step import shortest_z
+from apo_bench.correction.solvers.linear_step import goals_at, shortest_z
 from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR, jacobian_rank
-from apo_bench.correction.solvers.whitened import pulled, twists_of
+from apo_bench.correction.solvers.whitened import pulled
 from apo_bench.errors import InputError
-from apo_bench.geometry import Array, exp_and_jacobian
+from apo_bench.geometry import Array
 
 _BLIND = 1e-7
 """Part of the largest row below which an inequality does not depend on the free directions."""
@@ -143,9 +143,7 @@ def nearest_between(
         pace = _paced(pace, step, last)
         last = step if rest else shortened_step(step, L)
         z = z + (step if rest else pace * last)
-        D, Jr = exp_and_jacobian(twists_of(L, z))
-        T = observed @ D
-        B = Jr @ L
+        (T,), (B,) = goals_at(observed, L[None], z[None])
         before = largest
         if over:
             break
