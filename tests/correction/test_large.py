@@ -168,6 +168,31 @@ def test_rank_by_inertia_is_rank_by_singular_values(name: str, few: int, monkeyp
         assert sparse.sparse_rank(csr_array(Jt)) == posterior.jacobian_rank(Jt) == SMALL[name][1]
 
 
+@pytest.mark.parametrize("name", SMALL)
+def test_what_a_sparse_matrix_leaves_free_is_what_its_singular_vectors_say(name: str) -> None:
+    """Both are off by rounding over the smallest singular value: the largest difference seen was 2e-12."""
+    system, seen, L = drawn(name)
+    Jt = nearest_goals(system, seen[None], L).Jt[0]
+    free = sparse.free_basis(csr_array(Jt), *posterior.UNCLEAR)
+    assert free is not None
+    known = posterior.freedom_of(Jt)
+    assert known is not None
+    assert_allclose(free.T @ free, np.eye(len(Jt) - SMALL[name][1]), rtol=0, atol=1e-12)
+    assert_allclose(free @ free.T, known.free @ known.free.T, rtol=0, atol=1e-9)
+
+
+def test_a_rank_that_is_not_clear_is_left_to_dense_matrices() -> None:
+    """Columns that are nearly parallel: their difference is neither rounding nor beyond doubt."""
+    Jt = np.eye(12)[:, :4]
+    Jt[0, 1], Jt[1, 1] = 1.0, 1e-6
+    assert sparse.free_basis(csr_array(Jt), *posterior.UNCLEAR) is None
+    assert sparse.free_basis(csr_array(np.zeros((12, 4))), *posterior.UNCLEAR) is None
+    (rank,), P = posterior.projections([csr_array(Jt)])
+    assert rank == 4
+    assert P is not None
+    assert_allclose(P[0], np.diag([0.0] * 4 + [1.0] * 8), rtol=0, atol=1e-9)
+
+
 def test_rank_of_nothing() -> None:
     for shape in ((0, 0), (6, 0), (12, 3)):
         assert sparse.sparse_rank(csr_array(shape)) == posterior.jacobian_rank(np.zeros(shape)) == 0
