@@ -132,4 +132,5 @@ def _hidden_window(glfw: Any) -> Any:
 def _reason(error: Exception) -> str:
     if isinstance(error, AttributeError) and "NoneType" in str(error):
         return "its library is not installed"
-    return (str(error).splitlines() or [type(error).__name__])[0].rstrip(".")
+    cause = error.__cause__ or error  # MuJoCo 4 says around it what to install, and repeats the variable
+    return (str(cause).splitlines() or [type(cause).__name__])[0].rstrip(".")
