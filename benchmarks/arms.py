@@ -7,14 +7,18 @@ every arm, scenario and method, with Wilson's 95 % interval over the scenarios, 
 from __future__ import annotations
 
 import argparse
+import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
 from apo_bench.records import Row
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.statistics import wilson
+from benchmarks.made_with import mujoco_of, with_mujoco
 
 PAGE = Path(__file__).parents[1] / "docs" / "results" / "arms.md"
 SAID = """\
@@ -46,8 +50,10 @@ class Count(NamedTuple):
 def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("folders", nargs="+", type=Path)
-    rows = [row for folder in asked.parse_args().folders for row in read_rows(folder)]
-    PAGE.write_text(page([row for row in rows if row["success"] is not None]), encoding="utf-8")
+    folders = asked.parse_args().folders
+    rows = [row for folder in folders for row in read_rows(folder)]
+    written = page([row for row in rows if row["success"] is not None])
+    PAGE.write_text(with_mujoco(written, mujoco_of(folders)), encoding="utf-8")
     print(f"Wrote {PAGE}")
 
 

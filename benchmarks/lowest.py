@@ -31,7 +31,9 @@ def main() -> None:
     parser.add_argument("--tests", action="store_true", help="run the core of the tests there, too")
     asked = parser.parse_args()
     if sys.version_info[:2] != OLDEST:
-        print(f"The oldest versions are tried with Python {OLDEST[0]}.{OLDEST[1]} only: newer ones lack wheels of them.")
+        print(
+            f"The oldest versions are tried with Python {OLDEST[0]}.{OLDEST[1]} only: newer ones lack wheels of them."
+        )
         return
     bounds = lowest(ROOT / "pyproject.toml")
     with tempfile.TemporaryDirectory() as folder:

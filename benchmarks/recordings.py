@@ -17,6 +17,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
+import mujoco
 import numpy as np
 
 from apo_bench.geometry import pose
@@ -27,6 +28,7 @@ from apo_bench.recording.ordering import Stated
 from apo_bench.recording.setup_files import part_tracks, read_camera, read_objects
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.trial.planning import apply_method
+from benchmarks.made_with import said_by, with_mujoco
 from benchmarks.recording_demos import Errors, Truth, first_places, tracked, watched
 from benchmarks.recording_faults import refusals
 from benchmarks.recording_forms import FORMS, SAID, Form, write_recording
@@ -190,7 +192,8 @@ def main() -> None:
         results += measured("stays", TASKS, given.trials * 2 // 5, METHODS[1:])
         with RESULT.open("w", encoding="utf-8", newline="") as stream:
             csv.writer(stream, lineterminator="\n").writerows([HEAD, *results])
-    PAGE.write_text(page(results, list(refusals())), encoding="utf-8")
+    versions = said_by(PAGE.read_text(encoding="utf-8")) if given.page else [mujoco.__version__]
+    PAGE.write_text(with_mujoco(page(results, list(refusals())), versions), encoding="utf-8")
     print(f"Wrote {PAGE.relative_to(ROOT)}")
 
 

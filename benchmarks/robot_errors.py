@@ -7,12 +7,16 @@ robot error, method and scenario, with Wilson's 95 % interval over the scenarios
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.records import Row
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.statistics import Cell, tally, wilson
+from benchmarks.made_with import mujoco_of, with_mujoco
 
 PAGE = Path(__file__).parents[1] / "docs" / "results" / "robot-errors.md"
 SAID = """\
@@ -32,8 +36,9 @@ truth. They do not repair the robot's own: with one, `oracle`, which knows the t
 def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("folders", nargs="+", type=Path)
-    rows = [row for folder in asked.parse_args().folders for row in read_rows(folder)]
-    PAGE.write_text(page(rows), encoding="utf-8")
+    folders = asked.parse_args().folders
+    rows = [row for folder in folders for row in read_rows(folder)]
+    PAGE.write_text(with_mujoco(page(rows), mujoco_of(folders)), encoding="utf-8")
     print(f"Wrote {PAGE}")
 
 

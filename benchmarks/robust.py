@@ -20,6 +20,7 @@ from apo_bench.records import Row
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.statistics import tango, wilson
 from benchmarks.asked import ROBUST, block
+from benchmarks.made_with import mujoco_of, with_mujoco
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "robust.csv"
@@ -60,7 +61,8 @@ def main() -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*Place._fields, *Count._fields])
         writer.writerows([*place, *count] for place, count in sorted(cells.items()))
-    PAGE.write_text("\n".join(page(rows, cells)) + "\n", encoding="utf-8")
+    written = "\n".join(page(rows, cells)) + "\n"
+    PAGE.write_text(with_mujoco(written, mujoco_of(given.folders)), encoding="utf-8")
     print(f"Wrote {KEPT} and {PAGE}")
 
 

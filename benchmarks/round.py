@@ -22,6 +22,7 @@ from apo_bench.records import Row
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.statistics import wilson
 from benchmarks.asked import ROUND, block
+from benchmarks.made_with import mujoco_of, with_mujoco
 
 ROOT = Path(__file__).parents[1]
 KEPT = ROOT / "benchmarks" / "results" / "round.csv"
@@ -71,7 +72,8 @@ def main() -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*Place._fields, *Cell._fields])
         writer.writerows([*place, *cell] for place, cell in sorted(cells.items()))
-    PAGE.write_text("\n".join(page(cells, rows, half)) + "\n", encoding="utf-8")
+    written = "\n".join(page(cells, rows, half)) + "\n"
+    PAGE.write_text(with_mujoco(written, mujoco_of([*given.folders, *given.half])), encoding="utf-8")
     print(f"Wrote {KEPT} and {PAGE}")
 
 

@@ -11,12 +11,15 @@ docs/results/verdicts.md, cell by cell, with the reason of every trial whose ver
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.assembly import Contact, Layout, joint_play_mm, placements
 from apo_bench.geometry import Array, nearest_alike, pose
@@ -29,6 +32,7 @@ from apo_bench.scenario.layout import draw_layout
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.statistics import rank
 from apo_bench.trial.stages import LAYOUT, stream
+from benchmarks.made_with import mujoco_of, with_mujoco
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "results" / "verdicts.md"
@@ -80,7 +84,8 @@ def main() -> None:
         asked.error(f"no row of {given.folder} has a verdict; name the folder of a sweep")
     if given.trials is not None:
         rows = [row for row in rows if row["seed"] < rows[0]["seed"] + given.trials]
-    given.page.write_text("\n".join(page([compared(row) for row in rows])) + "\n", encoding="utf-8")
+    written = "\n".join(page([compared(row) for row in rows])) + "\n"
+    given.page.write_text(with_mujoco(written, mujoco_of([given.folder])), encoding="utf-8")
     print(f"Wrote {given.page}")
 
 

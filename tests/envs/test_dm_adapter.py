@@ -2,6 +2,7 @@
 
 import sys
 import unittest
+import unittest.mock
 from typing import Any
 
 import gymnasium
@@ -63,7 +64,31 @@ def test_specs_are_the_spaces() -> None:
     np.testing.assert_array_equal(adapted.action_spec().maximum, env.action_space.high)
 
 
-def test_it_runs_in_wrappers_of_dm_control() -> None:
+def test_the_loop_of_dm_control_drives_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The loop and the random agent with which dm_control tries the environments of its own suite."""
+    monkeypatch.setitem(sys.modules, "mock", unittest.mock)  # which it asks for by the name of before Python 3.3
+    suite = pytest.importorskip("dm_control.suite.suite_test")
+    env = to_dm_env(short(), seed=2)
+    policy = suite.uniform_random_policy(env.action_spec(), random=0)
+    seen = list(suite.step_environment(env, policy, num_episodes=2, max_steps_per_episode=3))
+    assert [(step.first(), step.last()) for step in seen] == 2 * [(True, False), (False, True)]
+    for step in seen:
+        for name, spec in env.observation_spec().items():
+            spec.validate(step.observation[name])
+        env.reward_spec().validate(step.reward or 0.0)
+        env.discount_spec().validate(1.0 if step.discount is None else step.discount)
+
+
+def test_the_viewer_of_dm_control_finds_an_action_of_its_own() -> None:
+    runtime = pytest.importorskip("dm_control.viewer.runtime")
+    env = to_dm_env(short(), seed=2)
+    action = runtime._get_default_action(env.action_spec())
+    env.action_spec().validate(action)
+    assert not action.any(), "the middle of the bounds: as seen"
+
+
+def test_it_runs_in_the_wrapper_of_dm_control_that_asks_for_no_physics() -> None:
+    """The others ask for what is no part of `dm_env`: pictures, timers and noise of a task with physics of its own."""
     action_scale = pytest.importorskip("dm_control.suite.wrappers.action_scale")
     env = action_scale.Wrapper(to_dm_env(short(), seed=2), minimum=-1.0, maximum=1.0)
     assert env.action_spec().maximum.max() == 1.0
