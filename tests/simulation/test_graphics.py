@@ -3,6 +3,7 @@
 import os
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -103,6 +104,7 @@ def test_a_context_is_there_for_whoever_asks_for_one(first: str) -> None:
 
 
 @linux
+@pytest.mark.skipif(find_spec("dm_control") is None, reason="dm-control does not come along here")
 def test_what_somebody_else_draws_with_dm_control_is_drawn_as_ever() -> None:
     draw = (
         "from dm_control import mjcf\n"
