@@ -192,7 +192,7 @@ def tables(kept: Mapping[str, Any]) -> str:
             f"| {each['group']} | {each['trials']} | {won} | {len(differ)} | {otherwise} | {each['same bits']} |"
         )
     lines += ["", f"| measured | {older} | {newer} |", "|---|---|---|"]
-    lines += [f"| {name} | {a:.2g} | {b:.2g} |" for name, (a, b) in kept["measures"].items()]
+    lines += [f"| {name} | {a:.3g} | {b:.3g} |" for name, (a, b) in kept["measures"].items()]
     return "\n".join(lines)
 
 
