@@ -78,8 +78,8 @@ def renderer(model: Any, width: int, height: int) -> Any:
         if _VARIABLE in os.environ and _VARIABLE not in reason:
             reason = f"{_VARIABLE}={os.environ[_VARIABLE]}: {reason}"
         raise InputError(
-            f"no picture can be drawn here ({reason}); without a display install libegl1 and "
-            "libgl1-mesa-dri (Debian) and set MUJOCO_GL=egl."
+            f"no picture can be drawn here ({reason}); without a display install libegl1, "
+            "libopengl0 and libgl1-mesa-dri (Debian) and set MUJOCO_GL=egl."
         ) from error
 
 
