@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 
 import mujoco
 import numpy as np
@@ -162,3 +163,25 @@ def test_a_demonstration_is_the_same_to_the_last_bit(scene: Scene, monkeypatch: 
         shown = demonstrate(scene, layout, 1.0, np.random.default_rng(4))
         seen.append((shown.code, shown.goals.tobytes(), [T.tobytes() for T in shown.final.values()]))
     assert seen[0] == seen[1]
+
+
+@pytest.mark.usefixtures("compiled")
+def test_scenes_that_run_at_the_same_time_keep_to_their_own_bounds(scene: Scene) -> None:
+    other = build_scene(load_scenario("peg_in_hole"))
+    wanted = [[contacts(world, data) for data in states(each, world, 8)] for each, world in both(scene, other)]
+
+    def run(at: int) -> list[tuple[bytes, ...]]:
+        each, world = both(scene, other)[at % 2]
+        found = []
+        for data in states(each, world, 8):
+            with apart.left_out(world):
+                found.append(contacts(world, data))
+        return found
+
+    with ThreadPoolExecutor(4) as pool:
+        assert all(found == wanted[i % 2] for i, found in enumerate(pool.map(run, range(8))))
+    assert mujoco.get_mjcb_contactfilter() is None
+
+
+def both(first: Scene, second: Scene) -> list[tuple[Scene, World]]:
+    return [(first, first.work), (second, second.shown)]

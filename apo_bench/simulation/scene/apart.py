@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from itertools import count
+from threading import Lock
 from typing import Any
 
 import mujoco
@@ -26,27 +27,40 @@ SURELY_M = 1e-7
 """Pairs that are farther apart are left out: much more than what MuJoCo or this may be wrong by."""
 _MOST = 8
 """So many models at a time; of others no pair is left out."""
+_ONE_AT_A_TIME = Lock()
 
 
 @contextmanager
 def left_out(world: World) -> Iterator[None]:
     """Pairs of pieces that are surely apart are not measured for a while; not where a filter of others is at work."""
     asked = _asked() if len(world.bounds) else None
-    known = mujoco.get_mjcb_contactfilter()
-    free = np.flatnonzero(_models()[:, 0] == 0)
-    if asked is None or known not in (None, asked) or len(free) == 0:
-        yield
-        return
-    models = _models()
-    at = int(free[0])
-    models[at, 1] = world.bounds.ctypes.data
-    models[at, 0] = world.model._address
-    mujoco.set_mjcb_contactfilter(asked)
+    at = None if asked is None else _enter(world, asked)
     try:
         yield
     finally:
+        if at is not None:
+            _leave(at, asked)
+
+
+def _enter(world: World, asked: Any) -> int | None:
+    """Have pairs of a model left out; returns its row among the models, None if it gets none."""
+    with _ONE_AT_A_TIME:
+        models = _models()
+        free = np.flatnonzero(models[:, 0] == 0)
+        if mujoco.get_mjcb_contactfilter() not in (None, asked.ctypes) or len(free) == 0:
+            return None
+        # The address of the model comes last: by it the row is found, also by steps that are under way.
+        models[free[0], 1] = world.bounds.ctypes.data
+        models[free[0], 0] = world.model._address
+        mujoco.set_mjcb_contactfilter(asked.ctypes)
+        return int(free[0])
+
+
+def _leave(at: int, asked: Any) -> None:
+    with _ONE_AT_A_TIME:
+        models = _models()
         models[at, 0] = 0
-        if not models[:, 0].any():
+        if not models[:, 0].any() and mujoco.get_mjcb_contactfilter() is asked.ctypes:
             mujoco.set_mjcb_contactfilter(None)
 
 
@@ -128,7 +142,7 @@ def _asked() -> Any:
                 return 0 if forth and reaches(q, x + 24 * b, R + 72 * b, p, x + 24 * a, R + 72 * a) else 1
         return 0
 
-    return asked.ctypes
+    return asked
 
 
 def _offset(structure: Any, array: Any) -> int:
