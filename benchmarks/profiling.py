@@ -162,9 +162,14 @@ def page(found: dict[str, Any]) -> list[str]:
 
 def compared() -> list[str]:
     """What `trial_times.py` measured last, if anything."""
-    if not TIMES.exists():
+    found = json.loads(TIMES.read_text(encoding="utf-8")) if TIMES.exists() else {}
+    return [*by_fidelity(found.get("fidelities")), *by_scenario(found.get("scenarios"))]
+
+
+def by_fidelity(found: dict[str, Any] | None) -> list[str]:
+    """Of the four examples of the paper."""
+    if found is None:
         return []
-    found = json.loads(TIMES.read_text(encoding="utf-8"))
     lines = [
         f"A whole trial with its demonstration, at {found['before']} and at {found['after']}, in turn in one run "
         f"(`{found['command']}`): the four examples, `none`, `paper` and `contact` at level 1, careless humans.",
@@ -172,13 +177,39 @@ def compared() -> list[str]:
         "| fidelity | trials | median seconds | median ratio | in CPU time | real-time factor | verdicts that differ |",
         "|---|---|---|---|---|---|---|",
     ]
-    for fidelity, f in found["fidelities"].items():
-        seconds, factors = (" to ".join(f"{x:g}" for x in f[name]) for name in ("wall_s", "real_time_factor"))
+    for fidelity, f in found["fidelity"].items():
         lines.append(
-            f"| {fidelity} | {f['trials']} | {seconds} | {f['wall_ratio']:.2f} | {f['cpu_ratio']:.2f} | {factors} "
-            f"| {f['verdicts_differ']} |"
+            f"| {fidelity} | {f['trials']} | {pair(f['wall_s'])} | {f['wall_ratio']:.2f} | {f['cpu_ratio']:.2f} "
+            f"| {pair(f['real_time_factor'])} | {f['verdicts_differ']} |"
         )
     return [*lines, ""]
+
+
+def by_scenario(found: dict[str, Any] | None) -> list[str]:
+    """Of others, each by itself."""
+    if found is None:
+        return []
+    lines = [
+        f"Other scenarios at fidelity `contact`, at {found['before']} and at {found['after']}, in turn in one run "
+        f"(`{found['command']}`), level 1, careless humans. Seconds are of the processor, and so are the factors: "
+        f"{found['load'][0]:.0f} processes wanted the {found['cores']} cores when it began, {found['load'][1]:.0f} "
+        "when it ended. Numba is installed ([what for](../how/simulated.md#round-parts)); it compiles before the clock "
+        "starts.",
+        "",
+        "| scenario | trials | a trial, seconds | median ratio | faster than real time | scene, seconds "
+        "| verdicts that differ |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    for scenario, f in found["scenario"].items():
+        lines.append(
+            f"| {scenario} | {f['trials']} | {pair(f['cpu_s'])} | {f['cpu_ratio']:.2f} "
+            f"| {pair(f['cpu_real_time_factor'])} | {pair(f['scene_s'])} | {f['verdicts_differ']} |"
+        )
+    return [*lines, ""]
+
+
+def pair(before_and_after: list[float]) -> str:
+    return " to ".join(f"{x:g}" for x in before_and_after)
 
 
 if __name__ == "__main__":

@@ -4,7 +4,8 @@ The four examples of the paper, methods `none`, `paper` and `contact` at level 1
 its demonstration, from settings to row, as `run_trial` makes it from a scene that is compiled. Each of the two packages
 runs in a process of its own, and the same trial is run by one and then by the other, so that a machine whose speed
 drifts treats both alike. Writes results/trial_times.json, which `python benchmarks/profiling.py` puts on its page.
-With `--scenarios` others are timed and only printed, each by itself, with the time that its scene takes to be built.
+With `--scenarios` others are timed at fidelity `contact`, each by itself, with the time that its scene takes to be
+built, and are kept beside those.
 """
 
 from __future__ import annotations
@@ -19,6 +20,7 @@ import tempfile
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 from typing import IO, Any
@@ -36,7 +38,7 @@ def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("commit", nargs="?", help="the commit to compare with, such as 7a4d1df")
     asked.add_argument("--seeds", type=int, default=5, help="seeds of each kind of trial")
-    asked.add_argument("--scenarios", nargs="+", help="time these, at fidelity contact, and print it")
+    asked.add_argument("--scenarios", nargs="+", help="time these, at fidelity contact, each by itself")
     asked.add_argument("--serve", action="store_true", help="run the trials that standard input asks for")
     given = asked.parse_args()
     if given.serve:
@@ -45,20 +47,24 @@ def main() -> None:
         asked.error("name a commit to compare with, such as 7a4d1df.")
     scenarios = given.scenarios or SCENARIOS
     fidelities = ("contact",) if given.scenarios else FIDELITIES
+    began = os.getloadavg()[0]
     trials = [told for seed in range(given.seeds) for told in cases(seed, scenarios, fidelities)]
     with tree_of(given.commit) as before, server(before) as old, server(ROOT) as new:
         pairs = [both(old, new, told, i % 2 == 1) for i, told in enumerate(trials)]
-    if given.scenarios:
-        print(json.dumps({name: summary(trials, pairs, "scenario", name) for name in scenarios}, indent=2))
-        return
-    kept = {
-        "command": f"python benchmarks/trial_times.py {given.commit} --seeds {given.seeds}",
+    by, names = ("scenario", scenarios) if given.scenarios else ("fidelity", fidelities)
+    asked_for = f" --scenarios {' '.join(scenarios)}" if given.scenarios else ""
+    measured = {
+        "command": f"python benchmarks/trial_times.py {given.commit} --seeds {given.seeds}{asked_for}",
         "before": commit(given.commit),
         "after": commit("HEAD"),
-        "fidelities": {fidelity: summary(trials, pairs, "fidelity", fidelity) for fidelity in FIDELITIES},
+        "cores": os.cpu_count(),
+        "load": [began, os.getloadavg()[0]],
+        by: {name: summary(trials, pairs, by, name) for name in names},
     }
+    kept = json.loads(KEPT.read_text(encoding="utf-8")) if KEPT.exists() else {}
+    kept["scenarios" if given.scenarios else "fidelities"] = measured
     KEPT.write_text(json.dumps(kept, indent=2) + "\n", encoding="utf-8")
-    print(json.dumps(kept["fidelities"], indent=2))
+    print(json.dumps(measured, indent=2))
 
 
 def cases(seed: int, scenarios: Sequence[str], fidelities: Sequence[str]) -> Iterator[Told]:
@@ -104,10 +110,12 @@ def serve(asked: IO[str], answers: IO[str]) -> None:
         name = str(settings.scenario)
         if name not in scenes:
             scenario = load_scenario(name)
-            began = time.perf_counter()
+            began = time.process_time()
             scenes[name] = build_scene(scenario)
-            building[name] = time.perf_counter() - began
-            run_trial(settings, scenes[name])
+            building[name] = time.process_time() - began
+            # what is compiled at the first trial of a method is at hand for all scenes
+            for method in (settings.method,) if len(scenes) > 1 else METHODS:
+                run_trial(replace(settings, method=method), scenes[name])
         began = time.perf_counter()
         worked = time.process_time()
         row = run_trial(settings, scenes[name])
@@ -127,18 +135,21 @@ def summary(trials: list[Told], pairs: list[tuple[Told, Told]], by: str, which: 
     mine = [pair for told, pair in zip(trials, pairs, strict=True) if told[by] == which]
     return {
         "trials": len(mine),
-        "wall_s": [round(statistics.median(pair[i]["wall_s"] for pair in mine), 3) for i in (0, 1)],
-        "scene_s": [round(statistics.median(pair[i]["scene_s"] for pair in mine), 3) for i in (0, 1)],
+        **{
+            key: [round(statistics.median(pair[i][key] for pair in mine), 3) for i in (0, 1)]
+            for key in ("wall_s", "cpu_s", "scene_s")
+        },
         "wall_ratio": round(statistics.median(new["wall_s"] / old["wall_s"] for old, new in mine), 3),
         "cpu_ratio": round(statistics.median(new["cpu_s"] / old["cpu_s"] for old, new in mine), 3),
-        "real_time_factor": [factor([pair[i] for pair in mine]) for i in (0, 1)],
+        "real_time_factor": [factor([pair[i] for pair in mine], "wall_s") for i in (0, 1)],
+        "cpu_real_time_factor": [factor([pair[i] for pair in mine], "cpu_s") for i in (0, 1)],
         "verdicts_differ": sum(old["verdict"] != new["verdict"] for old, new in mine),
     }
 
 
-def factor(answers: list[Told]) -> float | None:
+def factor(answers: list[Told], seconds: str) -> float | None:
     """How much faster than real time trials are in the median; None if none of them came to a replay."""
-    factors = [told["sim_s"] / told["wall_s"] for told in answers if told["sim_s"] is not None]
+    factors = [told["sim_s"] / told[seconds] for told in answers if told["sim_s"] is not None]
     return round(statistics.median(factors), 1) if factors else None
 
 

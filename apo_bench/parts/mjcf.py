@@ -3,6 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import final
 from xml.etree.ElementTree import Element, tostring
@@ -50,11 +51,25 @@ class PartFile:
 
 
 def read_part(path: Path) -> PartFile:
-    """Read a part file.
+    """Read a part file; once, as long as it and the file beside it stay as they are.
 
     Raises:
         InputError: The file cannot be read, is no XML, or is not one body of named pieces; or so the one beside it.
     """
+    return _kept(path, _stamp(path), _stamp(path.with_suffix(".toml")))
+
+
+def _stamp(path: Path) -> tuple[int, int, int] | None:
+    """Time, size and number of a file; None if there is none."""
+    try:
+        stat = path.stat()
+    except (OSError, ValueError):
+        return None
+    return stat.st_mtime_ns, stat.st_size, stat.st_ino
+
+
+@lru_cache(maxsize=64)
+def _kept(path: Path, *stamps: tuple[int, int, int] | None) -> PartFile:
     root = read_tree(path)
     body = root.find("worldbody/body")
     if body is None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
@@ -290,3 +291,17 @@ def test_a_fit_hole_whose_pieces_touch_it_in_corners_is_refused(tmp_path: Path) 
 def test_parts_of_the_package_are_as_they_say(name: str) -> None:
     """They are not held against their pieces each time that they are loaded."""
     check_part(read_part(part_path(name)), load_part(name))
+
+
+def test_a_part_file_is_read_once_until_it_or_the_file_beside_it_changes(tmp_path: Path) -> None:
+    for suffix in (".xml", ".toml"):
+        shutil.copy(part_path("peg").with_suffix(suffix), tmp_path / f"mine{suffix}")
+    mine = tmp_path / "mine.xml"
+    first = read_part(mine)
+    assert read_part(mine) is first
+    beside = mine.with_suffix(".toml")
+    beside.write_text(beside.read_text().replace("density = ", "density = 1"))
+    assert read_part(mine).density > first.density
+    mine.write_text("<mujoco/>")
+    with pytest.raises(InputError):
+        read_part(mine)

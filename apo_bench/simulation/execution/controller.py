@@ -16,6 +16,7 @@ from apo_bench.simulation.hooks import Hooks, hooks_of
 from apo_bench.simulation.robot.in_hand import HoldWatch
 from apo_bench.simulation.robot.robot import Halt, Robot
 from apo_bench.simulation.robot.robot_error import RobotError
+from apo_bench.simulation.scene.apart import left_out
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import sleeping, snapshot
 
@@ -77,7 +78,7 @@ def replay(
     hooks.before_replay(plan)
     robot = Robot(scene, start, hooks, fidelity, error)
     progress = Progress([None] * len(plan.assembly), [])
-    with sleeping(scene.work, scene.grasp == "friction"):
+    with sleeping(scene.work, scene.grasp == "friction"), left_out(scene.work):
         outcome = refused or _run_schedule(plan, robot, todo, progress, cache, keys, most_s)
         final = _settled(robot, plan) if outcome.code != "unstable_simulation" else None
     result = ReplayResult(

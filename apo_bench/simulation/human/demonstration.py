@@ -13,6 +13,7 @@ from apo_bench.scenario import Carelessness, careless_covariance, spread_error
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.human.perform import STAND_STILL_S, act, perform
+from apo_bench.simulation.scene.apart import left_out
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import has_failed, sleeping, snapshot
 
@@ -42,7 +43,7 @@ def demonstrate(
     hands = Hands(scene, layout.start, watch)
     goals = []
     after = []
-    with sleeping(scene.shown, True):
+    with sleeping(scene.shown, True), left_out(scene.shown):
         hands.wait(0.05)
         for k, operation in enumerate(scenario.assembly.operations):
             hands.begin(k)

@@ -33,9 +33,11 @@ class World:
     dof: dict[str, int]
     geom_part: Ints
     """Per geom: index into free + fixed, -1 for everything else (arm, hands)."""
+    bounds: Array
+    """Per geom: a plane that it is behind, a cylinder that it is inside of, (geoms, 12), of `bounds_of`."""
 
 
-def world(model: Any, free: tuple[str, ...], fixed: tuple[str, ...]) -> World:
+def world(model: Any, free: tuple[str, ...], fixed: tuple[str, ...], bounds: Array) -> World:
     """Look up every part of a compiled scene."""
     parts = free + fixed
     body = {part: model.body(f"{part}/").id for part in parts}
@@ -50,6 +52,7 @@ def world(model: Any, free: tuple[str, ...], fixed: tuple[str, ...]) -> World:
         qpos={part: int(model.jnt_qposadr[j]) for part, j in joints.items()},
         dof={part: int(model.jnt_dofadr[j]) for part, j in joints.items()},
         geom_part=geom_part,
+        bounds=bounds,
     )
 
 
