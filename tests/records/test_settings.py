@@ -33,7 +33,7 @@ def test_columns_of_a_row_are_the_settings_in_their_order_with_their_ranges() ->
         column = ROW_FIELDS[SETTINGS[name].column]
         if not SETTINGS[name].choices and name != "salt":
             assert column in (kind, kind | None)
-    assert {*KEY, *columns} - {*REQUIRED} == {"salt"}
+    assert {*KEY, *columns} - {*REQUIRED} == {"salt", "abstain"}
 
 
 def test_sweeps_have_an_axis_or_one_value_of_every_setting() -> None:
