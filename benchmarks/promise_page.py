@@ -33,9 +33,10 @@ def write_page(lines: Sequence[Line], scores: Sequence[float] = SCORES, rates: S
     promised = np.interp([float(line["score"]) for line in planned], scores, rates)
     right = np.array([float(line["success"]) for line in planned])
     calibration = [line for line in lines if line["set"] == CALIBRATION and line["score"]]
+    made, scenes = (len({line["scenario"] for line in some}) for some in (calibration, planned))
     said = [
-        f"Calibrated on {len(calibration):,} plans of {len({x['scenario'] for x in calibration})} generated assemblies; "
-        f"held out: {len(planned):,} plans of {len({x['scenario'] for x in planned})} scenarios of the benchmark "
+        f"Calibrated on {len(calibration):,} plans of {made} generated assemblies; "
+        f"held out: {len(planned):,} plans of {scenes} scenarios of the benchmark "
         f"({len(held) - len(planned)} further trials had no plan), of which {int(right.sum()):,} succeeded.",
         "",
         *numbers(planned, promised, right),
