@@ -55,7 +55,7 @@ def test_every_setting_is_an_option_of_replay_and_sweep() -> None:
 def test_the_environment_has_the_same_defaults() -> None:
     defaults = {name: parameter.default for name, parameter in signature(APOReplay).parameters.items()}
     here = [name for name in SETTINGS if defaults.get(name) is not None and name != "scenario"]
-    assert here == ["careless", "eye", "grasp", "arm", "robot_error", "looks", "timestep_s"]
+    assert here == ["careless", "eye", "grasp", "arm", "robot_error", "looks", "abstain", "timestep_s"]
     assert [defaults[name] for name in here] == [SETTINGS[name].default for name in here]
     assert defaults["level"] == TrialSettings.level_mm == TrialSettings.level_deg
 
