@@ -154,7 +154,7 @@ class Plan:
             object.__setattr__(self, "targets", self.goals[[step.operation for step in self.schedule]])
         freeze(self, targets=(len(self.schedule), 4, 4))
 
-    def with_goals(self, goals: Array) -> Plan:
+    def with_goals(self, goals: Array) -> "Plan":
         """The plan with other goals, (n, 4, 4), and with them where its schedule brings parts to the old ones."""
         done = [step.operation for step in self.schedule]
         # targets that are not goals are states in between, which stay where they are
