@@ -5,7 +5,7 @@ Goals are one pose per operation, shape (n, 4, 4), world frame, [m]. Parts that 
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import NamedTuple, final
 
@@ -153,6 +153,13 @@ class Plan:
         if not len(self.targets):
             object.__setattr__(self, "targets", self.goals[[step.operation for step in self.schedule]])
         freeze(self, targets=(len(self.schedule), 4, 4))
+
+    def with_goals(self, goals: Array) -> "Plan":
+        """The plan with other goals, (n, 4, 4), and with them where its schedule brings parts to the old ones."""
+        done = [step.operation for step in self.schedule]
+        # targets that are not goals are states in between, which stay where they are
+        final = (self.targets == self.goals[done]).all(axis=(1, 2))
+        return replace(self, goals=goals, targets=np.where(final[:, None, None], goals[done], self.targets))
 
 
 def placements(assembly: Assembly, start: Poses, goals: Array) -> tuple[Poses, ...]:

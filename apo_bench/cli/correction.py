@@ -38,12 +38,14 @@ def explain_command(
     from apo_bench.files.observation import as_planned, read_observation_file
     from apo_bench.scenario.file import load_scenario
     from apo_bench.show.explain_text import explanation_form, explanation_tables, sentences, total
+    from apo_bench.trial.promise import promise_sentence
 
     check_outputs([(out, "--out", (".png",))])
     if observation is None:
         loaded = load_scenario(scenario)
         seen = as_planned(loaded, deviation_mm, deviation_deg)
         goals = seen.goals
+        promised = None
         where = f"at the nominal goals, {_stated(deviation_mm, deviation_deg)}"
     else:
         seen, loaded, assumed = read_observation_file(
@@ -53,13 +55,15 @@ def explain_command(
         if not correction.ok:
             raise RuntimeError(f"{observation} cannot be corrected, so nothing is explained: {correction.sentence}.")
         goals = correction.goals
+        promised = _promised(_planned(loaded, seen, correction)[0], seen, correction, loaded)
         where = f"at the corrected goals of {observation}"
         where += f", {_stated(deviation_mm, deviation_deg)} where it states none" * assumed
     explanation = explain(seen, goals)
     if as_json:
-        print_json(explanation_form(loaded.name, explanation))
+        print_json(explanation_form(loaded.name, explanation) | {"promised": promised})
     else:
-        typer.echo("\n".join([f"{loaded.name}: {total(explanation)}", where, "", *sentences(explanation)]))
+        said = [] if promised is None else [f"promised: {promise_sentence(promised)}"]
+        typer.echo("\n".join([f"{loaded.name}: {total(explanation)}", where, *said, "", *sentences(explanation)]))
         print_tables(*explanation_tables(explanation))
     if out is not None:
         from apo_bench.show.explain_picture import draw_explanation
@@ -96,6 +100,7 @@ def correct_command(
     from apo_bench.correction.own_code.own import correct_named
     from apo_bench.files.observation import read_observation_file
     from apo_bench.show.correct_text import correction_form, correction_lines, pose_table, suspect_table
+    from apo_bench.trial.promise import promise_sentence
 
     check_outputs([(out, "--out", (".json", ".csv"))])
     if out is not None and out.exists() and observation.exists() and out.samefile(observation):
@@ -114,13 +119,16 @@ def correct_command(
     with redirect_output(as_json):
         correction = correct_named(seen, corrector)
     explanation = _explained(seen, correction)
-    plan, moved = _planned(loaded, seen, correction) if out is not None and correction.ok else (None, "")
+    plan, moved = _planned(loaded, seen, correction) if correction.ok else (None, "")
+    promised = None if plan is None else _promised(plan, seen, correction, loaded)
     if as_json:
         form = correction_form(loaded.name, method, seen, correction, explanation, assumed)
-        print_json(form | {"moved": moved or None})
+        print_json(form | {"moved": (out is not None and moved) or None, "promised": promised})
     else:
         typer.echo(f"{loaded.name} from {observation}, corrected by {method}\n")
         lines = correction_lines(seen, correction, explanation)
+        if promised is not None:
+            lines.append(("promised", promise_sentence(promised)))
         if assumed:
             lines.append(("noise", f"{_stated(deviation_mm, deviation_deg)}, assumed where the file states none"))
         print_lines(lines)
@@ -178,6 +186,13 @@ def _planned(scenario: Scenario, observation: Observation, correction: Correctio
 
     fitting = fitting_plan(correction, observation, scenario)
     return fitting.plan, fitting.sentence
+
+
+def _promised(plan: Plan, observation: Observation, correction: Correction, scenario: Scenario) -> float:
+    """The probability of success of a plan, whichever arm carries it out."""
+    from apo_bench.trial.promise import promised_success
+
+    return promised_success(plan, observation, correction, scenario)
 
 
 def _write_plan(out: Path, scenario: str, name: str, plan: Plan) -> None:

@@ -20,7 +20,10 @@ OPTIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "Task and robot": ("--careless", "--clearance", "--arm", "--grasp", "--robot-error"),
         "What is seen": ("--level", "--levels", "--level-mm", "--level-deg", "--noise", "--eye", "--observation"),
-        "What a method makes of it": ("--method", "--methods", "--relations", "--looks", "--corrector-limit"),
+        "What a method makes of it": (
+            *("--method", "--methods", "--relations", "--looks", "--abstain"),
+            "--corrector-limit",
+        ),
         "Which trials": ("--trials", "--seed", "--salt-file"),
         "How they are simulated": ("--fidelity", "--timestep-ms", "--trial-limit"),
         "Where they run": ("--workers", "--backend", "--address"),

@@ -112,13 +112,14 @@ def plan_command(
             raise InputError("--robot was given without --observation, which says where things are; give both.")
         loaded = load_scenario(scenario)
         notes = list[str]()
+        promised = None
         plan = Plan(loaded.assembly, loaded.start, loaded.goals)
         where = "at the nominal goals"
         axes = "directions and until in the frame of the assembly"
     else:
         method = CORRECTOR if method is None else method
         with redirect_output(as_json):
-            loaded, plan, notes = _planned(scenario, observation, method, (deviation_mm, deviation_deg))
+            loaded, plan, promised, notes = _planned(scenario, observation, method, (deviation_mm, deviation_deg))
         where = f"at the goals of {observation}, {_by(method)}"
         axes = "directions in the frame of the assembly, until in the world"
     if arm is not None:
@@ -129,7 +130,7 @@ def plan_command(
     if robot is not None:
         write_form(robot_form(lines, plan, loaded, robot_frames, notes), robot)
     if as_json:
-        print_json(plan_lines_form(lines, loaded, notes))
+        print_json(plan_lines_form(lines, loaded, notes) | {"promised": promised})
         return
     typer.echo(f"{loaded.name} {where}; {axes}: mm and degrees\n")
     typer.echo("\n".join([*plan_text(lines), *([""] if notes else []), *notes]))
@@ -139,10 +140,11 @@ def plan_command(
 
 def _planned(
     scenario: str, observation: Path, method: str, deviations: tuple[float | None, float | None]
-) -> tuple[Scenario, Plan, list[str]]:
-    """The scenario, the plan that a method makes of an observation of it, and what is to be said with it."""
+) -> tuple[Scenario, Plan, float, list[str]]:
+    """The scenario, the plan that a method makes of an observation of it, what it promises, and what is to be said."""
     from apo_bench.files.observation import read_observation_file
     from apo_bench.trial.planning import apply_method, plan_warning
+    from apo_bench.trial.promise import promise_sentence, promised_success
 
     seen, loaded, assumed = read_observation_file(
         observation, scenario, deviation_mm=deviations[0], deviation_deg=deviations[1]
@@ -156,7 +158,9 @@ def _planned(
     warning = plan_warning(loaded, result.plan, result.correction)
     notes = [assumed_deviations(*deviations)] if assumed and result.correction is not None else []
     moved = "" if result.fitting is None else result.fitting.sentence
-    return loaded, result.plan, [*notes, *filter(None, (moved, warning))]
+    promised = promised_success(result.plan, seen, result.correction, loaded)
+    notes += filter(None, (moved, warning, f"promised: {promise_sentence(promised)}"))
+    return loaded, result.plan, promised, notes
 
 
 def _by(method: str) -> str:

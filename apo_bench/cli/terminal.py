@@ -16,6 +16,7 @@ from apo_bench.report.tables.table import Column
 from apo_bench.report.tables.table import Table as Data
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.statistics import Cell, confusions, level_label
+from apo_bench.trial.promise import promise_sentence
 
 if TYPE_CHECKING:
     from apo_bench.report.comparison.compare import Comparison
@@ -110,6 +111,8 @@ def _lines(row: Row) -> list[tuple[str, str]]:
         trial += f", relations {row['relations']}" * (row["relations"] != "given")
         trial += f", {row['looks']} looks allowed" * bool(row["looks"])
         trial += f", robot error {row['robot_error']}" * (row["robot_error"] != "none")
+        abstain = row.get("abstain", 0.0)
+        trial += f", abstaining below {abstain:g}" * bool(abstain)
     lines = [
         ("scenario", f"{row['scenario']}, {row['grasp']} grasp, {row['clearance_mm']:g} mm clearance"),
         ("trial", trial),
@@ -132,6 +135,8 @@ def _lines(row: Row) -> list[tuple[str, str]]:
         lines.append(("free directions", f"{moved}, so that the plan fits"))
     if row["predicted"] is not None:
         lines.append(("predicted", _predicted(row["predicted"])))
+    if (promised := row.get("promised")) is not None:
+        lines.append(("promised", promise_sentence(promised)))
     if row["worst_gap_mm"] is not None:
         reached = f"least overlap {row['least_overlap']:.2f}, worst gap {row['worst_gap_mm']:.3f} mm"
         missed = "" if row["loose_success"] else "not every contact was made, even loosely: "

@@ -30,6 +30,7 @@ from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.fitting import fitting_plan
+from apo_bench.trial.promise import abstained, promised_success
 from apo_bench.trial.stages import (
     SimulatedDemonstration,
     demonstration_failure,
@@ -90,7 +91,8 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     Every step terminates. `info` then holds `is_success`, `as_demonstrated` (each contact was also made when and where
     it was shown), `loose_success`, `stage` and `code` (`done` and `ok`, or out of `apo_bench.records.outcomes`),
     `operation` (numbered from 1, or None), `sentence` and, if a plan was carried out, `predicted`: what it said about
-    itself before, `fails`, `operation`, `code`, `size_mm`. Never the truth, and nothing from which it can be drawn.
+    itself before, `fails`, `operation`, `code`, `size_mm`, and `promised`, the probability of success that it stated.
+    Never the truth, and nothing from which it can be drawn.
     A replay that takes more than 1000 s of simulated time, which only a schedule of a great many steps does, begins no
     further step: code `time_limit`. Wall time has no limit.
     A demonstration that went wrong itself (at most one in a hundred) is passed over by `reset()`; `reset(seed=k)`
@@ -109,6 +111,8 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     - `timestep_s`: of the physics.
     - `robot_error`: what is wrong with the robot itself, as standard deviations: `none`, or `hand_eye:1/0.2+tool:0.5`.
     - `looks`: how often `env.unwrapped.look(operations)`, or a corrector that can ask, may look at operations again.
+    - `abstain`: a plan that promises to succeed with less than this probability is not carried out: reward 0, stage
+      `promise`, code `abstained`. 0 carries out everything.
     - `render_mode`: `rgb_array` shows arm and parts before the step and where the replay ended after it, without a
       display; `human` opens a window when the replay begins.
 
@@ -135,12 +139,15 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         eye: str = TrialSettings.eye,
         looks: int = TrialSettings.looks,
         robot_error: str = TrialSettings.robot_error,
+        abstain: float = TrialSettings.abstain,
         render_mode: str | None = None,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise InputError(f"the render mode '{render_mode}' was given; use rgb_array, human or None.")
         check("eye", eye)
         check("looks", looks)
+        check("abstain", abstain)
+        self._abstain = abstain
         self._robot_error = checked_robot_error(robot_error)
         self.render_mode = render_mode
         if eye == RANGE and noise is not None:
@@ -158,6 +165,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self.action_space = action_space(len(self.assembly))
         self._episode: Episode | None = None
         self._aim: Plan | None = None
+        self._correction: Correction | None = None
         self._refused: Outcome | None = None
         self._over = False
         self._poses: Poses = self._scene.scenario.start
@@ -241,20 +249,28 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             raise gymnasium.error.ResetNeeded("one step is one whole replay; call reset() for the next demonstration.")
         plan = moved(self._aim, action, self.action_space)
         self._over = True
-        verdicts, end, predicted = self._replayed(plan)
-        info = step_info(verdicts, end, predicted)
+        verdicts, end, predicted, promised = self._replayed(plan)
+        info = step_info(verdicts, end, predicted, promised)
         return as_seen_entries(self.seen), float(verdicts["is_success"]), True, False, info
 
-    def aim(self, goals: Array, schedule: Sequence[Step] = (), targets: Array | None = None) -> None:
+    def aim(
+        self,
+        goals: Array,
+        schedule: Sequence[Step] = (),
+        targets: Array | None = None,
+        correction: Correction | None = None,
+    ) -> None:
         """Replay this on zeros, until the next reset; for wrappers.
 
         Args:
             goals: (n, 4, 4), where every operation puts its part in the end.
             schedule: What to do and undo; empty stands for every operation once, in order.
             targets: (steps, 4, 4), as in `apo_bench.assembly.goals.Plan`; None stands for `goals` throughout.
+            correction: What the goals come from, so that what it doubts is in what the plan promises.
         """
         plan = Plan(self.assembly, self.seen.start, goals, tuple(schedule))
         self._aim = plan if targets is None else replace(plan, targets=targets)
+        self._correction = correction
         self._refused = None
 
     def planned(self, correction: Correction) -> Plan:
@@ -308,16 +324,19 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             "the scenario."
         )
 
-    def _replayed(self, plan: Plan) -> tuple[dict[str, bool], Outcome, Predicted | None]:
-        """The verdicts, where it ended, and what the plan had said."""
+    def _replayed(self, plan: Plan) -> tuple[dict[str, bool], Outcome, Predicted | None, float | None]:
+        """The verdicts, where it ended, what the plan had said, and how likely it had called its success."""
         episode = self._current("there is no trial")
         simulated = episode.simulated
         failed = dict.fromkeys(("is_success", "as_demonstrated", "loose_success"), False)
         if simulated.demonstration.code != "ok":
-            return failed, demonstration_failure(simulated.demonstration), None
+            return failed, demonstration_failure(simulated.demonstration), None, None
         if self._refused is not None:
-            return failed, self._refused, None
+            return failed, self._refused, None, None
         predicted = predicted_outcome(plan, self._scene)
+        promised = promised_success(plan, self.seen, self._correction, self._scene, self._robot_error)
+        if promised < self._abstain:
+            return failed, abstained(promised, self._abstain), predicted, promised
         attempt = replay_and_judge(
             plan,
             self._scene,
@@ -330,7 +349,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             self._poses = attempt.result.reached.final.poses
         judged = attempt.verdict
         verdicts = (judged.success, judged.as_demonstrated, judged.loose_success)
-        return dict(zip(failed, verdicts, strict=True)), trial_outcome(attempt), predicted
+        return dict(zip(failed, verdicts, strict=True)), trial_outcome(attempt), predicted, promised
 
     def _watch(self) -> Any:
         """What looks on at a replay: in mode `human` a new window, since every replay has its own data."""

@@ -54,7 +54,7 @@ class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.R
         if correction.ok:
             plan = self._base.planned(correction)
             goals = plan.goals
-            self._base.aim(goals, plan.schedule, plan.targets)
+            self._base.aim(goals, plan.schedule, plan.targets, correction)
         else:
             self._base.refuse(correction.status, correction.sentence)
         self._goals = packed(goals)

@@ -33,7 +33,9 @@ def predicted_info(predicted: Mapping[str, Any]) -> dict[str, Any]:
     return {**predicted, **{name: nullable(predicted[name]) for name in ("operation", "size_mm")}}
 
 
-def step_info(verdicts: Mapping[str, bool], end: Outcome, predicted: Predicted | None) -> dict[str, Any]:
+def step_info(
+    verdicts: Mapping[str, bool], end: Outcome, predicted: Predicted | None, promised: float | None
+) -> dict[str, Any]:
     """What is said after a step: the verdicts, where the replay ended, and what the plan had said of itself."""
     return {
         **verdicts,
@@ -42,4 +44,5 @@ def step_info(verdicts: Mapping[str, bool], end: Outcome, predicted: Predicted |
         "operation": nullable(None if end.operation is None else end.operation + 1),
         "sentence": end.sentence,
         **({} if predicted is None else {"predicted": predicted_info(predicted)}),
+        **({} if promised is None else {"promised": promised}),
     }

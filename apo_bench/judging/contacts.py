@@ -18,7 +18,7 @@ _OFF: dict[ContactKind, str] = {
     "cone in cone": "{:.2f} mm off its seat",
     "cone on rim": "{:.2f} mm off its seat",
 }
-_Share = Callable[[Overlap, Overlap], float]
+Share = Callable[[Overlap, Overlap], float]
 """How much of the true overlap (the second) is covered by the one that was reached (the first), 0 to 1."""
 
 
@@ -67,7 +67,7 @@ class ContactJudge(NamedTuple):
     clearance_mm: float
 
     def verdict(
-        self, contact: Contact, operation: int, moment: ContactMoment, poses: Poses, true: Poses, share: _Share
+        self, contact: Contact, operation: int, moment: ContactMoment, poses: Poses, true: Poses, share: Share
     ) -> ContactVerdict:
         """Measure one contact.
 

@@ -4,13 +4,14 @@ The first is what a person says who sees the end, whatever became of it on the w
 when it is made, and at the end.
 """
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Poses, Reached, Relation, Snapshot, placements
 from apo_bench.geometry import Array, Overlap, nearest_alike, pose
-from apo_bench.judging.contacts import ContactJudge, ContactMoment, ContactVerdict
+from apo_bench.judging.contacts import ContactJudge, ContactMoment, ContactVerdict, Share, face_overlap
 from apo_bench.judging.displaced import displacements, faults_of_place, last_moves
 from apo_bench.judging.judgement import Judgement, judgement
 from apo_bench.records import Thresholds
@@ -38,10 +39,7 @@ def judge_finished(
         return judgement((), (), (), thresholds, all_made=False)
     away = fixtures(assembly)
     true = placements(assembly, final.poses, reference)[-1]
-    seen = {
-        part: T if part in assembly.fixed else nearest_alike(assembly.solids[part], T, true[part])
-        for part, T in final.poses.items()
-    }
+    seen = _as_meant(assembly, final.poses, true)
     return judgement(
         tuple(_standing_contacts(ContactJudge(assembly, thresholds, clearance_mm), seen, true, away)),
         [final],
@@ -76,11 +74,49 @@ def _on_fixed(assembly: Assembly, contact: Contact) -> bool:
 
 def _standing_contacts(judge: ContactJudge, seen: Poses, true: Poses, away: frozenset[str]) -> Iterator[ContactVerdict]:
     """The contacts that stand at the end, of parts that are no fixtures."""
-    assembly = judge.assembly
+    for contact, made, share in _standing(judge.assembly, away):
+        yield judge.verdict(contact, made, "end", seen, true, share)
+
+
+def _standing(assembly: Assembly, away: frozenset[str]) -> Iterator[tuple[Contact, int, Share]]:
+    """Contacts that stand at the end, of parts that are no fixtures; what made them, what of an overlap counts."""
     for contact, made, lost in assembly.relations():
         if lost is None and not away & {end.part for end in contact}:
-            share = _share_of_area if _on_fixed(assembly, contact) else Overlap.share
-            yield judge.verdict(contact, made, "end", seen, true, share)
+            yield contact, made, _share_of_area if _on_fixed(assembly, contact) else Overlap.share
+
+
+def least_overlaps(assembly: Assembly, final: Poses, references: Array) -> Array:
+    """The least share of the true overlap that a finished assembly covers, for each of several truths, (d,).
+
+    Args:
+        references: (d, n, 4, 4), goals that may be the true ones, world frame, [m].
+
+    Returns:
+        Not a number where faces that should touch do not meet in the truth itself, so that it cannot be one.
+    """
+    contacts = tuple(_standing(assembly, fixtures(assembly)))
+    return np.array([_least_overlap(assembly, final, placements(assembly, final, T)[-1], contacts) for T in references])
+
+
+def _least_overlap(
+    assembly: Assembly, final: Poses, true: Poses, contacts: Sequence[tuple[Contact, int, Share]]
+) -> float:
+    seen = _as_meant(assembly, final, true)
+    least = 1.0
+    for contact, _, share in contacts:
+        expected = face_overlap(assembly, contact, true)
+        if not expected:
+            return math.nan
+        least = min(least, share(face_overlap(assembly, contact, seen), expected))
+    return least
+
+
+def _as_meant(assembly: Assembly, final: Poses, true: Poses) -> Poses:
+    """Poses of parts turned by that of their symmetries which is nearest to the truth."""
+    return {
+        part: T if part in assembly.fixed else nearest_alike(assembly.solids[part], T, true[part])
+        for part, T in final.items()
+    }
 
 
 def _share_of_area(reached: Overlap, true: Overlap) -> float:

@@ -26,6 +26,7 @@ from apo_bench.records.setting_info import SettingInfo
 from apo_bench.records.settings import (
     ENV_ID,
     LEVEL,
+    OLDER_ROW,
     RANGE,
     ROW,
     SETTINGS,
@@ -64,6 +65,7 @@ __all__ = (
     "MEANINGS",
     "METHODS",
     "NO_ROBOT_ERROR",
+    "OLDER_ROW",
     "RANGE",
     "RECOGNISED",
     "REQUIRED",

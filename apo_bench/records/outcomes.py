@@ -7,8 +7,8 @@ trial or its corrector) are filled in where the outcome is made; no other words 
 from types import MappingProxyType
 
 STAGES = (
-    *("demonstrate", "observe", "correct", "plan", "pick", "lift", "carry", "attach", "release", "depart", "judge"),
-    "worker",
+    *("demonstrate", "observe", "correct", "promise", "plan", "pick", "lift", "carry", "attach", "release"),
+    *("depart", "judge", "worker"),
 )
 """Where a trial can fail, in the order of a trial, and last the process that runs it; `done` is where one that did not
 fail ends."""
@@ -26,6 +26,8 @@ CODES = MappingProxyType(
         "not_converged": "the solver did not come to rest within its iterations",
         "not_finite": "the correction holds a number that is not finite",
         "raised": "the corrector raised an error or returned what it must not",
+        # promise
+        "abstained": "the plan promised too little to be carried out",
         # plan
         "unreachable": "the arm cannot reach the goal of operation {operation} ({part})",
         "unreachable_start": "the arm cannot reach {part} where operation {operation} picks it up",

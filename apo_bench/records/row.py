@@ -21,6 +21,7 @@ from apo_bench.records.settings import (
     LooksAllowed,
     Name,
     NoiseLevel,
+    Promise,
     Seed,
     TimestepS,
 )
@@ -120,6 +121,8 @@ class Row(TypedDict, total=False):
     """Who planned: `oracle`, `none`, `by-heart`, `search` or a corrector."""
     looks: LooksAllowed
     """How often a corrector that can ask was allowed to look at operations again."""
+    abstain: Promise
+    """A plan that promised less was not carried out."""
     seed: Seed
     """Number of the trial: trials of one seed meet the same layout, human and noise."""
     salt: Name | None
@@ -171,6 +174,8 @@ class Row(TypedDict, total=False):
     """What of a corrected plan was moved where contacts leave it free, so that it fits; null where there is none."""
     predicted: Predicted | None
     """What the plan said about itself before it was carried out."""
+    promised: _Share | None
+    """Probability of success that the plan stated before it was carried out; null where there was no plan."""
     gap_before_mm: _Number | None
     """Gap of the contacts at the poses seen [mm]."""
     gap_after_mm: _Number | None
@@ -228,7 +233,7 @@ _CLOSED = dict.fromkeys(("demonstration", "failure_code", "as_demonstrated_code"
 _CLOSED["failure_stage"] = _ENDS[STAGES] | None
 ROW_FIELDS: Mapping[str, Any] = MappingProxyType(get_type_hints(Row, include_extras=True) | _CLOSED)
 """Column -> its type, with the range that it may have."""
-_SETTING_COLUMNS = (info.column for info in SETTINGS.values() if info.name != "salt")
+_SETTING_COLUMNS = (info.column for info in SETTINGS.values() if info.name not in ("salt", "abstain"))
 REQUIRED = (
     *("schema", "env_id", "spec_hash", *_SETTING_COLUMNS),
     *("demonstration", "success", "loose_success", "failure_stage", "failure_code"),

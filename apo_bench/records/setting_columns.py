@@ -46,7 +46,7 @@ def settings_of(row: Mapping[str, Any], scenario: str) -> TrialSettings:
     Args:
         scenario: A name, or the path of a scenario file.
     """
-    values = {name: row[info.column] for name, info in SETTINGS.items()}
+    values = {name: row.get(info.column, info.default) for name, info in SETTINGS.items()}
     return TrialSettings(**(values | {"scenario": scenario, "salt": None}))
 
 

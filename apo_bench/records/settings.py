@@ -22,7 +22,9 @@ from apo_bench.records.setting_info import SettingInfo, about, check_value
 from apo_bench.records.short_names import CORRECTOR
 
 ENV_ID = "APOReplay-v0"
-ROW = "apo-bench/row/7"
+ROW = "apo-bench/row/8"
+OLDER_ROW = "apo-bench/row/7"
+"""The same without `abstain`, which is 0 there, and `promised`."""
 Eye = Literal["noise", "range"]
 """Poses with noise that is drawn, or a simulated range finder that measures them."""
 RANGE = "range"
@@ -40,6 +42,8 @@ NoiseLevel = Annotated[float, Meta(ge=0.0, le=50.0)]
 CarelessnessValue = Annotated[float, Meta(ge=0.0, le=10.0)]
 ClearanceMm = Annotated[float, Meta(ge=0.0, le=5.0)]
 Seed = Annotated[int, Meta(ge=0, le=LARGEST_SEED)]
+Promise = Annotated[float, Meta(ge=0.0, le=1.0)]
+"""A probability of success."""
 LooksAllowed = Annotated[int, Meta(ge=0, le=100)]
 TimestepS = Annotated[float, Meta(gt=0.0, le=1.0)]
 LEVEL = SettingInfo(
@@ -195,6 +199,17 @@ class TrialSettings:
         ),
     )
     """How often a corrector that can ask may look at operations again; each look has the errors of the first."""
+    abstain: Promise = field(
+        default=0.0,
+        metadata=about(
+            "Carry out nothing that promises to succeed with less than this probability; 0 carries out everything",
+            called="promise to abstain below",
+            meaning="where 0 never abstains",
+            key=True,
+            axis="abstains",
+        ),
+    )
+    """A plan whose `promised` is less is not carried out: no success."""
     seed: Seed = field(default=0, metadata=about("Number of the trial", called="seed", key=True))
     """Number of the trial: trials of one seed meet the same layout, human and noise."""
     salt: Salt | None = field(

@@ -2,7 +2,7 @@
 fidelity, number of looks and robot error."""
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from operator import itemgetter
@@ -16,8 +16,9 @@ from apo_bench.records import Row, TrialSettings, one_salt, parsed
 CONFIDENCE = 0.95
 Line = TypeVar("Line", bound=Mapping[str, Any])
 """A row, or a line of timings."""
-NOT_EXECUTED = ("observe", "correct", "worker")
-"""Stages of failures at which no plan was carried out to its end: there was none, or its process died."""
+NOT_EXECUTED = ("observe", "correct", "promise", "worker")
+"""Stages of failures at which no plan was carried out to its end: there was none, it promised too little, or its
+process died."""
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,7 @@ class Place:
     fidelity: str = TrialSettings.fidelity
     looks: int = TrialSettings.looks
     robot_error: str = TrialSettings.robot_error
+    abstain: float = TrialSettings.abstain
     _replace = replace
     """The place with other values of some fields, as of a named tuple."""
 
@@ -77,7 +79,14 @@ class Cell(Place):
     """Successes of which every contact was also made when and where it was shown."""
     loose_successes: int
     not_executed: int
-    """Failures of which no plan was carried out: nothing was corrected, or the worker died. They count as failures."""
+    """Failures of which no plan was carried out: nothing was corrected, too little was promised, or the
+    worker died. They count as failures."""
+    abstained: int
+    """Those of them whose plan promised too little."""
+    promised: float | None
+    """Mean of what plans promised; None where no plan did."""
+    brier: float | None
+    """Mean squared difference of promise and success over the trials whose plan promised anything and was executed."""
     excluded: int
     """Trials left out of every method alike, since the demonstration itself was not right."""
     failures: Mapping[str, int]
@@ -110,6 +119,12 @@ class Cell(Place):
     def executed(self) -> Rate:
         """Success among the trials whose plan was carried out."""
         return Rate(self.successes, self.trials - self.not_executed)
+
+    @property
+    def wrong_when_executed(self) -> float | None:
+        """Share of failures among the trials whose plan was carried out; None without one."""
+        done = self.executed.rate
+        return None if done is None else 1.0 - done
 
 
 @lru_cache(maxsize=65536)
@@ -145,7 +160,7 @@ def place_of(row: Row) -> Place | None:
 
 PLACE_FIELDS = Place.__match_args__
 _PLACE = itemgetter(*PLACE_FIELDS)
-_USUAL = {"fidelity": TrialSettings.fidelity, "looks": TrialSettings.looks, "robot_error": TrialSettings.robot_error}
+_USUAL = {name: getattr(TrialSettings, name) for name in ("fidelity", "looks", "robot_error", "abstain")}
 
 
 def by_place(rows: Iterable[Row]) -> dict[Place, dict[int, Row]]:
@@ -199,9 +214,24 @@ def _cell(key: Place, rows: list[Row]) -> Cell:
         demonstrated=sum(bool(row["as_demonstrated"]) for row in counted),
         loose_successes=sum(bool(row["loose_success"]) for row in counted),
         not_executed=sum(row["failure_stage"] in NOT_EXECUTED for row in failed),
+        abstained=sum(row["failure_code"] == "abstained" for row in failed),
+        promised=_mean([promise for row in counted if (promise := row.get("promised")) is not None]),
+        brier=_mean([(promise - bool(row["success"])) ** 2 for row, promise in _carried_out(counted)]),
         excluded=len(rows) - len(counted),
         failures=MappingProxyType(dict(sorted(why.items(), key=lambda item: (-item[1], item[0])))),
     )
+
+
+def _carried_out(rows: Iterable[Row]) -> Iterator[tuple[Row, float]]:
+    """Rows of plans that were executed, with what they had promised."""
+    for row in rows:
+        promise = row.get("promised")
+        if promise is not None and row["failure_stage"] not in NOT_EXECUTED:
+            yield row, promise
+
+
+def _mean(numbers: Sequence[float]) -> float | None:
+    return sum(numbers) / len(numbers) if numbers else None
 
 
 def order(k: Place) -> tuple[Any, ...]:
@@ -209,5 +239,5 @@ def order(k: Place) -> tuple[Any, ...]:
     return (
         *(k.scenario, k.clearance_mm, k.noise, rank_relations(k.relations), k.careless),
         *(k.grasp, k.robot_error != TrialSettings.robot_error, k.robot_error, k.fidelity != "full"),
-        *(k.looks, rank(k.method), k.method, k.level, k.level_deg),
+        *(k.looks, k.abstain, rank(k.method), k.method, k.level, k.level_deg),
     )

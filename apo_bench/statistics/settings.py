@@ -23,6 +23,7 @@ class Setting(NamedTuple):
     fidelity: str
     looks: int = 0
     robot_error: str = NO_ROBOT_ERROR
+    abstain: float = 0.0
 
     def holds(self, cell: Place) -> bool:
         """Whether a cell belongs here.
@@ -51,6 +52,7 @@ class Setting(NamedTuple):
             f"robot error {self.robot_error}": self.robot_error != NO_ROBOT_ERROR,
             f"fidelity {self.fidelity}": self.fidelity != "full",
             f"{self.looks} more look{'s' * (self.looks > 1)}": self.looks > 0,
+            f"abstaining below {self.abstain:g}": self.abstain > 0,
         }
         place = [human, *[f"{self.clearance_mm:g} mm clearance"] * clearance]
         return place + [words for words, here in unusual.items() if here]
@@ -108,7 +110,7 @@ def setting_of(p: Place) -> Setting:
 
 
 def _site(x: Place | Setting) -> tuple[Any, ...]:
-    return x.scenario, x.clearance_mm, x.grasp, x.fidelity, x.robot_error
+    return x.scenario, x.clearance_mm, x.grasp, x.fidelity, x.robot_error, x.abstain
 
 
 def _one_ceiling(inside: list[_Item]) -> list[_Item]:

@@ -68,6 +68,8 @@ class SweepSettings:
     """The oracle meets them too."""
     looks: tuple[int, ...] = (TrialSettings.looks,)
     """Methods that cannot ask run once, with none."""
+    abstains: tuple[float, ...] = (TrialSettings.abstain,)
+    """The oracle abstains too."""
     arm: str = TrialSettings.arm
     timestep_s: float = TrialSettings.timestep_s
     fidelity: str = TrialSettings.fidelity

@@ -97,7 +97,7 @@ def fitting_plan(
     goals = _goals_that_fit(believed_plan, correction.believed or corrector_input, where) if why else None
     if why is None or goals is None:
         return FittingPlan(plan)
-    return FittingPlan(_moved(plan, goals), _moves(plan.goals, goals), why)
+    return FittingPlan(plan.with_goals(goals), _moves(plan.goals, goals), why)
 
 
 def _fault(scene: Scene, plan: Plan) -> str | None:
@@ -127,7 +127,7 @@ def _goals_that_fit(plan: Plan, believed: Observation, scene: Scene) -> Array | 
     allowed = _earlier_gaps(plan)
 
     def fits(goals: Array) -> bool:
-        moved = _moved(plan, goals)
+        moved = plan.with_goals(goals)
         held = all(
             (now <= np.maximum(most, _EXACT_M)).all() for now, most in zip(_earlier_gaps(moved), allowed, strict=True)
         )
@@ -143,7 +143,7 @@ def _goals_that_fit(plan: Plan, believed: Observation, scene: Scene) -> Array | 
 
 def _excess(plan: Plan, scene: Scene, room_mm: float, limits: Array, goals: Array) -> Array:
     """By how much each measure of a plan with other goals is too large."""
-    return np.array([measure.size for measure in _measured(scene, _moved(plan, goals), room_mm)]) - limits
+    return np.array([measure.size for measure in _measured(scene, plan.with_goals(goals), room_mm)]) - limits
 
 
 def _limits(before: tuple[Measure, ...], with_room: tuple[Measure, ...], room_mm: float) -> Array:
@@ -154,14 +154,6 @@ def _limits(before: tuple[Measure, ...], with_room: tuple[Measure, ...], room_mm
         had = (plain.kind == "falls" and not plain.exceeded) or (plain.kind in _ROOMY and plain.size <= 0.0)
         limits.append(max(wanted, roomy.size + _SLACK) if had and roomy.size > wanted else wanted)
     return np.array(limits)
-
-
-def _moved(plan: Plan, goals: Array) -> Plan:
-    """A plan with other goals, (n, 4, 4), and with them where the schedule brings parts to the old ones."""
-    done = [step.operation for step in plan.schedule]
-    # targets that are not goals are states in between, which stay where they are
-    final = (plan.targets == plan.goals[done]).all(axis=(1, 2))
-    return replace(plan, goals=goals, targets=np.where(final[:, None, None], goals[done], plan.targets))
 
 
 def _earlier_gaps(plan: Plan) -> list[Array]:

@@ -6,6 +6,7 @@ Chance enters a trial here and nowhere else.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, final
 
@@ -153,27 +154,37 @@ def predicted_outcome(plan: Plan, scene: Scene, searches: bool = False) -> Predi
 def draw_robot_error(name: str, scene: Scene, seed: int, salt: Salt | None = None) -> RobotError | None:
     """What is wrong with the robot in a trial, in proportion to the standard deviations; None of a right one.
 
-    The base is turned about the middle of the nominal goals. A part slips along the pads, the second and third axis of
-    the tip, and turns about their normal, the first.
-
     Args:
         name: As in a row.
     """
     if name == NO_ROBOT_ERROR:
         return None
+    return robot_error_of(name, scene, lambda which: stream(seed, which, salt))
+
+
+def robot_error_of(name: str, scene: Scene, stream_of: Callable[[int], np.random.Generator]) -> RobotError:
+    """What is wrong with a robot.
+
+    The base is turned about the middle of the nominal goals. A part slips along the pads, the second and third axis of
+    the tip, and turns about their normal, the first.
+
+    Args:
+        name: As in a row.
+        stream_of: Makes the random numbers of one of the streams `HAND_EYE`, `JOINTS`, `TOOL`, `IN_HAND`.
+    """
     sigmas = robot_sigmas(name)
-    drawn = stream(seed, HAND_EYE, salt).standard_normal(6)
+    drawn = stream_of(HAND_EYE).standard_normal(6)
     hand_eye = pose.at(1e-3 * sigmas.hand_eye[0] * drawn[:3], sigmas.hand_eye[1] * drawn[3:])
     middle = np.eye(4)
     middle[:3, 3] = scene.scenario.goals[:, :3, 3].mean(axis=0)
     # turned about the middle of the goals: E becomes T_m E T_m^-1
     if sigmas.hand_eye != (0.0, 0.0):
         hand_eye = middle @ hand_eye @ pose.inverse(middle)
-    joints = np.radians(sigmas.joints_deg) * stream(seed, JOINTS, salt).standard_normal(len(scene.arm.joints))
-    tool = pose.at(1e-3 * sigmas.tool_mm * stream(seed, TOOL, salt).standard_normal(3), (0.0, 0.0, 0.0))
+    joints = np.radians(sigmas.joints_deg) * stream_of(JOINTS).standard_normal(len(scene.arm.joints))
+    tool = pose.at(1e-3 * sigmas.tool_mm * stream_of(TOOL).standard_normal(3), (0.0, 0.0, 0.0))
     m = 1e-3 * sigmas.in_hand[0]
     deg = sigmas.in_hand[1]
-    slips = stream(seed, IN_HAND, salt).standard_normal((len(scene.scenario.assembly), 3))
+    slips = stream_of(IN_HAND).standard_normal((len(scene.scenario.assembly), 3))
     in_hand = np.array([pose.at((0.0, m * y, m * z), (deg * turn, 0.0, 0.0)) for y, z, turn in slips])
     return RobotError(hand_eye, joints, tool, in_hand)
 

@@ -18,6 +18,7 @@ from apo_bench.trial.by_heart import nominal_where_seen
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.outcome_columns import confidence_columns, method_columns, replay_columns
 from apo_bench.trial.planning import MethodResult, apply_method
+from apo_bench.trial.promise import abstained, promised_success
 from apo_bench.trial.recognised_contacts import count_contacts, with_recognised_contacts
 from apo_bench.trial.row import head, lost, misbehaved, result
 from apo_bench.trial.stages import (
@@ -165,7 +166,7 @@ def _row(
         truth: (n, 4, 4) goals of the layout; None if they are not known.
     """
     planned = apply_method(method or parsed(settings.method).plan, observation, truth, corrector_input, look, scene)
-    row = _outcome(settings, scene, planned, reference, truth, watch, cache)
+    row = _outcome(settings, scene, corrector_input, planned, reference, truth, watch, cache)
     row |= confidence_columns(planned, observation, corrector_input, truth)
     if planned.correction is not None:
         row |= {"seen_again": look.seen_again if look else 0}
@@ -189,20 +190,24 @@ def _corrector_input(settings: TrialSettings, observation: Observation, truth: A
 def _outcome(
     settings: TrialSettings,
     scene: Scene,
+    believed: Observation,
     planned: MethodResult,
     reference: Array,
     truth: Array | None,
     watch: Any,
     cache: ReplayCache | None,
 ) -> Row:
-    """Carry out the plan, if there is one."""
+    """Carry out the plan, if there is one that promises enough."""
     if planned.plan is None:
         assert planned.failure is not None
         return result(planned.failure, success=False) | method_columns(planned)
     searches = parsed(settings.method).searches
-    predicted: Row = {"predicted": predicted_outcome(planned.plan, scene, searches)}
+    promised = promised_success(planned.plan, believed, planned.correction, scene, settings.robot_error, searches)
+    said: Row = {"predicted": predicted_outcome(planned.plan, scene, searches), "promised": promised}
+    if promised < settings.abstain:
+        return result(abstained(promised, settings.abstain), success=False) | method_columns(planned) | said
     error = draw_robot_error(settings.robot_error, scene, settings.seed, settings.salt)
     attempt = replay_and_judge(planned.plan, scene, reference, watch, settings.fidelity, cache, searches, error=error)
     end = result(trial_outcome(attempt), success=attempt.verdict.success)
     driven: Row = {"joint_control": scene.arm.control}
-    return end | method_columns(planned) | predicted | driven | replay_columns(attempt, planned.plan, truth)
+    return end | method_columns(planned) | said | driven | replay_columns(attempt, planned.plan, truth)

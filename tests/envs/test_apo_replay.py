@@ -270,6 +270,7 @@ def test_info_never_holds_the_truth(watched: APOReplay) -> None:
     _, _, _, _, info = watched.step(np.full((3, 6), 0.05))
     said = info.pop("predicted")
     assert set(said) == {"fails", "operation", "code", "size_mm"}
+    assert 0.0 <= info.pop("promised") <= 1.0
     assert set(info) == {"is_success", "as_demonstrated", "loose_success", "stage", "code", "operation", "sentence"}
     assert set(first) == {"demonstration"}
     assert info["stage"] in (*outcomes.STAGES, "done")

@@ -33,7 +33,7 @@ def test_columns_of_a_row_are_the_settings_in_their_order_with_their_ranges() ->
         column = ROW_FIELDS[SETTINGS[name].column]
         if not SETTINGS[name].choices and name != "salt":
             assert column in (kind, kind | None)
-    assert {*KEY, *columns} - {*REQUIRED} == {"salt"}
+    assert {*KEY, *columns} - {*REQUIRED} == {"salt", "abstain"}
 
 
 def test_sweeps_have_an_axis_or_one_value_of_every_setting() -> None:
@@ -55,7 +55,7 @@ def test_every_setting_is_an_option_of_replay_and_sweep() -> None:
 def test_the_environment_has_the_same_defaults() -> None:
     defaults = {name: parameter.default for name, parameter in signature(APOReplay).parameters.items()}
     here = [name for name in SETTINGS if defaults.get(name) is not None and name != "scenario"]
-    assert here == ["careless", "eye", "grasp", "arm", "robot_error", "looks", "timestep_s"]
+    assert here == ["careless", "eye", "grasp", "arm", "robot_error", "looks", "abstain", "timestep_s"]
     assert [defaults[name] for name in here] == [SETTINGS[name].default for name in here]
     assert defaults["level"] == TrialSettings.level_mm == TrialSettings.level_deg
 

@@ -45,7 +45,7 @@ def _options(row: Mapping[str, Any], limits: Limits) -> list[str]:
             info = SETTINGS[name]
             add(info.option, float(row[info.column]), info.default)
     for name, info in SETTINGS.items():
-        value = row[info.column]
+        value = row.get(info.column, info.default)
         if name in _APART or (name == "noise" and measured) or (value == info.default and name not in _ALWAYS):
             continue
         add(info.option, milli(value) if info.scale != 1.0 else value if info.is_text else float(value))

@@ -21,6 +21,7 @@ NUMBERS: Mapping[str, str] = {
     "pose_error_fixed_mm": "reached error, fixed [mm]",
     "pose_error_free_mm": "reached error, free [mm]",
     "p_value": "p of the test",
+    "promised": "promised",
     "extra_operations": "extra operations",
     "peak_force_n": "peak force [N]",
     "sim_seconds": "simulated [s]",

@@ -16,7 +16,7 @@ from apo_bench.io.lossless_json import HALF_BUT_OF_FILES, HALF_LETTER, WHOLE_LET
 from apo_bench.io.plain_text import CONTROL, clean
 from apo_bench.records.row import REQUIRED, ROW_FIELDS, Row
 from apo_bench.records.setting_columns import KEY
-from apo_bench.records.settings import ROW, Name
+from apo_bench.records.settings import OLDER_ROW, ROW, Name, TrialSettings
 
 _Text = Annotated[str, Meta(max_length=100_000)]
 _Plain = None | bool | int | float | _Text
@@ -98,8 +98,12 @@ def row_of(line: bytes, where: str) -> Row:
         InputError: A line that is no row.
     """
     row = _decoded(_ROW, line, where, "this is not a row of a sweep")
-    if row["schema"] != ROW:
-        raise InputError(f"{where}: a row of schema '{_short(row['schema'])}' was given; {ROW} can be read.")
+    if row["schema"] not in (ROW, OLDER_ROW):
+        raise InputError(
+            f"{where}: a row of schema '{_short(row['schema'])}' was given; {OLDER_ROW} and {ROW} can be read."
+        )
+    if row["abstain"] is None:
+        row["abstain"] = TrialSettings.abstain
     fault = _fault(row)
     if fault is not None:
         raise _wrong(where, *fault)

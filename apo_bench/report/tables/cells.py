@@ -23,9 +23,13 @@ def cell_table(cells: Sequence[Cell]) -> Table:
         "relations": lambda c: knows_relations(c.method),
         "looks": lambda c: may_look(c.method),
         "robot_error": lambda c: True,
+        "abstain": lambda c: True,
     }
 
-    def axis(name: str, usual: str | int) -> Column:
+    abstains = any(c.abstain for c in cells)
+    promises = any(c.promised is not None for c in cells)
+
+    def axis(name: str, usual: str | float) -> Column:
         unusual = any(getattr(c, name) != usual for c in cells)
         return Column(name, name * unusual, text=lambda c: getattr(c, name) if met[name](c) else "any", words=True)
 
@@ -45,6 +49,7 @@ def cell_table(cells: Sequence[Cell]) -> Table:
             Column("fidelity"),
             axis("looks", 0),
             axis("robot_error", "none"),
+            axis("abstain", 0.0),
             Column("", "success", text=lambda c: percent(c.rate)),
             Column("", "95 % interval", text=lambda c: percents(c.interval)),
             Column("trials", "n"),
@@ -55,6 +60,12 @@ def cell_table(cells: Sequence[Cell]) -> Table:
                 lambda c: c.executed,
                 ("executed", "", "executed_rate", "executed_low_95", "executed_high_95"),
             ),
+            Column("abstained", "abstained" * abstains),
+            Column(
+                "wrong_when_executed", "wrong when executed" * abstains, text=lambda c: percent(c.wrong_when_executed)
+            ),
+            Column("promised", "promised" * promises, text=lambda c: percent(c.promised)),
+            Column("brier"),
             Column("as_demonstrated", value=lambda c: c.demonstrated),
             Column("as_demonstrated_rate", value=lambda c: c.demonstrated_rate),
             Column("", "as demonstrated", text=lambda c: percent(c.demonstrated_rate)),

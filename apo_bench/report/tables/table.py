@@ -110,7 +110,7 @@ def place_columns(of: Callable[[Any], Any] = cell_place, levels: bool = True) ->
         *(axis(name, of) for name in ("clearance_mm", "noise", "relations", "careless")),
         *((axis("level", of, name="level_mm"), axis("level_deg", of)) if levels else ()),
         axis("method", of, head="method", words=True),
-        *(axis(name, of) for name in ("grasp", "fidelity", "looks", "robot_error")),
+        *(axis(name, of) for name in ("grasp", "fidelity", "looks", "robot_error", "abstain")),
     )
 
 

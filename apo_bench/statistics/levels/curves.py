@@ -33,6 +33,7 @@ class CurveSetting(NamedTuple):
     fidelity: str = "full"
     looks: int = 0
     robot_error: str = "none"
+    abstain: float = 0.0
 
 
 @final

@@ -1,0 +1,235 @@
+"""How likely a plan is to succeed, said before anything moves, by whoever knows only what the planner knew.
+
+Every explanation that a corrector kept says where things may truly be. Truths are drawn from them, in proportion to
+their weights, along what contacts leave free; and robots, from the errors that are stated of the robot. Of each draw it
+is asked how far the plan is from failing: whether what would be brought there fits (the measures of `prediction`), and
+whether faces overlap as the judge asks if that draw is the truth. The mean over the draws is the *score*; a table that
+was made of other assemblies says how often plans with such a score succeeded.
+
+A simulator is asked only for a scene, for what its arm reaches and where a robot with errors brings things.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, placements
+from apo_bench.errors import InputError
+from apo_bench.geometry import Array
+from apo_bench.judging.rules import least_overlaps
+from apo_bench.prediction.arm import ArmMove
+from apo_bench.prediction.measures import Measure, measures
+from apo_bench.records import NO_ROBOT_ERROR, sentence
+from apo_bench.scenario.scenario import Scenario
+from apo_bench.trial.free_directions import FreeSpace, free_space
+from apo_bench.trial.promise_table import RATES, SCORES
+
+if TYPE_CHECKING:
+    from apo_bench.simulation.scene.scene import Scene
+
+TRUTHS = 32
+ROBOTS = 24
+"""Draws of the truth and, where the robot has stated errors, of those."""
+_STREAM = 2_030
+"""Of the draws of a promise, the same for every plan: no trial has streams of that many words."""
+_SLACK_MM = 0.05
+"""Standard deviation of what a measure leaves out: sag, rest, compliance."""
+_SLACK_SHARE = 0.1
+"""The same of an overlap."""
+_FARTHEST_M = 0.02
+_FARTHEST_RAD = 0.5
+"""A truth is drawn no further along a free direction of which nothing is known, one standard deviation."""
+_FALLS = 0.02
+"""How near to fitting a plan is in which a part would fall or lean."""
+_UNKNOWN = 0.5
+"""The share where no truth could be drawn at which faces meet."""
+_LEAST_WEIGHT = 0.01
+"""Explanations that are less likely are passed over."""
+
+
+class Explanation(NamedTuple):
+    """What may be so, and how likely that is beside the others."""
+
+    weight: float
+    believed: Observation
+    goals: Array
+    """(n, 4, 4), world frame, [m]."""
+    dropped: tuple[str, ...] = ()
+    spread: float = 1.0
+    """By how much what was seen is off more than is stated."""
+
+
+def explanations(correction: Correction | None, believed: Observation, goals: Array) -> tuple[Explanation, ...]:
+    """Those that a corrector kept; of one that keeps none, and of no corrector, that what it believed is so.
+
+    Args:
+        believed: What the corrector was given.
+        goals: (n, 4, 4), of the plan.
+    """
+    if correction is None:
+        return (Explanation(1.0, believed, goals),)
+    if not correction.hypotheses:
+        seen = correction.believed or believed
+        return (Explanation(1.0, seen, correction.goals, correction.dropped, _spread(correction)),)
+    likely = [each for each in correction.hypotheses if each.weight >= _LEAST_WEIGHT]
+    total = sum(each.weight for each in likely)
+    return tuple(
+        Explanation(each.weight / total, each.believed, each.goals, each.dropped, _spread(correction))
+        for each in likely
+    )
+
+
+def _spread(correction: Correction) -> float:
+    """The Birge ratio of a correction, 1 at least: the root of chi-square over its degrees of freedom."""
+    test = correction.test_after or correction.test
+    if test is None or test.freedom < 1 or not np.isfinite(test.chi_square):
+        return 1.0
+    return float(np.sqrt(max(1.0, test.chi_square / test.freedom)))
+
+
+def promised_success(
+    plan: Plan,
+    believed: Observation,
+    correction: Correction | None,
+    where: Scene | Scenario,
+    robot_error: str = NO_ROBOT_ERROR,
+    searches: bool = False,
+) -> float:
+    """The probability that a plan succeeds; the same for the same arguments.
+
+    Args:
+        believed: What the planner was given: what was seen, with the contacts that it was told.
+        correction: What the corrector made of it; None where none was asked, or a plan is nobody's correction.
+        where: What the plan is to be carried out in. Of a scenario, everything counts as in reach.
+        robot_error: The errors that are stated of the robot, as in rows; of a scenario they are not asked for.
+        searches: The robot feels for a hole where a motion into it is stopped.
+    """
+    explained = explanations(correction, believed, plan.goals)
+    score = plan_score(plan, believed.assembly, explained, where, robot_error, searches)
+    return float(np.interp(score, SCORES, RATES))
+
+
+def promise_sentence(promised: float) -> str:
+    """`success with probability 0.93`."""
+    return f"success with probability {promised:.2f}"
+
+
+def abstained(promised: float, least: float) -> Outcome:
+    """The ending of a trial whose plan promises less than was asked for."""
+    why = f": {promised:.2f}, where {least:g} is asked"
+    return Outcome("promise", "abstained", None, sentence("abstained") + why)
+
+
+def plan_score(
+    plan: Plan,
+    told: Assembly,
+    explained: Sequence[Explanation],
+    where: Scene | Scenario,
+    robot_error: str = NO_ROBOT_ERROR,
+    searches: bool = False,
+) -> float:
+    """How near to certain it is that a plan fits, from 0 to 1: what the table turns into a probability.
+
+    Args:
+        told: The assembly with the contacts that the planner was told.
+        where, robot_error, searches: As in `promised_success`.
+    """
+    ends, arm = ([plan], ()) if isinstance(where, Scenario) else _by_arm(plan, where, robot_error, searches)
+    if any(move.refused is not None for move in arm):
+        return 0.0
+    rng = np.random.default_rng(_STREAM)
+    fits = dict[tuple[str, ...], float]()
+    score = 0.0
+    for each in explained:
+        assembly = _without(told, each.dropped)
+        if each.dropped not in fits:
+            near = [_fit_share(replace(end, assembly=assembly), where, arm) for end in ends]
+            fits[each.dropped] = float(np.mean(near))
+        truths = drawn_truths(each, max(1, round(TRUTHS * each.weight)), rng)
+        score += each.weight * fits[each.dropped] * _cover_share(replace(plan, assembly=assembly), truths, where)
+    return score
+
+
+def _by_arm(plan: Plan, scene: Scene, robot_error: str, searches: bool) -> tuple[list[Plan], tuple[ArmMove, ...]]:
+    """Where robots with errors that were drawn bring the parts, and what the arm makes of the plan."""
+    from apo_bench.simulation.arm_checks.plan_check import arm_moves
+    from apo_bench.trial.robot_draws import brought
+    from apo_bench.trial.stages import robot_error_of
+
+    arm = arm_moves(plan, scene, searches)
+    if robot_error == NO_ROBOT_ERROR or any(move.refused is not None for move in arm):
+        return [plan], arm
+    errors = (robot_error_of(robot_error, scene, _stream_of(draw)) for draw in range(ROBOTS))
+    return [brought(plan, scene, error, searches) for error in errors], arm
+
+
+def drawn_truths(explanation: Explanation, count: int, rng: np.random.Generator) -> Array:
+    """Goals as they may truly be, (count, n, 4, 4): of an explanation, along what contacts leave free."""
+    goals = explanation.goals
+    try:
+        space = free_space(explanation.believed, goals)
+    except InputError:
+        space = None
+    if space is None:
+        return np.repeat(goals[None], count, axis=0)
+    widths = _widths(space, explanation.spread)
+    return np.array([space.tangent(widths * rng.standard_normal(len(space))) for _ in range(count)])
+
+
+def _widths(space: FreeSpace, spread: float) -> Array:
+    """How far to draw along each free direction, in its stated standard deviations, (f,)."""
+    far = np.linalg.norm(space.twists[:, :3], axis=1).max(axis=0) / _FARTHEST_M
+    turned = np.linalg.norm(space.twists[:, 3:], axis=1).max(axis=0) / _FARTHEST_RAD
+    return np.asarray(1.0 / np.maximum(1.0 / spread, np.maximum(far, turned)))
+
+
+def _stream_of(draw: int) -> Callable[[int], np.random.Generator]:
+    return lambda which: np.random.default_rng([_STREAM, draw, which])
+
+
+def _without(assembly: Assembly, dropped: tuple[str, ...]) -> Assembly:
+    """The assembly without contacts that are not believed."""
+    if not dropped:
+        return assembly
+    left = {
+        (relation.made, relation.contact)
+        for relation, kept in zip(assembly.relations(), assembly.without(dropped), strict=True)
+        if kept
+    }
+    operations = [
+        replace(operation, contacts=tuple(c for c in operation.contacts if (k, c) in left))
+        for k, operation in enumerate(assembly.operations)
+    ]
+    return replace(assembly, operations=tuple(operations))
+
+
+def _fit_share(plan: Plan, where: Scene | Scenario, arm: Sequence[ArmMove]) -> float:
+    """How surely everything that a plan is measured by is within what is allowed, from 0 to 1."""
+    scenario = where if isinstance(where, Scenario) else where.scenario
+    every = measures(plan, where.clearance_mm, scenario.thresholds, scenario.attach, arm=arm)
+    return float(np.prod([_within(measure) for measure in every]))
+
+
+def _within(measure: Measure) -> float:
+    from scipy.special import ndtr
+
+    if measure.kind in ("falls", "leans"):
+        return _FALLS if measure.exceeded else 1.0
+    return float(ndtr((measure.allowed - measure.size) / _SLACK_MM))
+
+
+def _cover_share(plan: Plan, truths: Array, where: Scene | Scenario) -> float:
+    """How surely faces overlap as the judge asks, were the plan carried out to the letter and the truth among these."""
+    from scipy.special import ndtr
+
+    scenario = where if isinstance(where, Scenario) else where.scenario
+    final = placements(plan.assembly, plan.start, plan.goals)[-1]
+    overlaps = least_overlaps(plan.assembly, final, truths)
+    possible = overlaps[np.isfinite(overlaps)]
+    if not len(possible):
+        return _UNKNOWN
+    return float(np.mean(ndtr((possible - scenario.thresholds.overlap_fraction) / _SLACK_SHARE)))

@@ -1,0 +1,170 @@
+"""Trials of `promise.py`: what a plan scored before it was carried out, and whether it succeeded; saved one by one."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+from apo_bench.assembly import Observation
+from apo_bench.records import TrialSettings
+from apo_bench.scenario.file import load_scenario
+from apo_bench.simulation.execution.replay_cache import ReplayCache
+from apo_bench.simulation.scene.scene import Scene
+from apo_bench.trial.planning import apply_method
+from apo_bench.trial.promise import explanations, plan_score
+from apo_bench.trial.stages import (
+    SimulatedDemonstration,
+    draw_robot_error,
+    observe_demonstration,
+    replay_and_judge,
+    scene_of,
+    simulate_demonstration,
+    trial_outcome,
+)
+from apo_bench.trial.trial import noise_of, run_trial
+from benchmarks.generated import scenario_of
+from benchmarks.promise_scenes import scenario_of_blocks
+
+CALIBRATION = "calibration"
+HELD_OUT = "held-out"
+NO_PLAN = "no_plan"
+"""In place of a code, where the method made no plan: nothing was promised."""
+SCENES = (
+    *("stick_in_tower", "vanished_fixture", "pocket_table", "carried_bridge", "block_on_block", "bridge_cycle"),
+    *("stick_on_castles", "l_bracket_on_plate", "wedge_under_roof", "dovetail", "shaft_through_brackets"),
+    *("peg_in_hole", "fixture_alignment"),
+)
+COLUMNS = ("set", "scenario", "seed", "method", "noise", "level", "robot_error", "success", "code", "score")
+_FAILURES = "apo_bench.observation.models.failures:"
+
+
+class Condition(NamedTuple):
+    """What the trials of a cell have in common, besides the scenario."""
+
+    method: str
+    noise: str
+    level: float = 1.0
+    robot_error: str = "none"
+
+
+CONDITIONS = (
+    *(Condition("contact-robust", noise) for noise in ("megapose-tless", "benchmarks/gross.toml")),
+    *(
+        Condition("contact-robust", _FAILURES + kind)
+        for kind in ("Flipped", "Stale", "Swapped", "AlongRay", "DisplacedView")
+    ),
+    *(Condition("contact-robust", "isotropic", level) for level in (8.0, 2.0)),
+    *(Condition("contact", noise) for noise in ("megapose-tless", _FAILURES + "Stale", _FAILURES + "Flipped")),
+    *(Condition("snap", "isotropic", level) for level in (0.1, 0.25)),
+    Condition("none", "isotropic", 0.1),
+    *(
+        Condition("contact-robust", "isotropic", 1.0, error)
+        for error in ("hand_eye:0.25/0.05", "hand_eye:0.1/0.02", "tool:0.25", "in_hand:0.25/0.5", "joints:0.02")
+    ),
+)
+Line = Mapping[str, str]
+
+
+def lines_of(path: Path) -> list[Line]:
+    """The trials that were saved."""
+    if not path.exists():
+        return []
+    with path.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+def save(path: Path, lines: Iterable[Line]) -> None:
+    """Add trials to a file."""
+    new = not path.exists()
+    with path.open("a", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, COLUMNS, lineterminator="\n")
+        if new:
+            writer.writeheader()
+        writer.writerows(lines)
+
+
+def calibration_trials(folder: Path, kind: str, numbers: Iterable[int], known: Iterable[Line]) -> Iterator[list[Line]]:
+    """All conditions of one generated assembly after the other.
+
+    An assembly that fails even by the truth has no trial.
+
+    Args:
+        kind: `blocks`, or `generated`: with round parts, which take ten times as long.
+    """
+    there = {(line["scenario"], line["seed"]) for line in known}
+    for number in numbers:
+        name = f"{kind}_{number}"
+        path = folder / name / f"{name}.toml"
+        seed = 2000 + 10 * number
+        if (name, str(seed)) in there:
+            continue
+        if not path.exists():
+            (scenario_of if kind == "generated" else scenario_of_blocks)(number, path.parent)
+        scene = _scene(str(path))
+        best = run_trial(_settings(str(path), scene.clearance_mm, 1, Condition("oracle", "isotropic")), scene)
+        if best["success"]:
+            yield list(_trials(CALIBRATION, name, str(path), scene, seed))
+
+
+def held_out_trials(seeds: Iterable[int], known: Iterable[Line]) -> Iterator[list[Line]]:
+    """All conditions of one scenario of the benchmark and one seed after the other."""
+    there = {(line["scenario"], line["seed"]) for line in known}
+    for seed in seeds:
+        for name in SCENES:
+            if (name, str(seed)) not in there:
+                yield list(_trials(HELD_OUT, name, name, _scene(name), seed))
+
+
+def _scene(scenario: str) -> Scene:
+    loaded = load_scenario(scenario)
+    return scene_of(_settings(scenario, loaded.clearance_mm, 0, CONDITIONS[0]), loaded)
+
+
+def _settings(scenario: str, clearance_mm: float, seed: int, condition: Condition) -> TrialSettings:
+    level = condition.level
+    named = condition._asdict()
+    del named["level"]
+    return TrialSettings(
+        scenario,
+        level_mm=level,
+        level_deg=level,
+        clearance_mm=clearance_mm,
+        seed=seed,
+        fidelity="contact",
+        **named,
+    )
+
+
+def _trials(kind: str, name: str, scenario: str, scene: Scene, seed: int) -> Iterator[Line]:
+    first = _settings(scenario, scene.clearance_mm, seed, CONDITIONS[0])
+    simulated = simulate_demonstration(scene, first.careless, seed)
+    cache = ReplayCache()
+    for condition in CONDITIONS if simulated.demonstration.code == "ok" else ():
+        success, code, score = _trial(replace(first, **_fields(condition)), scene, simulated, cache)
+        cells = (kind, name, seed, *condition._replace(level=f"{condition.level:g}"), success, code, score)
+        yield dict(zip(COLUMNS, map(str, cells), strict=True))
+
+
+def _fields(condition: Condition) -> dict[str, object]:
+    fields = condition._asdict()
+    level = fields.pop("level")
+    return fields | {"level_mm": level, "level_deg": level}
+
+
+def _trial(
+    settings: TrialSettings, scene: Scene, simulated: SimulatedDemonstration, cache: ReplayCache
+) -> tuple[str, str, str]:
+    """Success, code and score, as they are saved."""
+    seen: Observation = observe_demonstration(simulated, noise_of(settings, scene, simulated), settings.seed)
+    made = apply_method(settings.method, seen, None, seen, None, scene)
+    if made.plan is None:
+        return "0", NO_PLAN, ""
+    explained = explanations(made.correction, seen, made.plan.goals)
+    score = plan_score(made.plan, seen.assembly, explained, scene, settings.robot_error)
+    error = draw_robot_error(settings.robot_error, scene, settings.seed)
+    truth = simulated.layout.goals
+    attempt = replay_and_judge(made.plan, scene, truth, None, settings.fidelity, cache, error=error)
+    return str(int(attempt.verdict.success)), trial_outcome(attempt).code, repr(score)

@@ -1,0 +1,179 @@
+"""A plan promises how likely it is to succeed, from what its planner knew; below `abstain` nothing moves."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from apo_bench import Scene, TrialSettings, build_scene, load_scenario, run_trial
+from apo_bench.assembly import Hypothesis
+from apo_bench.correction.correctors import correct
+from apo_bench.geometry import pose
+from apo_bench.records import Row
+from apo_bench.statistics import tally
+from apo_bench.trial import trial
+from apo_bench.trial.planning import apply_method
+from apo_bench.trial.promise import Explanation, drawn_truths, promised_success
+from apo_bench.trial.promise_table import RATES, SCORES
+from apo_bench.trial.robot_draws import brought
+from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, robot_error_of, simulate_demonstration
+from apo_bench.trial.trial import noise_of
+
+SCENARIO = "stick_in_tower"
+SEED = 4
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return build_scene(load_scenario(SCENARIO))
+
+
+@pytest.fixture(scope="module")
+def simulated(scene: Scene) -> SimulatedDemonstration:
+    return simulate_demonstration(scene, 1.0, SEED)
+
+
+def asked(**more: Any) -> TrialSettings:
+    return TrialSettings(SCENARIO, **({"seed": SEED, "fidelity": "contact", "method": "contact"} | more))
+
+
+def row(scene: Scene, simulated: SimulatedDemonstration, **more: Any) -> Row:
+    return run_trial(asked(**more), scene, simulated=simulated)
+
+
+def test_the_table_never_falls() -> None:
+    assert (np.diff(SCORES) > 0.0).all()
+    assert (np.diff(RATES) >= 0.0).all()
+    assert 0.0 <= RATES[0] <= RATES[-1] <= 1.0
+
+
+def test_the_same_trial_promises_the_same_bytes(scene: Scene, simulated: SimulatedDemonstration) -> None:
+    one, two = (json.dumps(row(scene, simulated, robot_error="hand_eye:0.2/0.05")) for _ in range(2))
+    assert one == two
+    promised = json.loads(one)["promised"]
+    assert 0.0 <= promised <= 1.0
+
+
+def test_a_promise_never_sees_the_truth(scene: Scene, simulated: SimulatedDemonstration) -> None:
+    """The same observation before another truth: the same promise, though the plan is wrong now."""
+    off = pose.at((0.0, 0.0, 0.03), (0.0, 0.0, 40.0))
+    elsewhere = replace(simulated, layout=replace(simulated.layout, goals=simulated.layout.goals @ off))
+    right, wrong = row(scene, simulated), row(scene, elsewhere)
+    assert right["promised"] == wrong["promised"]
+    assert wrong["planned_error_fixed_mm"] > 10.0 > right["planned_error_fixed_mm"]
+
+
+def test_what_is_seen_worse_and_not_corrected_promises_less(scene: Scene) -> None:
+    careful = simulate_demonstration(scene, 0.0, SEED)
+    promised = []
+    for level in (0.0, 0.1, 0.5, 4.0):
+        settings = asked(level_mm=level, level_deg=level)
+        means = []
+        for seed in range(4):
+            seen = observe_demonstration(careful, noise_of(settings, scene, careful), seed)
+            planned = apply_method("none", seen, None, where=scene)
+            assert planned.plan is not None
+            means.append(promised_success(planned.plan, seen, None, scene.scenario))
+        promised.append(float(np.mean(means)))
+    assert promised == sorted(promised, reverse=True)
+    assert promised[0] - promised[-1] > 0.3
+
+
+def test_a_robot_that_is_further_off_promises_less(scene: Scene, simulated: SimulatedDemonstration) -> None:
+    seen = observe_demonstration(simulated, noise_of(asked(), scene, simulated), SEED)
+    planned = apply_method("contact", seen, None, where=scene)
+    assert planned.plan is not None
+    errors = ("none", "hand_eye:0.1/0.02", "hand_eye:1/0.2", "hand_eye:10/2")
+    promised = [promised_success(planned.plan, seen, planned.correction, scene, error) for error in errors]
+    assert promised == sorted(promised, reverse=True)
+    assert promised[0] > promised[-1]
+
+
+def test_a_right_robot_brings_parts_to_their_goals_and_a_shifted_one_beside_them(
+    scene: Scene, simulated: SimulatedDemonstration
+) -> None:
+    seen = observe_demonstration(simulated, noise_of(asked(), scene, simulated), SEED)
+    plan = correct(seen, "contact").plan(seen)
+    right = robot_error_of("tool:0", scene, lambda which: np.random.default_rng([1, which]))
+    np.testing.assert_allclose(brought(plan, scene, right).goals, plan.goals, atol=1e-12)
+    shifted = robot_error_of("hand_eye:1", scene, lambda which: np.random.default_rng([1, which]))
+    off = np.linalg.norm((brought(plan, scene, shifted).goals - plan.goals)[:, :3, 3], axis=1)
+    assert (off > 0.0).any()
+    assert (off <= 2.0 * np.linalg.norm(shifted.hand_eye[:3, 3]) + 1e-9).all(), "taken wrongly, and put wrongly"
+
+
+def test_the_likelier_a_rival_whose_contacts_the_plan_breaks_the_less_it_promises(
+    scene: Scene, simulated: SimulatedDemonstration
+) -> None:
+    """A goal half a millimetre beside its contacts: right if they are wrong, and wrong if they hold."""
+    seen = observe_demonstration(simulated, noise_of(asked(level_mm=0.1, level_deg=0.1), scene, simulated), SEED)
+    correction = correct(seen, "contact")
+    last = len(seen.assembly) - 1
+    relations = seen.assembly.relations()
+    made = [any(relations[j].made == last for j in arc) for arc in seen.assembly.arcs()]
+    dropped = tuple(f"R{i}" for i, own in enumerate(made, start=1) if own)
+    aside = correction.goals.copy()
+    aside[last, :3, 3] += 0.0005
+    plan = correction.plan(seen).with_goals(aside)
+    promised = []
+    for weight in (0.99, 0.8, 0.5, 0.1):
+        without = Hypothesis(weight, aside, correction.covariance, seen, (), dropped)
+        holding = Hypothesis(1.0 - weight, correction.goals, correction.covariance, seen)
+        torn = replace(correction, goals=aside, hypotheses=(without, holding))
+        promised.append(promised_success(plan, seen, torn, scene.scenario))
+    assert promised == sorted(promised, reverse=True)
+    assert promised[0] - promised[-1] > 0.2
+
+
+def test_truths_are_drawn_where_contacts_hold(scene: Scene, simulated: SimulatedDemonstration) -> None:
+    from apo_bench.assembly import largest_gap
+
+    seen = observe_demonstration(simulated, noise_of(asked(level_mm=0.1, level_deg=0.1), scene, simulated), SEED)
+    correction = correct(seen, "contact")
+    truths = drawn_truths(Explanation(1.0, seen, correction.goals), 8, np.random.default_rng(0))
+    gaps = [largest_gap(seen.assembly, seen.start, goals) for goals in truths]
+    moved = np.abs(truths - correction.goals).max(axis=(1, 2, 3))
+    assert max(gaps) < 1e-4 < max(moved)
+
+
+def test_below_abstain_the_arm_never_moves(
+    scene: Scene, simulated: SimulatedDemonstration, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    carried_out = row(scene, simulated)
+    least = min(1.0, carried_out["promised"] + 1e-6)
+    monkeypatch.setattr(trial, "replay_and_judge", lambda *given, **named: pytest.fail("the arm moved"))
+    kept = row(scene, simulated, abstain=least)
+    assert (kept["success"], kept["failure_stage"], kept["failure_code"]) == (False, "promise", "abstained")
+    assert (kept["sim_seconds"], kept["reached"]) == (None, None)
+    assert kept["promised"] == carried_out["promised"]
+
+
+def test_what_promises_enough_is_carried_out_as_without_abstaining(
+    scene: Scene, simulated: SimulatedDemonstration
+) -> None:
+    usual = row(scene, simulated)
+    same = row(scene, simulated, abstain=usual["promised"])
+    assert {name for name in usual if usual[name] != same[name]} == {"abstain", "spec_hash"}  # type: ignore[literal-required]
+
+
+def test_an_abstained_trial_counts_as_no_success_in_every_rate(scene: Scene, simulated: SimulatedDemonstration) -> None:
+    done = row(scene, simulated, abstain=0.01)
+    kept = done | {
+        "seed": SEED + 1,
+        "success": False,
+        "as_demonstrated": False,
+        "loose_success": False,
+        "failure_stage": "promise",
+        "failure_code": "abstained",
+        "promised": 0.005,
+    }
+    (cell,) = tally([done, kept])
+    assert (cell.trials, cell.successes, cell.rate) == (2, 1, 0.5)
+    assert (cell.abstained, cell.not_executed, cell.executed.trials) == (1, 1, 1)
+    assert cell.wrong_when_executed == 0.0
+    assert cell.promised == pytest.approx((done["promised"] + 0.005) / 2)
+    assert cell.brier == pytest.approx((1.0 - done["promised"]) ** 2)
