@@ -185,3 +185,8 @@ def test_scenes_that_run_at_the_same_time_keep_to_their_own_bounds(scene: Scene)
 
 def both(first: Scene, second: Scene) -> list[tuple[Scene, World]]:
     return [(first, first.work), (second, second.shown)]
+
+
+def test_an_array_that_is_kept_elsewhere_is_not_looked_for_beyond_the_structure() -> None:
+    model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
+    assert apart._offset(model, np.zeros(3), apart._MODEL_BYTES) is None

@@ -27,6 +27,9 @@ SURELY_M = 1e-7
 """Pairs that are farther apart are left out: much more than what MuJoCo or this may be wrong by."""
 _MOST = 8
 """So many models at a time; of others no pair is left out."""
+_MODEL_BYTES = 4_000
+_DATA_BYTES = 162_000
+"""Addresses are looked for in so much of the structures, both of which are larger in MuJoCo 3.17 and 4.0."""
 _ONE_AT_A_TIME = Lock()
 
 
@@ -72,7 +75,7 @@ def _models() -> Ints:
 
 @cache
 def _asked() -> Any:
-    """The compiled function; None without Numba."""
+    """The compiled function; None without Numba, or where MuJoCo keeps its arrays otherwise."""
     try:
         from numba import cfunc, njit, types
         from numba.extending import intrinsic
@@ -80,10 +83,12 @@ def _asked() -> Any:
         return None
     model = mujoco.MjModel.from_xml_string("<mujoco><worldbody><geom size='1'/></worldbody></mujoco>")
     data = mujoco.MjData(model)
-    contypes = _offset(model, model.geom_contype)
-    conaffinities = _offset(model, model.geom_conaffinity)
-    places = _offset(data, data.geom_xpos)
-    turns = _offset(data, data.geom_xmat)
+    contypes = _offset(model, model.geom_contype, _MODEL_BYTES)
+    conaffinities = _offset(model, model.geom_conaffinity, _MODEL_BYTES)
+    places = _offset(data, data.geom_xpos, _DATA_BYTES)
+    turns = _offset(data, data.geom_xmat, _DATA_BYTES)
+    if None in (contypes, conaffinities, places, turns):
+        return None
     known = int(_models().ctypes.data)
 
     def read(kind: Any) -> Any:
@@ -145,8 +150,8 @@ def _asked() -> Any:
     return asked
 
 
-def _offset(structure: Any, array: Any) -> int:
-    """Where in one of MuJoCo's structures the address of an array is, in bytes.
+def _offset(structure: Any, array: Any, most: int) -> int | None:
+    """Where in one of MuJoCo's structures the address of an array is, in bytes; None if it is not found there.
 
     Arrays without elements stand before it at the same address.
     """
@@ -154,5 +159,5 @@ def _offset(structure: Any, array: Any) -> int:
     def there(at: int) -> bool:
         return bool(ctypes.c_int64.from_address(structure._address + at).value == array.ctypes.data)
 
-    at = next(at for at in count(0, 8) if there(at))
-    return next(at for at in count(at, 8) if not there(at + 8))
+    at = next((at for at in range(0, most, 8) if there(at)), None)
+    return None if at is None else next(at for at in count(at, 8) if not there(at + 8))
