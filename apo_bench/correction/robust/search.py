@@ -175,10 +175,10 @@ class Search:
         while True:
             near = [self._try(states, best.dropped) for states in self._near(best.states)]
             near += [self._try(states, (relation,)) for states, relation in self._instead(best)]
-            best = min(near, key=_badness, default=best)
-            if not best.badness < best.badness:
+            better = min(near, key=_badness, default=best)
+            if not better.badness < best.badness:
                 return
-            best = best
+            best = better
 
     def _near(self, states: States) -> Iterator[States]:
         """With one view, that is no inlier, in another state."""
