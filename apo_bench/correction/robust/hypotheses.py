@@ -16,16 +16,18 @@ import numpy as np
 
 from apo_bench.assembly import Correction, Observation, OutlierModel, looking_away
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.consistency import CONTRADICTION_M, fit_deviation
+from apo_bench.correction.consistency import CONTRADICTION_M, fit_deviation, p_value
 from apo_bench.correction.contact import ContactCorrector, contact_apply
+from apo_bench.correction.heavy_tails import drawn_chi_squares, drawn_p_value
 from apo_bench.correction.inferred import inferred_goals
-from apo_bench.correction.problem import seen_system
+from apo_bench.correction.problem import problem_of, seen_system
 from apo_bench.correction.robust.views import GROSS, INLIER, ROOM, Sightings, State, merged
 from apo_bench.correction.solvers.compact import linearised_by
+from apo_bench.correction.solvers.posterior import jacobian_rank
 from apo_bench.correction.solvers.whitened import noise_factor
 from apo_bench.geometry import Array, frozen, pose, right_jacobian
 
-_as_begun = ContactCorrector("apply", elsewhere=False)
+as_begun = ContactCorrector("apply", elsewhere=False)
 _FAR_RAD = np.radians(10.0)
 """Parts that are believed to be turned by less (a standard deviation) are not far from where they were seen: no other
 start is tried, and what is far nevertheless is an outlier."""
@@ -110,7 +112,8 @@ class SolvedHypothesis:
         there = np.array(self.observation.goals)
         there[list(unknown)] = goals[list(unknown)]
         moved = replace(self.observation, goals=there)
-        return replace(self, observation=moved, correction=_corrected(moved, self.dropped))
+        correction = tested(moved, _corrected(moved, self.dropped), self.left_out)
+        return replace(self, observation=moved, correction=correction)
 
     def stands_at(self, goals: Array) -> bool:
         """Whether the faces of every contact that is believed look at each other at the goals, (n, 4, 4)."""
@@ -137,13 +140,38 @@ def hypothesis(case: Case, states: States, dropped: tuple[str, ...] = ()) -> Sol
     believed = believed_observation(case, states)
     trusted = all(state and set(state) == {INLIER} for state in states) and not dropped
     correction = as_stated(believed) if trusted else _corrected(believed, dropped)
-    return SolvedHypothesis(case, states, dropped, believed, correction)
+    return SolvedHypothesis(case, states, dropped, believed, tested(believed, correction, unbelieved(states)))
+
+
+def tested(believed: Observation, correction: Correction, left_out: tuple[int, ...]) -> Correction:
+    """With the test of what was seen alone: directions that only left-out operations could tell of are not tested.
+
+    What is inferred agrees with its contacts, so these operations add nothing to the squared length, and the rank of
+    their own columns is no degree of freedom.
+    """
+    if not left_out or correction.test is None or not correction.ok:
+        return correction
+    kept = believed.assembly.without(correction.dropped)
+    system = seen_system(believed).among(kept)
+    n = len(correction.goals)
+    own = linearised_by(system, correction.goals, np.tile(np.eye(6), (n, 1, 1)))[1]
+    own = own.reshape(n, 6, -1)[list(left_out)].reshape(6 * len(left_out), -1)
+    freedom = max(0, correction.test.freedom - jacobian_rank(own))
+    p = p_value(correction.test.chi_square, freedom)
+    if believed.tails is not None and freedom:
+        L = noise_factor(believed)
+        xi = pose.log(pose.inverse(believed.goals) @ correction.goals)
+        _, Jt = linearised_by(system, correction.goals, right_jacobian(xi) @ L)
+        play = problem_of((believed,)).play_covariance(kept)
+        drawn = drawn_chi_squares(believed, L, Jt, play, left_out)
+        p = drawn_p_value(drawn, correction.test.chi_square)
+    return replace(correction, test=replace(correction.test, freedom=freedom, p_value=p))
 
 
 def as_stated(observation: Observation) -> Correction:
     """The correction if every observation is believed as it is stated."""
     far = (observation.covariance.diagonal(axis1=1, axis2=2)[:, 3:] > _FAR_RAD**2).any()
-    return contact_apply(observation) if far else _as_begun(observation)
+    return contact_apply(observation) if far else as_begun(observation)
 
 
 def believed_observation(case: Case, states: States) -> Observation:
@@ -174,4 +202,4 @@ def soft_deviation(observation: Observation) -> Array:
 
 def _corrected(observation: Observation, dropped: tuple[str, ...]) -> Correction:
     """Without other starts: what is not believed is where contacts say already."""
-    return _as_begun.leaving_out(observation, dropped) if dropped else _as_begun(observation)
+    return as_begun.leaving_out(observation, dropped) if dropped else as_begun(observation)

@@ -9,12 +9,12 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Hypothesis, Look, Observation, OutlierModel, largest_gap
+from apo_bench.assembly import Correction, Hypothesis, Look, Observation, OutlierModel, largest_gap, lowered_together
 from apo_bench.correction.consistency import TEST_LEVEL
 from apo_bench.correction.contact import contact_apply
 from apo_bench.correction.inferred import inferred_goals
 from apo_bench.correction.robust.crowding import least_crowded
-from apo_bench.correction.robust.hypotheses import Case, SolvedHypothesis, as_stated
+from apo_bench.correction.robust.hypotheses import Case, SolvedHypothesis, as_begun, as_stated
 from apo_bench.correction.robust.search import Search
 from apo_bench.correction.robust.views import BROAD, FLIPPED, GROSS, INLIER, Sightings, looked_again, views_of
 from apo_bench.correction.status import refused_correction
@@ -48,14 +48,22 @@ class RobustCorrector:
         """
         return self.looking(observation, None)
 
+    def together(self, observations: Sequence[Observation]) -> list[Correction]:
+        """Correct observations of one assembly with the same start poses and play: at once those that pass the test."""
+        observations = lowered_together(observations)
+        plain = [i for i, observation in enumerate(observations) if self._is_plain(observation)]
+        made: list[Correction | None] = [None] * len(observations)
+        for i, correction in zip(plain, as_begun.together([observations[i] for i in plain]), strict=True):
+            made[i] = self._believed(correction)
+        return [one or self(observation) for one, observation in zip(made, observations, strict=True)]
+
     def looking(self, observation: Observation, look: Look | None) -> Correction:
         """Correct an observation, with looks at what is in doubt for as long as there is any and one is left."""
-        model = self.outliers or observation.outliers or OutlierModel()
-        if look is None and observation.seen.all() and model.surprises[INLIER] < model.surprises[GROSS]:
-            # One view of each operation, an inlier more likely than not: nothing is searched while the test holds.
-            correction = as_stated(observation)
-            if correction.ok and correction.test is not None and correction.test.p_value >= self.level:
-                return replace(correction, sentence=correction.sentence + _unexplained(correction))
+        if look is None and self._is_plain(observation):
+            correction = self._believed(as_stated(observation))
+            if correction is not None:
+                return correction
+        model = self._model(observation)
         views = views_of(observation)
         again = list[int]()
         first = None
@@ -73,6 +81,19 @@ class RobustCorrector:
         if best is None:
             return contact_apply(observation) if observation.seen.all() else refused_correction(observation)
         return _report(observation, first or best, search, with_room(best), again)
+
+    def _model(self, observation: Observation) -> OutlierModel:
+        return self.outliers or observation.outliers or OutlierModel()
+
+    def _is_plain(self, observation: Observation) -> bool:
+        """One view of each operation, an inlier more likely than not: nothing is searched while the test holds."""
+        model = self._model(observation)
+        return bool(observation.seen.all()) and model.surprises[INLIER] < model.surprises[GROSS]
+
+    def _believed(self, correction: Correction) -> Correction | None:
+        """A correction of all as it is stated, if that holds."""
+        holds = correction.ok and correction.test is not None and correction.test.p_value >= self.level
+        return replace(correction, sentence=correction.sentence + _unexplained(correction)) if holds else None
 
 
 contact_robust = RobustCorrector()
