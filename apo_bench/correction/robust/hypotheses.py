@@ -14,14 +14,23 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Observation, OutlierModel, looking_away
+from apo_bench.assembly import Correction, Observation, OutlierModel, SharedError, looking_away
 from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.consistency import CONTRADICTION_M, fit_deviation, p_value
 from apo_bench.correction.contact import ContactCorrector, contact_apply
 from apo_bench.correction.heavy_tails import drawn_chi_squares, drawn_p_value
 from apo_bench.correction.inferred import inferred_goals
 from apo_bench.correction.problem import problem_of, seen_system
-from apo_bench.correction.robust.views import GROSS, INLIER, ROOM, Sightings, State, merged
+from apo_bench.correction.robust.beliefs import (
+    DISPLACED,
+    INLIER,
+    ROOM,
+    VIEW,
+    States,
+    says_nothing,
+    together,
+)
+from apo_bench.correction.robust.views import Sightings, exchanged_view, merged
 from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.posterior import jacobian_rank
 from apo_bench.correction.solvers.whitened import noise_factor
@@ -31,8 +40,6 @@ as_begun = ContactCorrector("apply", elsewhere=False)
 _FAR_RAD = np.radians(10.0)
 """Parts that are believed to be turned by less (a standard deviation) are not far from where they were seen: no other
 start is tried, and what is far nevertheless is an outlier."""
-States = tuple[State, ...]
-"""Those of the views of each operation."""
 UNKNOWN = frozen(np.diag(np.repeat([0.05, 0.5], 3) ** 2))
 """(6, 6): how far the goal of an operation that was left out may be from what its contacts say of it, [m, rad]."""
 _WRONG_M = 0.05
@@ -104,7 +111,7 @@ class SolvedHypothesis:
         unlikely = correction.test.chi_square + false @ false + np.linalg.slogdet(S)[1]
         model = self.case.model
         states = zip(self.case.views, self.states, strict=True)
-        surprise = sum(merged(views, state, model).surprise for views, state in states)
+        surprise = sum(merged(views, state, model).surprise for views, state in states) + together(self.states, model)
         return float(unlikely + surprise + len(self.dropped) * model.relation_surprise)
 
     def at(self, goals: Array, unknown: Sequence[int]) -> SolvedHypothesis:
@@ -132,7 +139,7 @@ class SolvedHypothesis:
 
 def unbelieved(states: States) -> tuple[int, ...]:
     """Operations of which no view is believed."""
-    return tuple(k for k, state in enumerate(states) if all(belief == GROSS for belief in state))
+    return tuple(k for k, state in enumerate(states) if all(map(says_nothing, state)))
 
 
 def hypothesis(case: Case, states: States, dropped: tuple[str, ...] = ()) -> SolvedHypothesis:
@@ -181,18 +188,31 @@ def believed_observation(case: Case, states: States) -> Observation:
     covariance = np.array(first.covariance)
     unknown = list[int]()
     for k, (views, state) in enumerate(zip(case.views, states, strict=True)):
-        together = merged(views, state, case.model)
-        if together.goal is None:
+        every = merged(views, state, case.model, exchanged_view(case.views, state))
+        if every.goal is None:
             unknown.append(k)
             covariance[k] = UNKNOWN
         else:
-            goals[k] = together.goal
-            covariance[k] = together.covariance
+            goals[k] = every.goal
+            covariance[k] = every.covariance
     seen = np.ones(len(states), dtype=np.bool_)
     believed = replace(first, goals=goals, covariance=covariance, seen=seen)
     if any(len(views) > 1 for views in case.views):
         believed = replace(believed, shared=(), tails=None)
+    displaced = tuple(k for k, state in enumerate(states) if state == (DISPLACED,))
+    if displaced:
+        believed = _displaced(believed, displaced)
     return replace(believed, goals=inferred_goals(believed, unknown).goals) if unknown else believed
+
+
+def _displaced(observation: Observation, operations: tuple[int, ...]) -> Observation:
+    """With one displacement that some operations share, about their middle."""
+    P = np.eye(4)
+    P[:3, 3] = observation.goals[list(operations), :3, 3].mean(axis=0)
+    error = SharedError("view", operations, VIEW, P)
+    covariance = np.array(observation.covariance)
+    covariance[list(operations)] += error.added(observation.goals)
+    return replace(observation, covariance=covariance, shared=(*observation.shared, error))
 
 
 def soft_deviation(observation: Observation) -> Array:

@@ -3,7 +3,7 @@
 It can ask to look again: at what it left out or did not see, and at what it is least sure of.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import final
 
@@ -13,10 +13,11 @@ from apo_bench.assembly import Correction, Hypothesis, Look, Observation, Outlie
 from apo_bench.correction.consistency import TEST_LEVEL
 from apo_bench.correction.contact import contact_apply
 from apo_bench.correction.inferred import inferred_goals
+from apo_bench.correction.robust.beliefs import BROAD, DISPLACED, FLIPPED, GROSS, INLIER, SHIFTED, STALE
 from apo_bench.correction.robust.crowding import least_crowded
 from apo_bench.correction.robust.hypotheses import Case, SolvedHypothesis, as_begun, as_stated
 from apo_bench.correction.robust.search import Search
-from apo_bench.correction.robust.views import BROAD, FLIPPED, GROSS, INLIER, Sightings, looked_again, views_of
+from apo_bench.correction.robust.views import Sightings, looked_again, views_of
 from apo_bench.correction.status import refused_correction
 from apo_bench.geometry import Array
 
@@ -64,19 +65,20 @@ class RobustCorrector:
             if correction is not None:
                 return correction
         model = self._model(observation)
-        views = views_of(observation)
+        views = views_of(observation, model)
         again = list[int]()
         first = None
+        best = None
         while True:
             case = Case(observation, views, model)
             search = Search(case, self.level)
             baseless = _baseless(observation, views)
-            best = None if baseless else search.likeliest()
+            best = None if baseless else search.likeliest(best)
             first = first or search.first
             doubted = baseless or unsure(search, best)
             if look is None or not look.left or not doubted:
                 break
-            views = looked_again(views, look(doubted))
+            views = looked_again(views, look(doubted), observation, model)
             again += doubted
         if best is None:
             return contact_apply(observation) if observation.seen.all() else refused_correction(observation)
@@ -113,8 +115,9 @@ def unsure(search: Search, best: SolvedHypothesis | None) -> tuple[int, ...]:
 
 
 def with_room(hypothesis: SolvedHypothesis) -> SolvedHypothesis:
-    """A hypothesis whose left-out operations lead to where there is room for their parts."""
-    unknown = hypothesis.left_out
+    """A hypothesis whose operations of which little was seen lead to where there is room for their parts."""
+    shifted = tuple(k for k, state in enumerate(hypothesis.states) if state in ((SHIFTED,), (DISPLACED,)))
+    unknown = tuple(sorted({*hypothesis.left_out, *shifted}))
     covariance = hypothesis.correction.covariance
     if not unknown or covariance is None or not np.isfinite(hypothesis.badness):
         return hypothesis
@@ -192,11 +195,24 @@ def _doubts(search: Search, best: SolvedHypothesis) -> str:
 
 def _disbelieved(best: SolvedHypothesis) -> str:
     """`; left out what was seen of operation 2; seen turned: operation 3`, or empty."""
-    broad = tuple(k for k, state in enumerate(best.states) if BROAD in state and k not in best.left_out)
-    turned = tuple(k for k, state in enumerate(best.states) if max(state, default=0) >= FLIPPED)
-    lists = (("left out what was seen of", best.left_out), ("seen badly:", broad), ("seen turned:", turned))
+    states = best.states
+    stale = tuple(k for k in best.left_out if STALE in states[k])
+    lists = (
+        ("left out what was seen of", tuple(k for k in best.left_out if k not in stale)),
+        ("seen where the part was before:", stale),
+        ("seen badly:", _those(best, lambda belief: belief == BROAD)),
+        ("seen too near or too far:", _those(best, lambda belief: belief == SHIFTED)),
+        ("seen turned:", _those(best, lambda belief: belief >= FLIPPED)),
+        ("seen in each other's place:", _those(best, lambda belief: belief < 0)),
+        ("seen displaced together:", _those(best, lambda belief: belief == DISPLACED)),
+    )
     words = "".join(f"; {what} {_operations(those)}" for what, those in lists if those)
     return words + "".join(f"; left out {relation}" for relation in best.dropped)
+
+
+def _those(best: SolvedHypothesis, which: Callable[[int], bool]) -> tuple[int, ...]:
+    """Operations with a view that is believed so, and that are not left out."""
+    return tuple(k for k, state in enumerate(best.states) if any(map(which, state)) and k not in best.left_out)
 
 
 def _looks(again: list[int]) -> str:

@@ -18,16 +18,17 @@ from numpy.typing import NDArray
 from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.consistency import p_value
 from apo_bench.correction.problem import seen_system
+from apo_bench.correction.robust.beliefs import DISPLACED, GROSS, INLIER, State, States, is_false
 from apo_bench.correction.robust.hypotheses import (
     Case,
     SolvedHypothesis,
-    States,
     believed_observation,
     hypothesis,
     soft_deviation,
     unbelieved,
 )
-from apo_bench.correction.robust.views import FLIPPED, GROSS, INLIER, State, beliefs
+from apo_bench.correction.robust.nearby import changed, continued, displaced_together, likely_beliefs, swaps
+from apo_bench.correction.robust.views import beliefs
 from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.posterior import jacobian_rank
 from apo_bench.correction.solvers.whitened import noise_factor
@@ -44,6 +45,12 @@ _MOST_SOLVED = 24
 _BY = 15.0
 """An operation that is less likely to be wrong, by so much in -2 log, counts like one more of a set."""
 _MOST_STARTS = 32
+_EQUALLY = 2.0
+"""States of an operation that differ by less, in -2 log, are as likely as each other by themselves."""
+_MOST_OTHER = 3
+"""States of one operation that are tried in a set."""
+_MOST_ALTOGETHER = 100
+"""Hypotheses beyond which no larger sets are tried, and so many more beyond which nothing is refined."""
 _MOST_KEPT = 16
 _LEAST_KEPT = 1e-3
 """Hypotheses that are told of at most, and how likely one is at least beside the likeliest."""
@@ -65,13 +72,19 @@ class Search:
         self.first: SolvedHypothesis | None = None
         """What is likeliest of each operation by itself."""
 
-    def likeliest(self) -> SolvedHypothesis | None:
-        """None if nothing that was tried has a solution."""
+    def likeliest(self, known: SolvedHypothesis | None = None) -> SolvedHypothesis | None:
+        """None if nothing that was tried has a solution; `known` is what was likeliest before the last look."""
         start = self._start()
         self.first = self._try(start)
         if self.first.p_value >= self._level:
             return self.first
-        best = self._smallest(start)
+        best = None
+        if known is not None:
+            best = self._try(continued(self._case.views, known.states, self._case.model), known.dropped)
+            self._refined(best)
+            best = min(self._known(), key=_badness, default=None)
+        if best is None or best.p_value < self._level:
+            best = self._smallest(start)
         if best is not None:
             self._refined(best)
             # Where a relation is to blame, the likeliest observation to blame in its place may have been turned.
@@ -116,7 +129,7 @@ class Search:
 
     def _start(self) -> States:
         """The likeliest state of each operation by itself; of those that are equally likely what contacts like best."""
-        likeliest = [[state for s, state in own if s <= own[0][0]] for own in self._beliefs]
+        likeliest = [[state for s, state in own if s <= own[0][0] + _EQUALLY] for own in self._beliefs]
         several = [one for _, one in zip(range(_MOST_STARTS), product(*likeliest), strict=False)]
         if len(several) == 1:
             return several[0]
@@ -127,6 +140,8 @@ class Search:
         tried = [self._try(start, (relation,)) for relation in self._relations(start)]
         gross = self._case.model.surprises[GROSS]
         for size, sets in enumerate(self._sets(start), start=1):
+            if len(self._solved) > _MOST_ALTOGETHER:
+                break
             tried += [self._try(states) for states in sets]
             held = [solved for solved in tried if solved.p_value >= self._level]
             # A wrong relation is no answer while as many gross views as could be tried next are likelier.
@@ -139,7 +154,7 @@ class Search:
         """States in which some operations are in another than at the start, size by size, the best agreeing first."""
         rest = ContactAgreement(self._case, start)
         seen = [k for k, views in enumerate(self._case.views) if views]
-        other = {k: [state for _, state in self._beliefs[k] if state != start[k]] for k in seen}
+        other = {k: [state for _, state in self._beliefs[k] if state != start[k]][:_MOST_OTHER] for k in seen}
         size = {k: self._size(k, start[k]) for k in other}
         for some in self._grown(size, rest):
             rated = sorted(((rest.agreement(s), s) for s in some), key=lambda set_: (-set_[0], set_[1]))
@@ -163,34 +178,42 @@ class Search:
     def _size(self, k: int, now: State) -> int:
         """How many outliers it is worth that operation k is in another state."""
         known = {state: surprise for surprise, state in self._beliefs[k]}
-        least = min(surprise for state, surprise in known.items() if state != now)
+        least = min((surprise for state, surprise in known.items() if state != now), default=known[now])
         return max(1, round((least - known[now]) / _BY))
 
     def _believed(self, k: int) -> State:
         """The likeliest state of an operation in which a view is believed."""
-        return next(state for _, state in self._beliefs[k] if set(state) != {GROSS})
+        return next(state for _, state in self._beliefs[k] if INLIER in state)
 
     def _refined(self, best: SolvedHypothesis) -> None:
         """One state after the other changed for the better, until none is; or relations in place of observations."""
-        while True:
-            near = [self._try(states, best.dropped) for states in self._near(best.states)]
+        most = len(self._solved) + _MOST_ALTOGETHER
+        while len(self._solved) < most:
+            near = [self._try(states, best.dropped) for states in self._near(best)]
             near += [self._try(states, (relation,)) for states, relation in self._instead(best)]
             better = min(near, key=_badness, default=best)
             if not better.badness < best.badness:
                 return
             best = better
 
-    def _near(self, states: States) -> Iterator[States]:
-        """With one view, that is no inlier, in another state."""
+    def _near(self, best: SolvedHypothesis) -> Iterator[States]:
+        """With one view, that is no inlier, in another state; with two exchanged; with some displaced together."""
+        states = best.states
         for k, (views, state) in enumerate(zip(self._case.views, states, strict=True)):
-            for i, (view, now) in enumerate(zip(views, state, strict=True)):
-                every = range(FLIPPED + len(view.flips)) if now != INLIER else ()
-                others = (belief for belief in every if belief != now)
-                yield from (changed(states, (k,), ((*state[:i], belief, *state[i + 1 :]),)) for belief in others)
+            for i, now in enumerate(state):
+                if now in (INLIER, DISPLACED):
+                    continue
+                blank = changed(states, (k,), ((*state[:i], GROSS, *state[i + 1 :]),))
+                yield blank
+                without = self._try(blank, best.dropped)
+                for belief in likely_beliefs(self._case, without, k, views[i]):
+                    yield changed(states, (k,), ((*state[:i], belief, *state[i + 1 :]),))
+        yield from swaps(self._case, states)
+        yield from displaced_together(states)
 
     def _instead(self, best: SolvedHypothesis) -> Iterator[tuple[States, str]]:
         """A relation in place of an operation that is in doubt and that it depends on."""
-        doubted = [k for k, state in enumerate(best.states) if any(belief != INLIER for belief in state)]
+        doubted = [k for k, state in enumerate(best.states) if any(map(is_false, state))]
         for k in () if best.dropped else doubted:
             states = changed(best.states, (k,), (self._believed(k),))
             yield from ((states, relation) for relation in self._relations(states, k))
@@ -208,12 +231,6 @@ class Search:
                 single = contacts_of(assembly, relation)
                 if len(single) > 1:
                     yield from (name for name, group in single.items() if rest.agreement((), group) >= _LENIENT)
-
-
-def changed(states: States, which: Sequence[int], to: Sequence[State]) -> States:
-    """With the states of some operations replaced."""
-    new = dict(zip(which, to, strict=True))
-    return tuple(new.get(k, state) for k, state in enumerate(states))
 
 
 def _badness(solved: SolvedHypothesis) -> float:
