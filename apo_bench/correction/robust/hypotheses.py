@@ -14,7 +14,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Observation, OutlierModel, SharedError, looking_away
+from apo_bench.assembly import Consistency, Correction, Observation, OutlierModel, SharedError, looking_away
 from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.consistency import CONTRADICTION_M, fit_deviation, p_value
 from apo_bench.correction.contact import ContactCorrector, contact_apply
@@ -29,6 +29,14 @@ from apo_bench.correction.robust.beliefs import (
     States,
     says_nothing,
     together,
+)
+from apo_bench.correction.robust.noise_scale import (
+    LEAST,
+    likeliest_scale,
+    noisier,
+    region_scale,
+    scale_surprise,
+    scaled_test,
 )
 from apo_bench.correction.robust.views import Sightings, exchanged_view, merged
 from apo_bench.correction.solvers.compact import linearised_by
@@ -69,6 +77,13 @@ class SolvedHypothesis:
     observation: Observation
     """Views merged, and operations of which none is believed where contacts say, with `UNKNOWN`."""
     correction: Correction
+    scale: float = 1.0
+    """How much larger than stated the noise of all views is."""
+
+    @property
+    def key(self) -> tuple[States, tuple[str, ...], bool]:
+        """What it believes."""
+        return self.states, self.dropped, self.scale > 1.0
 
     @property
     def left_out(self) -> tuple[int, ...]:
@@ -80,6 +95,7 @@ class SolvedHypothesis:
         """Whether anything is not believed as it was stated."""
         return (
             bool(self.dropped)
+            or self.scale > 1.0
             or any(belief != INLIER for state in self.states for belief in state)
             or () in self.states
         )
@@ -93,7 +109,7 @@ class SolvedHypothesis:
             return np.inf
         # What contacts leave at the observation is Gaussian with covariance S = J J^t + soft^2: -2 log of its density
         # is the squared length of the correction and log det S. Of an operation that was left out `ROOM` is as likely.
-        wide = np.array(observation.covariance)
+        wide = observation.covariance * self.scale**2
         wide[list(self.left_out)] = ROOM
         system = seen_system(observation)
         xi = pose.log(pose.inverse(observation.goals) @ correction.goals)
@@ -108,11 +124,36 @@ class SolvedHypothesis:
             soft = np.where(wrong, each, soft)
             false = np.where(wrong, system.residual(correction.goals) / each, 0.0)
         S = Jt.T @ Jt + np.diag(soft * soft)
-        unlikely = correction.test.chi_square + false @ false + np.linalg.slogdet(S)[1]
+        unlikely = correction.test.chi_square / self.scale**2 + false @ false + np.linalg.slogdet(S)[1]
         model = self.case.model
         states = zip(self.case.views, self.states, strict=True)
         surprise = sum(merged(views, state, model).surprise for views, state in states) + together(self.states, model)
+        if self.scale > 1.0:
+            surprise += scale_surprise(self.scale, correction.test.freedom)
         return float(unlikely + surprise + len(self.dropped) * model.relation_surprise)
+
+    def noisier(self) -> SolvedHypothesis:
+        """The same if all noise is larger than stated, by as much as is likeliest: the goals stay."""
+        test = self.correction.test
+        if test is None or self.observation.shared:
+            return self
+        scale = likeliest_scale(test.chi_square, test.freedom)
+        return replace(self, scale=scale) if scale >= LEAST else self
+
+    @property
+    def stated(self) -> Observation:
+        """What is believed with the noise that is."""
+        return noisier(self.observation, self._region_scale) if self.scale > 1.0 else self.observation
+
+    @property
+    def covariance(self) -> Array | None:
+        """Of the goals, (n, 6, 6), [m, rad], with the noise that is."""
+        C = self.correction.covariance
+        return C if C is None or self.scale == 1.0 else C * self._region_scale**2
+
+    @property
+    def _region_scale(self) -> float:
+        return region_scale(self.scale, self.correction.test.freedom) if self.correction.test else self.scale
 
     def at(self, goals: Array, unknown: Sequence[int]) -> SolvedHypothesis:
         """The same with the inferred goals of some operations elsewhere, at these of goals (n, 4, 4)."""
@@ -134,7 +175,13 @@ class SolvedHypothesis:
     @property
     def p_value(self) -> float:
         """Of the test of its correction; 0 if there is no solution."""
-        return self.correction.test.p_value if self.correction.test and np.isfinite(self.badness) else 0.0
+        return self.test.p_value if self.test and np.isfinite(self.badness) else 0.0
+
+    @property
+    def test(self) -> Consistency | None:
+        """Of its correction, with the noise that is."""
+        test = self.correction.test
+        return test if test is None or self.scale == 1.0 else scaled_test(test, self.scale)
 
 
 def unbelieved(states: States) -> tuple[int, ...]:

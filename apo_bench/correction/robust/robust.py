@@ -16,11 +16,14 @@ from apo_bench.correction.inferred import inferred_goals
 from apo_bench.correction.robust.beliefs import BROAD, DISPLACED, FLIPPED, GROSS, INLIER, SHIFTED, STALE
 from apo_bench.correction.robust.crowding import least_crowded
 from apo_bench.correction.robust.hypotheses import Case, SolvedHypothesis, as_begun, as_stated
+from apo_bench.correction.robust.noise_scale import LEAST, likeliest_scale, noisier, region_scale, scale_words
 from apo_bench.correction.robust.search import Search
 from apo_bench.correction.robust.views import Sightings, looked_again, views_of
 from apo_bench.correction.status import refused_correction
 from apo_bench.geometry import Array
 
+TEMPERATURE = 1.0
+"""At which weights hold, of scenes that are in no benchmark: `python -m benchmarks.weights`."""
 _SURE = 0.01
 """An operation is looked at again if it is likelier than this that another state is the right one, ..."""
 _SURE_DEVIATION = np.repeat([5e-3, np.radians(5.0)], 3)
@@ -36,6 +39,8 @@ class RobustCorrector:
     """None stands for what the observation states, or for what is usual."""
     level: float = TEST_LEVEL
     """A set of observations is believed if the p-value of its correction is not below."""
+    temperature: float = TEMPERATURE
+    """Weights of hypotheses are likelihoods to the power of its inverse."""
 
     def __call__(self, observation: Observation) -> Correction:
         """Correct an observation.
@@ -55,13 +60,13 @@ class RobustCorrector:
         plain = [i for i, observation in enumerate(observations) if self._is_plain(observation)]
         made: list[Correction | None] = [None] * len(observations)
         for i, correction in zip(plain, as_begun.together([observations[i] for i in plain]), strict=True):
-            made[i] = self._believed(correction)
+            made[i] = self._believed(observations[i], correction)
         return [one or self(observation) for one, observation in zip(made, observations, strict=True)]
 
     def looking(self, observation: Observation, look: Look | None) -> Correction:
         """Correct an observation, with looks at what is in doubt for as long as there is any and one is left."""
         if look is None and self._is_plain(observation):
-            correction = self._believed(as_stated(observation))
+            correction = self._believed(observation, as_stated(observation))
             if correction is not None:
                 return correction
         model = self._model(observation)
@@ -71,7 +76,7 @@ class RobustCorrector:
         best = None
         while True:
             case = Case(observation, views, model)
-            search = Search(case, self.level)
+            search = Search(case, self.level, self.temperature)
             baseless = _baseless(observation, views)
             best = None if baseless else search.likeliest(best)
             first = first or search.first
@@ -92,10 +97,22 @@ class RobustCorrector:
         model = self._model(observation)
         return bool(observation.seen.all()) and model.surprises[INLIER] < model.surprises[GROSS]
 
-    def _believed(self, correction: Correction) -> Correction | None:
-        """A correction of all as it is stated, if that holds."""
-        holds = correction.ok and correction.test is not None and correction.test.p_value >= self.level
-        return replace(correction, sentence=correction.sentence + _unexplained(correction)) if holds else None
+    def _believed(self, observation: Observation, correction: Correction) -> Correction | None:
+        """A correction of all as it is stated, if that holds; noise that is larger makes regions larger."""
+        test = correction.test
+        if not correction.ok or test is None or test.p_value < self.level:
+            return None
+        scale = likeliest_scale(test.chi_square, test.freedom)
+        if scale < LEAST or observation.shared:
+            return correction
+        C = correction.covariance
+        return replace(
+            correction,
+            sentence=correction.sentence + scale_words(scale),
+            covariance=None if C is None else C * region_scale(scale, test.freedom) ** 2,
+            believed=noisier(observation, region_scale(scale, test.freedom)),
+            noise_scale=scale,
+        )
 
 
 contact_robust = RobustCorrector()
@@ -116,7 +133,7 @@ def unsure(search: Search, best: SolvedHypothesis | None) -> tuple[int, ...]:
 
 def with_room(hypothesis: SolvedHypothesis) -> SolvedHypothesis:
     """A hypothesis whose operations of which little was seen lead to where there is room for their parts."""
-    shifted = tuple(k for k, state in enumerate(hypothesis.states) if state in ((SHIFTED,), (DISPLACED,)))
+    shifted = tuple(k for k, state in enumerate(hypothesis.states) if state == (SHIFTED,))
     unknown = tuple(sorted({*hypothesis.left_out, *shifted}))
     covariance = hypothesis.correction.covariance
     if not unknown or covariance is None or not np.isfinite(hypothesis.badness):
@@ -141,16 +158,18 @@ def _report(
     """The correction of what is believed, with what was seen at first."""
     correction = best.correction
     if not best.doubts and not again:
-        return replace(correction, sentence=correction.sentence + _unexplained(correction))
+        return replace(correction, sentence=correction.sentence + _unexplained(best))
     before = largest_gap(observation.assembly, observation.start, observation.goals)
     return replace(
         correction,
-        sentence=correction.sentence + _unexplained(correction) + _doubts(search, best) + _looks(again),
+        sentence=correction.sentence + _unexplained(best) + _doubts(search, best) + _looks(again),
+        covariance=best.covariance,
+        noise_scale=best.scale,
         gap_before_m=before if observation.seen.all() else np.nan,
         test=first.correction.test or correction.test,
-        test_after=correction.test,
+        test_after=best.test,
         left_out=best.left_out,
-        believed=best.observation,
+        believed=best.stated,
         hypotheses=_hypotheses(search, best),
     )
 
@@ -161,24 +180,24 @@ def _hypotheses(search: Search, best: SolvedHypothesis) -> tuple[Hypothesis, ...
         Hypothesis(
             weight,
             solved.correction.goals,
-            solved.correction.covariance,
-            solved.observation,
+            solved.covariance,
+            solved.stated,
             solved.left_out,
             solved.dropped,
             _disbelieved(solved).removeprefix("; "),
+            solved.scale,
         )
         for weight, solved in (
-            (weight, best if (solved.states, solved.dropped) == (best.states, best.dropped) else solved)
-            for weight, solved in search.weighted()
+            (weight, best if solved.key == best.key else solved) for weight, solved in search.weighted()
         )
     )
 
 
-def _unexplained(correction: Correction) -> str:
+def _unexplained(best: SolvedHypothesis) -> str:
     """What the test says that no outlier explains better."""
-    if correction.test is None or correction.test.passes:
+    if best.test is None or best.test.passes:
         return ""
-    p = correction.test.p_value
+    p = best.test.p_value
     return f"; the correction is longer than the stated noise explains (p = {p:.2g}), no outlier does"
 
 
@@ -207,7 +226,7 @@ def _disbelieved(best: SolvedHypothesis) -> str:
         ("seen displaced together:", _those(best, lambda belief: belief == DISPLACED)),
     )
     words = "".join(f"; {what} {_operations(those)}" for what, those in lists if those)
-    return words + "".join(f"; left out {relation}" for relation in best.dropped)
+    return words + "".join(f"; left out {relation}" for relation in best.dropped) + scale_words(best.scale)
 
 
 def _those(best: SolvedHypothesis, which: Callable[[int], bool]) -> tuple[int, ...]:

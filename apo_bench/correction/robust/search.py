@@ -33,6 +33,7 @@ from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.posterior import jacobian_rank
 from apo_bench.correction.solvers.whitened import noise_factor
 from apo_bench.correction.suspects import contacts_of
+from apo_bench.geometry import Array
 
 MOST_EXACT = 12
 """Operations up to which every set is looked at; of more, sets grow by one operation at a time."""
@@ -60,14 +61,15 @@ _LEAST_KEPT = 1e-3
 class Search:
     """The hypotheses of one case, each solved once."""
 
-    def __init__(self, case: Case, level: float) -> None:
+    def __init__(self, case: Case, level: float, temperature: float = 1.0) -> None:
         """Args:
-        level: As of `RobustCorrector`.
+        level: As of `RobustCorrector`, and so is `temperature`.
         """
+        self._temperature = temperature
         self._case = case
         self._level = level
         self._beliefs = [beliefs(views, case.model) for views in case.views]
-        self._solved: dict[tuple[States, tuple[str, ...]], SolvedHypothesis] = {}
+        self._solved: dict[tuple[States, tuple[str, ...], bool], SolvedHypothesis] = {}
         self.operations = len(case.views)
         self.first: SolvedHypothesis | None = None
         """What is likeliest of each operation by itself."""
@@ -77,7 +79,8 @@ class Search:
         start = self._start()
         self.first = self._try(start)
         if self.first.p_value >= self._level:
-            return self.first
+            self._rescaled()
+            return min(self._known(), key=_badness)
         best = None
         if known is not None:
             best = self._try(continued(self._case.views, known.states, self._case.model), known.dropped)
@@ -91,7 +94,15 @@ class Search:
             rival = self.rival(best) if best.dropped else None
             if rival is not None:
                 self._refined(rival)
+        self._rescaled()
         return min(self._known(), key=_badness, default=None)
+
+    def _rescaled(self) -> None:
+        """What if noise is larger than stated: all that was seen believed, or what is likeliest."""
+        best = min(self._known(), key=_badness, default=None)
+        for one in (self.first, best):
+            if one is not None and one.scale == 1.0 and (noisier := one.noisier()).scale > 1.0:
+                self._solved[noisier.key] = noisier
 
     def share(self, best: SolvedHypothesis, k: int) -> float:
         """How likely it is, of all hypotheses that were solved, that operation k is not in the state that was found."""
@@ -105,7 +116,7 @@ class Search:
     def weight(self, best: SolvedHypothesis, which: Callable[[SolvedHypothesis], bool]) -> float:
         """How likely some of the hypotheses are together."""
         known = self._known()
-        weights = np.exp([-0.5 * (other.badness - best.badness) for other in known])
+        weights = self._weights(known, best)
         return float(weights @ [which(other) for other in known] / weights.sum())
 
     def weighted(self) -> list[tuple[float, SolvedHypothesis]]:
@@ -113,16 +124,20 @@ class Search:
         known = sorted(self._known(), key=_badness)[:_MOST_KEPT]
         if not known:
             return []
-        weights = np.exp([-0.5 * (solved.badness - known[0].badness) for solved in known])
+        weights = self._weights(known, known[0])
         kept = [(weight, solved) for weight, solved in zip(weights, known, strict=True) if weight >= _LEAST_KEPT]
         whole = sum(weight for weight, _ in kept)
         return [(float(weight / whole), solved) for weight, solved in kept]
+
+    def _weights(self, some: list[SolvedHypothesis], best: SolvedHypothesis) -> Array:
+        """How likely some are beside the best: their likelihood by the temperature."""
+        return np.exp([-0.5 / self._temperature * (one.badness - best.badness) for one in some])
 
     def _known(self) -> list[SolvedHypothesis]:
         return [solved for solved in self._solved.values() if np.isfinite(solved.badness)]
 
     def _try(self, states: States, dropped: tuple[str, ...] = ()) -> SolvedHypothesis:
-        key = states, dropped
+        key = states, dropped, False
         if key not in self._solved:
             self._solved[key] = hypothesis(self._case, states, dropped)
         return self._solved[key]
