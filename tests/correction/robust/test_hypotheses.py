@@ -28,8 +28,9 @@ from apo_bench.geometry import pose
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.failures import Flipped
-from apo_bench.observation.noise import Level
+from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.observing import observe
+from apo_bench.observation.relations import make_relations, with_relations
 from tests.correction.robust.test_looks import Again, at_the_same_place
 from tests.correction.robust.test_robust import astray, fixed_error_mm, look, shown
 
@@ -205,3 +206,15 @@ def test_the_likeliest_scale_is_where_the_posterior_is_largest():
         t = np.log(scales)
         surprises = chi_square / scales**2 + 2.0 * freedom * t + t**2
         assert likeliest_scale(chi_square, freedom) == pytest.approx(scales[surprises.argmin()], abs=2e-4)
+
+
+def test_a_hypothesis_at_which_the_solver_finds_no_number_is_none():
+    """A contact too many in ten operations: one of the sets that are tried leads the compiled solver to no number."""
+    scenario = load_scenario("gearbox")
+    layout = draw_layout(scenario, np.random.default_rng([13, 7]), 0.0)
+    first = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((10, 6, 6)))
+    seen = make_noise("isotropic", Level(1.0, 1.0))(scenario.assembly, first, np.random.default_rng([13, 8]))
+    wrong = with_relations(seen, make_relations("false"), layout.goals, np.random.default_rng([13, 9]))
+    found = correct(wrong)
+    assert found.ok
+    assert found.dropped
