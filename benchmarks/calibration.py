@@ -32,7 +32,7 @@ from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import Array, pose, symmetries
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.fitted import MeasuredNoise, restated
-from apo_bench.observation.noise import NOISES, Level, make_noise
+from apo_bench.observation.noise import FAILURES, NOISES, Level, make_noise
 from apo_bench.observation.noise_file import read_noise
 from apo_bench.observation.presets import presets
 from apo_bench.scenario.file import load_scenario
@@ -64,7 +64,7 @@ def main() -> None:
     asked.add_argument("--only", nargs="*", help="these models; nothing is written then")
     asked.add_argument("--stated", help="noise file that is stated in place of what a model states, with --only")
     given = asked.parse_args()
-    names = given.only or [*sorted(NOISES), *(name for name in presets() if name.endswith("-inliers"))]
+    names = given.only or [*sorted({*NOISES} - {*FAILURES}), *(name for name in presets() if name.endswith("-inliers"))]
     stated = read_noise(given.stated) if given.only and given.stated else None
     found = {name: summary(list(drawn(name, given.draws, stated))) for name in names}
     print(table(found))

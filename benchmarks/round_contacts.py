@@ -20,6 +20,7 @@ import numpy as np
 from scipy.stats import kstest
 
 from apo_bench.assembly import Assembly, Contact, Observation, Operation, PartFace, largest_gap
+from apo_bench.correction.contact import contact
 from apo_bench.correction.explanation import explain
 from apo_bench.correction.many import correct_many
 from apo_bench.correction.region import contains_truth
@@ -64,7 +65,7 @@ def row(kind: str, draws: int) -> str:
     for _ in range(draws):
         goals = truth @ pose.inverse(pose.exp(rng.standard_normal((2, 6)) * DEVIATIONS))
         seen.append(Observation(assembly, start, goals, C, np.ones(2, dtype=np.bool_)))
-    made = correct_many(seen)
+    made = correct_many(seen, contact)
     assert all(one.ok for one in made)
     p = np.array([one.test.p_value for one in made if one.test is not None])
     covered = np.mean([contains_truth(one, c, truth) for one, c in zip(seen, made, strict=True)])

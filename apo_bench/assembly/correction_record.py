@@ -98,6 +98,8 @@ class Hypothesis:
     """Relations that are not believed."""
     sentence: str = ""
     """What is believed in place of what was stated, in words; empty if all is believed as stated."""
+    noise_scale: float = 1.0
+    """How much larger than stated the noise is; `covariance` and `believed` count it."""
 
     def __post_init__(self) -> None:
         freeze(self, goals=(None, 4, 4), covariance=(len(self.goals), 6, 6))
@@ -144,6 +146,8 @@ class Correction:
     None if it was the observation."""
     hypotheses: tuple[Hypothesis, ...] = ()
     """All that were kept, the likeliest first; empty of correctors that believe one explanation only."""
+    noise_scale: float = 1.0
+    """How much larger than stated the noise seems to be; `covariance` and `believed` count it."""
 
     def __post_init__(self) -> None:
         n = len(self.goals)

@@ -37,32 +37,40 @@ def explain_command(
     from apo_bench.correction.explanation import explain
     from apo_bench.files.observation import as_planned, read_observation_file
     from apo_bench.scenario.file import load_scenario
-    from apo_bench.show.explain_text import explanation_form, explanation_tables, sentences, total
+    from apo_bench.show.explain_text import (
+        explanation_form,
+        explanation_tables,
+        hypothesis_forms,
+        hypothesis_lines,
+        sentences,
+        total,
+    )
     from apo_bench.trial.promise import promise_sentence
 
     check_outputs([(out, "--out", (".png",))])
     if observation is None:
         loaded = load_scenario(scenario)
         seen = as_planned(loaded, deviation_mm, deviation_deg)
-        goals = seen.goals
+        at: Any = seen.goals
         promised = None
         where = f"at the nominal goals, {_stated(deviation_mm, deviation_deg)}"
     else:
         seen, loaded, assumed = read_observation_file(
             observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg
         )
-        correction = correct(seen, "contact")
-        if not correction.ok:
-            raise RuntimeError(f"{observation} cannot be corrected, so nothing is explained: {correction.sentence}.")
-        goals = correction.goals
-        promised = _promised(_planned(loaded, seen, correction)[0], seen, correction, loaded)
+        at = correct(seen)
+        if not at.ok:
+            raise RuntimeError(f"{observation} cannot be corrected, so nothing is explained: {at.sentence}.")
+        promised = _promised(_planned(loaded, seen, at)[0], seen, at, loaded)
         where = f"at the corrected goals of {observation}"
         where += f", {_stated(deviation_mm, deviation_deg)} where it states none" * assumed
-    explanation = explain(seen, goals)
+    explanation = explain(seen, at)
     if as_json:
-        print_json(explanation_form(loaded.name, explanation) | {"promised": promised})
+        known = {"promised": promised, "hypotheses": hypothesis_forms(explanation.hypotheses)}
+        print_json(explanation_form(loaded.name, explanation) | known)
     else:
         said = [] if promised is None else [f"promised: {promise_sentence(promised)}"]
+        said += [f"may be {line}" for line in hypothesis_lines(explanation.hypotheses)]
         typer.echo("\n".join([f"{loaded.name}: {total(explanation)}", where, *said, "", *sentences(explanation)]))
         print_tables(*explanation_tables(explanation))
     if out is not None:
@@ -158,7 +166,7 @@ def _explained(observation: Observation, correction: Correction) -> Any:
         or gap_of(observation, correction.goals, correction.dropped) > _EXACT_M
     ):
         return None
-    return explain(observation, correction.goals, correction.dropped)
+    return explain(observation, correction)
 
 
 def _corrector(method: str, doubt: str | None) -> Any:

@@ -149,10 +149,14 @@ class ContactCorrector:
         status = _status(solved, gap_m)
         if status == "converged" and self.doubt in ("refuse", "drop") and not solved.test.passes:
             status = "doubtful"
+        goals = solved.goals
+        if not np.isfinite(goals).all():
+            goals = problem.observations[i].goals
+            status = "not_finite"
         of = f"every contact but those of {', '.join(dropped)}" if dropped else "every contact"
         doubts = "" if self.doubt == "apply" else _doubts(test, dropped)
         return Correction(
-            goals=solved.goals,
+            goals=goals,
             status=status,
             sentence=status_sentence(status, gap_m, of) + turned + doubts,
             freed=problem.laid.pattern.freed,

@@ -16,7 +16,17 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import ODL, Assembly, Observation, Operation, Poses, lowered_observation, placements
+from apo_bench.assembly import (
+    ODL,
+    Assembly,
+    Correction,
+    Hypothesis,
+    Observation,
+    Operation,
+    Poses,
+    lowered_observation,
+    placements,
+)
 from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.directions import Direction, directions, held
 from apo_bench.correction.problem import problem_of
@@ -106,19 +116,32 @@ class Explanation:
     spectral_gap: float
     shared: tuple[SharedEstimate, ...] = ()
     """What is known of the errors that operations share."""
+    left_out: tuple[int, ...] = ()
+    """Operations of which nothing that was seen is believed, counted from 0."""
+    hypotheses: tuple[Hypothesis, ...] = ()
+    """What else may be believed of what was seen, each with its weight, as of the correction."""
 
 
-def explain(observation: Observation, goals: Array, dropped: Collection[str] = ()) -> Explanation:
+def explain(observation: Observation, goals: Array | Correction, dropped: Collection[str] = ()) -> Explanation:
     """What the contacts determine at goals that satisfy them, and how uncertain these are after what was seen.
 
     Args:
-        goals: (n, 4, 4), consistent with every contact, such as corrected goals, world frame, [m].
+        goals: (n, 4, 4), consistent with every contact, world frame, [m]; or a correction, which says in addition what
+            of the observation is believed and which relations are not.
         dropped: Relations, R1, R2, .., that are left out; so are inequalities, which leave a part free between them.
 
     Raises:
         InputError: The covariance of an operation is not positive definite, or there are too many operations.
     """
     given = observation.assembly
+    left_out = tuple[int, ...]()
+    hypotheses = tuple[Hypothesis, ...]()
+    if isinstance(goals, Correction):
+        left_out = goals.left_out
+        hypotheses = goals.hypotheses
+        dropped = (*goals.dropped, *dropped)
+        observation = goals.believed or observation
+        goals = goals.goals
     observation = lowered_observation(observation)
     n = len(goals)
     assembly = observation.assembly
@@ -169,6 +192,8 @@ def explain(observation: Observation, goals: Array, dropped: Collection[str] = (
         redundant=known.redundant - _void(assembly, kept),
         spectral_gap=known.spectral_gap,
         shared=shared,
+        left_out=left_out,
+        hypotheses=hypotheses,
     )
 
 

@@ -16,15 +16,18 @@ from apo_bench.geometry import Array
 DRAWS = 2000
 
 
-def drawn_chi_squares(observation: Observation, L: Array, Jt: Array, S: Array | None) -> Array:
+def drawn_chi_squares(
+    observation: Observation, L: Array, Jt: Array, S: Array | None, left_out: tuple[int, ...] = ()
+) -> Array:
     """Squared lengths of corrections of errors that are drawn, (DRAWS,), sorted.
 
     Args:
         L: As of `noise_factor`.
         Jt: (6 n, 3 c), the transposed derivative of the equations by z, at a solution.
         S: (3 c, 3 c), the covariance of what equations are off by, [m^2]; None: nothing.
+        left_out: Operations whose goals are inferred, so that they agree with their contacts.
     """
-    r = _drawn(observation, L) @ Jt
+    r = _drawn(observation, L, left_out) @ Jt
     # As `softened_chi_square`, of errors that are drawn: r of each is J z, and what play adds, factored as S = V w V^t.
     A = Jt.T @ Jt
     if S is not None:
@@ -47,9 +50,11 @@ def drawn_radius(observation: Observation, L: Array, free: Array, level: float) 
     return float(np.quantile(np.square(_drawn(observation, L) @ free).sum(axis=1), level))
 
 
-def _drawn(observation: Observation, L: Array) -> Array:
-    """z of errors, (DRAWS, 6 n)."""
+def _drawn(observation: Observation, L: Array, left_out: tuple[int, ...] = ()) -> Array:
+    """z of errors, (DRAWS, 6 n); of operations that are left out of none."""
     if observation.tails is None:
         raise ValueError("the observation states no tails")
     joint = joint_covariance(observation.goals, observation.covariance, observation.shared)
-    return coordinates_of(L, observation.tails.draws(joint, DRAWS))
+    twists = observation.tails.draws(joint, DRAWS)
+    twists[:, list(left_out)] = 0.0
+    return coordinates_of(L, twists)

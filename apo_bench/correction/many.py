@@ -6,8 +6,9 @@ from math import ceil
 import numpy as np
 
 from apo_bench.assembly import Correction, Observation
-from apo_bench.correction.contact import ContactCorrector, contact
+from apo_bench.correction.contact import ContactCorrector
 from apo_bench.correction.observation_checks import check_observations
+from apo_bench.correction.robust.robust import RobustCorrector, contact_robust
 from apo_bench.errors import InputError
 
 BATCH = 150
@@ -16,20 +17,24 @@ LARGEST_JACOBIANS = 96_000
 """Entries of all their Jacobians: more would leave the cache of the processor."""
 
 
-def correct_many(observations: Sequence[Observation], corrector: ContactCorrector = contact) -> tuple[Correction, ...]:
+def correct_many(
+    observations: Sequence[Observation], corrector: ContactCorrector | RobustCorrector = contact_robust
+) -> tuple[Correction, ...]:
     """Correct many observations of one assembly at once: as one after the other up to rounding, and faster.
 
     Args:
         observations: Observations of one and the same assembly with the same start poses and play.
+        corrector: As `correct` has it by default; those whose test fails are then corrected one after the other.
 
     Raises:
         InputError: They are not, one makes no sense, or a covariance is not positive definite.
     """
     if isinstance(observations, Observation) or not isinstance(observations, Sequence):
         raise InputError("correct_many needs a list of observations; ask `correct` for one, or make a list of them.")
-    if not isinstance(corrector, ContactCorrector):
+    if not isinstance(corrector, ContactCorrector | RobustCorrector):
         raise InputError(
-            f"correct_many was given {corrector!r}; give a ContactCorrector, such as ContactCorrector('drop')."
+            f"correct_many was given {corrector!r}; give a ContactCorrector, such as ContactCorrector('drop'), or a "
+            "RobustCorrector."
         )
     if not observations:
         return ()

@@ -22,7 +22,18 @@ PLAN_SCHEMA = "apo-bench/plan/2"
 TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
 
 OUTLIER_KEYS = MappingProxyType(
-    {"gross_rate": "gross", "broad_rate": "broad", "broad_times": "times", "wrong_relation_rate": "relation"}
+    {
+        "gross_rate": "gross",
+        "broad_rate": "broad",
+        "broad_times": "times",
+        "wrong_relation_rate": "relation",
+        "turned_share": "flip",
+        "stale_share": "stale",
+        "swapped_share": "swap",
+        "shifted_share": "shift",
+        "displaced_view_rate": "view",
+        "repeat_rate": "repeat",
+    }
 )
 """Key of a form -> field of `OutlierModel`."""
 Form = dict[str, Any]
@@ -84,7 +95,8 @@ def covariance_form(C: Array) -> list[list[float]]:
 
 
 def _outliers_form(outliers: OutlierModel) -> Form:
-    return {key: getattr(outliers, name) for key, name in OUTLIER_KEYS.items()}
+    camera = {} if outliers.camera_m is None else {"camera_mm": [1e3 * x for x in outliers.camera_m]}
+    return {key: getattr(outliers, name) for key, name in OUTLIER_KEYS.items()} | camera
 
 
 def _shared_form(error: SharedError) -> Form:

@@ -4,7 +4,9 @@ One file of more than 250 lines: both forms are made of the same pieces, each of
 """
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -94,9 +96,14 @@ def read_plan(path: str | Path, scenario: Scenario | None = None) -> Plan:
 
 def _outliers(node: JsonNode) -> OutlierModel:
     """How often observations are worse than they state; what is not said is as usual."""
-    rates = node.fields((), tuple(OUTLIER_KEYS))
+    keys = node.fields((), (*OUTLIER_KEYS, "camera_mm"))
+    rates: dict[str, Any] = {OUTLIER_KEYS[key]: value.number(0.0) for key, value in keys.items() if key in OUTLIER_KEYS}
     try:
-        return OutlierModel(**{OUTLIER_KEYS[key]: value.number(0.0) for key, value in rates.items()})
+        model = replace(OutlierModel(), **rates)
+        if "camera_mm" not in keys:
+            return model
+        x, y, z = (keys["camera_mm"].numbers(3) * 1e-3).tolist()
+        return replace(model, camera_m=(x, y, z))
     except InputError as error:
         raise InputError(f"{node.file}, {node.key}: {error}") from error
 

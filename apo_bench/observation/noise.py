@@ -35,8 +35,15 @@ NOISES = MappingProxyType(
         "bias-view": "apo_bench.observation.models.shared:BiasView",
         "correlated": "apo_bench.observation.models.shared:Correlated",
         "symmetric": "apo_bench.observation.models.symmetric:Symmetric",
+        "flips": "apo_bench.observation.models.failures:Flipped",
+        "stale": "apo_bench.observation.models.failures:Stale",
+        "swaps": "apo_bench.observation.models.failures:Swapped",
+        "rays": "apo_bench.observation.models.failures:AlongRay",
+        "displaced-view": "apo_bench.observation.models.failures:DisplacedView",
     }
 )
+FAILURES = ("flips", "stale", "swaps", "rays", "displaced-view")
+"""Those in which a camera fails now and then: the covariance that is stated is that of what is no failure."""
 
 
 _LIMITS = {"deviation_mm": 10000.0, "deviation_deg": 180.0}

@@ -8,7 +8,7 @@ from apo_bench.assembly import Consistency, Correction, Observation
 from apo_bench.correction.explanation import Explanation
 from apo_bench.files.json_forms import covariance_form, pose_form
 from apo_bench.geometry import Array, pose
-from apo_bench.show.explain_text import explanation_form, sentences, total
+from apo_bench.show.explain_text import explanation_form, hypothesis_forms, hypothesis_lines, sentences, total
 
 _CORRECTION = "apo-bench/correction/1"
 _TOO_GOOD = 1e-6
@@ -27,11 +27,16 @@ def correction_lines(
         "test": _test(correction.test, correction.status == "inconsistent"),
         "left out": ", ".join(correction.dropped),
         "test without": _test(correction.test_after, correction.status == "inconsistent"),
+        "may be": hypothesis_lines(correction.hypotheses),
         "contacts": "" if explanation is None else total(explanation),
+        "free": [] if explanation is None else sentences(explanation),
     }
-    free = [] if explanation is None else sentences(explanation)
-    named = [(name, text) for name, text in facts.items() if text]
-    return named + [("" if i else "free", sentence) for i, sentence in enumerate(free)]
+    return [
+        ("" if i else name, text)
+        for name, said in facts.items()
+        for i, text in enumerate([said] if isinstance(said, str) else said)
+        if text
+    ]
 
 
 def pose_table(observation: Observation, correction: Correction) -> Any:
@@ -87,6 +92,8 @@ def correction_form(
         "test": _test_form(correction.test),
         "test_after": _test_form(correction.test_after),
         "dropped": list(correction.dropped),
+        "left_out": [k + 1 for k in correction.left_out],
+        "hypotheses": hypothesis_forms(correction.hypotheses),
         "explanation": None if explanation is None else explanation_form(scenario, explanation),
     }
 

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.assembly import spelled
+from apo_bench.assembly import Hypothesis, spelled
 from apo_bench.correction.directions import SHIFT_NAMES, TURN_NAMES, Direction
 from apo_bench.correction.explanation import Explanation, FreeDirection, OperationExplanation, PartExplanation
 from apo_bench.correction.relation_equations import RelationHold
@@ -33,9 +33,34 @@ def total(explanation: Explanation) -> str:
 def sentences(explanation: Explanation) -> list[str]:
     """One for each operation: what is fixed by which parts, and what is free; then one for each shared error."""
     return [
-        f"{o.operation + 1} {o.part}: {_fixed(o)}; {_loose(explanation, o.free)}{_along_axes(explanation, o)}"
+        f"{o.operation + 1} {o.part}: {_fixed(o)}; {_loose(explanation, o)}{_along_axes(explanation, o)}"
         for o in explanation.operations
     ] + [_shared(estimate) for estimate in explanation.shared]
+
+
+def hypothesis_lines(hypotheses: Sequence[Hypothesis]) -> list[str]:
+    """`0.92: left out what was seen of operation 2`, one each, if there is any doubt."""
+    if len(hypotheses) < 2:
+        return []
+    return [f"{hypothesis.weight:.2g}: {hypothesis.sentence or 'all as it was seen'}" for hypothesis in hypotheses]
+
+
+def hypothesis_forms(hypotheses: Sequence[Hypothesis]) -> list[dict[str, Any]]:
+    """What `json` can write of what may be believed: operations from 1, poses and covariances in mm and degrees."""
+    return [
+        {
+            "weight": one.weight,
+            "sentence": one.sentence,
+            "left_out": _numbers(one.left_out),
+            "dropped": list(one.dropped),
+            "operations": [
+                pose_form(T)
+                | {"covariance_mm_deg": None if one.covariance is None else covariance_form(one.covariance[k])}
+                for k, T in enumerate(one.goals)
+            ],
+        }
+        for one in hypotheses
+    ]
 
 
 def explanation_tables(explanation: Explanation) -> list[Any]:
@@ -77,6 +102,7 @@ def explanation_form(scenario: str, explanation: Explanation) -> dict[str, Any]:
             }
             for estimate in explanation.shared
         ],
+        "left_out": _numbers(explanation.left_out),
         "spectral_gap": explanation.spectral_gap if np.isfinite(explanation.spectral_gap) else None,
     }
 
@@ -106,17 +132,19 @@ def _fixed(o: OperationExplanation) -> str:
     return f"{', '.join(o.fixed)} fixed by {listed_words(map(with_article, others))} ({', '.join(names)}{agrees})"
 
 
-def _loose(explanation: Explanation, free: Sequence[FreeDirection]) -> str:
+def _loose(explanation: Explanation, o: OperationExplanation) -> str:
     """Free directions, those that go together in one breath."""
-    together = grouped((direction.along, direction) for direction in free)
-    return "; ".join(_group(explanation, along, some) for along, some in together.items()) or "nothing is free"
+    together = grouped((direction.along, direction) for direction in o.free)
+    kept = "chosen" if o.operation in explanation.left_out else "kept as seen"
+    groups = (_group(explanation, along, some, kept) for along, some in together.items())
+    return "; ".join(groups) or "nothing is free"
 
 
-def _group(explanation: Explanation, along: tuple[int, ...], some: list[FreeDirection]) -> str:
+def _group(explanation: Explanation, along: tuple[int, ...], some: list[FreeDirection], kept: str) -> str:
     sizes = ", ".join(map(size, some))
     names = ", ".join(f"{free.direction}{_about(free)}" for free in some)
     if not along:
-        return f"{names} free, kept as seen, {sizes}"
+        return f"{names} free, {kept}, {sizes}"
     others = dict.fromkeys(explanation.operations[j].part for j in along)
     return f"{names} free together with {listed_words(map(with_article, others))}, {sizes}"
 

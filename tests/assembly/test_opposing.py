@@ -8,6 +8,7 @@ import pytest
 from apo_bench import ContactCorrector, correct, correct_many
 from apo_bench.assembly import looking_away, placements
 from apo_bench.assembly.kinds import OPPOSING
+from apo_bench.correction.contact import contact
 from apo_bench.geometry import pose
 from tests.correction.robust.test_robust import look, shown
 from tests.shipped import BOXES
@@ -46,7 +47,7 @@ def test_nothing_converges_where_a_part_was_seen_turned_over(name):
     """Operations and turns in turn; what the solver turns back is right, what it leaves upside down is said."""
     scenario, layout, _ = shown(name)
     seen = [turned(name, k, turn) for k in range(len(scenario.assembly)) for turn in TURNS]
-    for made in correct_many(seen[::5]):
+    for made in correct_many(seen[::5], contact):
         assert not made.ok or not looking_away(scenario.assembly, layout.start, made.goals).any()
     for corrector in ("paper", "contact-drop", "snap", "contact-robust"):
         for one in seen[::11]:

@@ -12,7 +12,7 @@ import pytest
 
 from apo_bench import Assembly, ContactCorrector, Correction, Observation, correct, correct_many, load_scenario
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.contact import Doubt
+from apo_bench.correction.contact import Doubt, contact
 from apo_bench.correction.solvers import kernels
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
 from apo_bench.correction.solvers.gauss_newton import NearestGoals, nearest_goals
@@ -178,7 +178,7 @@ def test_contact_is_compiled_by_default_and_says_what_it_says_uncompiled(name: s
 def test_many_at_once_are_bit_for_bit_what_they_are_alone() -> None:
     first = observed("pocket_table", 2.0, 1.0, 0)
     seen = [replace(first, goals=observed("pocket_table", 2.0, 1.0, seed).goals) for seed in range(3)]
-    for one, made in zip(seen, correct_many(seen), strict=True):
+    for one, made in zip(seen, correct_many(seen, contact), strict=True):
         alone = correct(one, "contact")
         assert np.array_equal(made.goals, alone.goals)
         assert (made.covariance is None) == (alone.covariance is None)
@@ -208,7 +208,7 @@ def test_without_numba_contact_is_not_compiled(name: str) -> None:
     one = observed("bridge_cycle", 2.0, 1.0, 0)
     uncompiled = correct(one, ContactCorrector(compiled=False))
     assert np.array_equal(correct(one, name).goals, uncompiled.goals)
-    np.testing.assert_allclose(correct_many([one])[0].goals, uncompiled.goals, rtol=0, atol=1e-12)
+    np.testing.assert_allclose(correct_many([one], contact)[0].goals, uncompiled.goals, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("turn", [0.0, 1e-9, 0.3, 0.999, 1.001, 3.0])

@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose
 from apo_bench import Correction, Observation, correct, correct_many, load_scenario
 from apo_bench.assembly import Gap, Operation
 from apo_bench.assembly.equations import equations
+from apo_bench.correction.contact import contact
 from apo_bench.correction.region import contains_truth
 from apo_bench.correction.solvers.compact import compact_equations
 from apo_bench.correction.solvers.gauss_newton import nearest_goals
@@ -102,7 +103,7 @@ def test_the_stated_covariance_is_that_of_draws(name: str, correlated: bool) -> 
     L = crooked(n, np.random.default_rng(1), 0.5, 0.5) if correlated else scales(n, 0.5, 0.5)
     errors = np.zeros((400, n, 6))
     stated = np.zeros((n, 6, 6))
-    for seed, made in enumerate(correct_many([look(scene, L, seed) for seed in range(len(errors))])):
+    for seed, made in enumerate(correct_many([look(scene, L, seed) for seed in range(len(errors))], contact)):
         assert made.covariance is not None
         errors[seed] = pose.log(pose.inverse(made.goals) @ scene.goals)
         stated += made.covariance / len(errors)
@@ -135,7 +136,7 @@ def corrected_towers() -> tuple[scenes.Scene, list[Observation], tuple[Correctio
     scene = scenes.stick_in_tower()
     L = scales(3, 1.0, 1.0)
     seen = [look(scene, L, seed) for seed in range(300)]
-    return scene, seen, correct_many(seen)
+    return scene, seen, correct_many(seen, contact)
 
 
 @pytest.mark.parametrize(("level", "low", "high"), [(0.95, 0.90, 0.99), (0.5, 0.41, 0.59)])

@@ -144,7 +144,7 @@ def test_the_test_and_the_regions_hold_what_they_say(kind):
     rng = np.random.default_rng(5)
     observation, truth = case(kind)
     many = [seen(observation.assembly, observation.start, truth, rng) for _ in range(400)]
-    made = correct_many(many)
+    made = correct_many(many, contact)
     assert all(one.ok for one in made)
     covered = [contains_truth(one, correction, truth) for one, correction in zip(many, made, strict=True)]
     assert 0.90 < np.mean(covered) < 0.99
@@ -156,7 +156,7 @@ def test_compiled_and_plain_solvers_agree(kind):
     observation, _ = case(kind, seed=2)
     plain = ContactCorrector(compiled=False)(observation)
     np.testing.assert_allclose(contact(observation).goals, plain.goals, atol=1e-9)
-    np.testing.assert_allclose(correct_many([observation, observation])[1].goals, plain.goals, atol=1e-9)
+    np.testing.assert_allclose(correct_many([observation, observation], contact)[1].goals, plain.goals, atol=1e-9)
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -301,10 +301,10 @@ def test_a_shaft_that_stands_anywhere_in_its_play_is_no_alarm(mm):
         off[:3, :3] = np.column_stack([x / np.linalg.norm(x), np.cross(axis, x / np.linalg.norm(x)), axis])
         off[:3, 3] = low + axis * off[2, 3] / axis[2]
         many.append(seen(assembly, start, np.array([PLATE_AT, PLATE_AT @ off]), rng, mm, mm, play_m=c))
-    made = correct_many(many)
+    made = correct_many(many, contact)
     assert all(one.ok for one in made)
     assert np.mean([not one.test.passes for one in made]) <= 0.03
-    told_nothing = correct_many([replace(one, play_m=0.0) for one in many])
+    told_nothing = correct_many([replace(one, play_m=0.0) for one in many], contact)
     assert mm > 0.1 or np.mean([not one.test.passes for one in told_nothing]) > 0.5
 
 

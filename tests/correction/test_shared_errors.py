@@ -20,6 +20,7 @@ from apo_bench import (
     load_scenario,
 )
 from apo_bench.assembly import Gap, SharedError
+from apo_bench.correction.contact import contact
 from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise
@@ -98,7 +99,7 @@ def test_a_shared_error_of_none_of_the_size_changes_nothing() -> None:
 
 def test_many_are_corrected_as_one_after_the_other() -> None:
     observation, _ = seen("bias-view")
-    made = correct_many([observation, replace(observation, shared=())])
+    made = correct_many([observation, replace(observation, shared=())], contact)
     for one, given in zip(made, (observation, replace(observation, shared=())), strict=True):
         assert_allclose(one.goals, correct(given, "contact").goals, atol=1e-9)
 

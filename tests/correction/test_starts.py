@@ -8,6 +8,7 @@ import pytest
 from apo_bench import ContactCorrector, correct, correct_many
 from apo_bench.assembly import largest_gap, looking_away
 from apo_bench.assembly.equations import equations
+from apo_bench.correction.contact import contact
 from apo_bench.correction.solvers.compact import compact_equations
 from apo_bench.correction.solvers.curved import descended
 from apo_bench.correction.solvers.gauss_newton import nearest_goals
@@ -64,7 +65,7 @@ def test_other_starts_change_nothing_where_the_first_one_leads_to_goals_nearby()
 
 def test_many_at_once_find_the_same():
     seen = [turned("bridge_cycle", 2, turn) for turn in UPSIDE_DOWN]
-    for many, one in zip(correct_many(seen), (correct(one, "contact") for one in seen), strict=True):
+    for many, one in zip(correct_many(seen, contact), (correct(one, "contact") for one in seen), strict=True):
         assert (many.status, many.sentence) == (one.status, one.sentence)
         assert many.goals.tolist() == one.goals.tolist()
 

@@ -16,9 +16,11 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
+import numpy as np
 import pytest
 import typer
 
+from apo_bench import read_observation
 from apo_bench.cli.app import app, main
 from apo_bench.parts.load import load_part
 
@@ -222,3 +224,13 @@ def test_what_a_page_says_works_from_top_to_bottom(
     for name in set(sys.modules) - known:
         if str(getattr(sys.modules[name], "__file__", "")).startswith(str(tmp_path)):
             del sys.modules[name]
+
+
+def test_the_example_of_an_observation_file_is_read_as_the_table_that_it_repeats(tmp_path: Path) -> None:
+    text = (ROOT / "docs" / "guide" / "measured.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"```json\n(.*?)```", text, re.DOTALL)
+    path = tmp_path / "seen.json"
+    path.write_text(example, encoding="utf-8")
+    seen, table = (read_observation(one, "stick_in_tower") for one in (path, ROOT / "docs" / "seen.csv"))
+    assert seen.goals.tolist() == table.goals.tolist()
+    assert np.allclose(seen.covariance, table.covariance, rtol=1e-12)

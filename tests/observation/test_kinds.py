@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench import Demonstration, InputError, Observation, observe
+from apo_bench import Demonstration, InputError, Observation, draw_layout, load_scenario, observe
 from apo_bench.geometry import Array, pose, symmetries
 from apo_bench.observation.models import shared
 from apo_bench.observation.models.anisotropic import Sighted, line_of_sight
@@ -254,6 +254,20 @@ def test_of_equal_poses_the_nearest_is_reported_and_what_is_stated_bounds_its_er
         stated.append(np.diagonal(seen.covariance[3])[3:])
     assert (np.mean(np.array(turns) ** 2, axis=0) <= np.array(stated[0]) * 1.15).all()
     assert np.sqrt(stated[0][0]) == pytest.approx(np.radians(45.0 / np.sqrt(3.0)))
+
+
+def test_of_a_part_of_revolution_the_turn_about_its_axis_is_as_wrong_as_stated() -> None:
+    """A part that looks the same after any turn; else its region covers more than it says."""
+    scenario = load_scenario("nested_bushings")
+    layout = draw_layout(scenario, np.random.default_rng(3), 0.0)
+    n = len(layout.goals)
+    shown = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((n, 6, 6)))
+    lengths = []
+    for seed in range(300):
+        seen = Symmetric(LEVEL)(scenario.assembly, shown, np.random.default_rng(seed))
+        xi = pose.log(pose.inverse(seen.goals) @ layout.goals)
+        lengths.append(np.einsum("ki,kij,kj->k", xi, np.linalg.inv(seen.covariance), xi))
+    assert_allclose(np.mean(lengths, axis=0), 6.0, rtol=0.15)
 
 
 def test_any_turn_fills_the_same_space_and_names_other_faces() -> None:

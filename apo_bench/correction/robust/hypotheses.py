@@ -14,23 +14,40 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Observation, OutlierModel, looking_away
+from apo_bench.assembly import Consistency, Correction, Observation, OutlierModel, SharedError, looking_away
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.consistency import CONTRADICTION_M, fit_deviation
+from apo_bench.correction.consistency import CONTRADICTION_M, fit_deviation, p_value
 from apo_bench.correction.contact import ContactCorrector, contact_apply
+from apo_bench.correction.heavy_tails import drawn_chi_squares, drawn_p_value
 from apo_bench.correction.inferred import inferred_goals
-from apo_bench.correction.problem import seen_system
-from apo_bench.correction.robust.views import GROSS, INLIER, ROOM, Sightings, State, merged
+from apo_bench.correction.problem import problem_of, seen_system
+from apo_bench.correction.robust.beliefs import (
+    DISPLACED,
+    INLIER,
+    ROOM,
+    VIEW,
+    States,
+    says_nothing,
+    together,
+)
+from apo_bench.correction.robust.noise_scale import (
+    LEAST,
+    likeliest_scale,
+    noisier,
+    region_scale,
+    scale_surprise,
+    scaled_test,
+)
+from apo_bench.correction.robust.views import Sightings, exchanged_view, merged
 from apo_bench.correction.solvers.compact import linearised_by
+from apo_bench.correction.solvers.posterior import jacobian_rank
 from apo_bench.correction.solvers.whitened import noise_factor
 from apo_bench.geometry import Array, frozen, pose, right_jacobian
 
-_as_begun = ContactCorrector("apply", elsewhere=False)
+as_begun = ContactCorrector("apply", elsewhere=False)
 _FAR_RAD = np.radians(10.0)
 """Parts that are believed to be turned by less (a standard deviation) are not far from where they were seen: no other
 start is tried, and what is far nevertheless is an outlier."""
-States = tuple[State, ...]
-"""Those of the views of each operation."""
 UNKNOWN = frozen(np.diag(np.repeat([0.05, 0.5], 3) ** 2))
 """(6, 6): how far the goal of an operation that was left out may be from what its contacts say of it, [m, rad]."""
 _WRONG_M = 0.05
@@ -60,6 +77,13 @@ class SolvedHypothesis:
     observation: Observation
     """Views merged, and operations of which none is believed where contacts say, with `UNKNOWN`."""
     correction: Correction
+    scale: float = 1.0
+    """How much larger than stated the noise of all views is."""
+
+    @property
+    def key(self) -> tuple[States, tuple[str, ...], bool]:
+        """What it believes."""
+        return self.states, self.dropped, self.scale > 1.0
 
     @property
     def left_out(self) -> tuple[int, ...]:
@@ -71,6 +95,7 @@ class SolvedHypothesis:
         """Whether anything is not believed as it was stated."""
         return (
             bool(self.dropped)
+            or self.scale > 1.0
             or any(belief != INLIER for state in self.states for belief in state)
             or () in self.states
         )
@@ -84,7 +109,7 @@ class SolvedHypothesis:
             return np.inf
         # What contacts leave at the observation is Gaussian with covariance S = J J^t + soft^2: -2 log of its density
         # is the squared length of the correction and log det S. Of an operation that was left out `ROOM` is as likely.
-        wide = np.array(observation.covariance)
+        wide = observation.covariance * self.scale**2
         wide[list(self.left_out)] = ROOM
         system = seen_system(observation)
         xi = pose.log(pose.inverse(observation.goals) @ correction.goals)
@@ -99,18 +124,44 @@ class SolvedHypothesis:
             soft = np.where(wrong, each, soft)
             false = np.where(wrong, system.residual(correction.goals) / each, 0.0)
         S = Jt.T @ Jt + np.diag(soft * soft)
-        unlikely = correction.test.chi_square + false @ false + np.linalg.slogdet(S)[1]
+        unlikely = correction.test.chi_square / self.scale**2 + false @ false + np.linalg.slogdet(S)[1]
         model = self.case.model
         states = zip(self.case.views, self.states, strict=True)
-        surprise = sum(merged(views, state, model).surprise for views, state in states)
+        surprise = sum(merged(views, state, model).surprise for views, state in states) + together(self.states, model)
+        if self.scale > 1.0:
+            surprise += scale_surprise(self.scale, correction.test.freedom)
         return float(unlikely + surprise + len(self.dropped) * model.relation_surprise)
+
+    def noisier(self) -> SolvedHypothesis:
+        """The same if all noise is larger than stated, by as much as is likeliest: the goals stay."""
+        test = self.correction.test
+        if test is None or self.scale > 1.0 or self.observation.shared:
+            return self
+        scale = likeliest_scale(test.chi_square, test.freedom)
+        return replace(self, scale=scale) if scale >= LEAST else self
+
+    @property
+    def stated(self) -> Observation:
+        """What is believed with the noise that is."""
+        return noisier(self.observation, self._region_scale) if self.scale > 1.0 else self.observation
+
+    @property
+    def covariance(self) -> Array | None:
+        """Of the goals, (n, 6, 6), [m, rad], with the noise that is."""
+        C = self.correction.covariance
+        return C if C is None or self.scale == 1.0 else C * self._region_scale**2
+
+    @property
+    def _region_scale(self) -> float:
+        return region_scale(self.scale, self.correction.test.freedom) if self.correction.test else self.scale
 
     def at(self, goals: Array, unknown: Sequence[int]) -> SolvedHypothesis:
         """The same with the inferred goals of some operations elsewhere, at these of goals (n, 4, 4)."""
         there = np.array(self.observation.goals)
         there[list(unknown)] = goals[list(unknown)]
         moved = replace(self.observation, goals=there)
-        return replace(self, observation=moved, correction=_corrected(moved, self.dropped))
+        correction = tested(moved, _corrected(moved, self.dropped), self.left_out)
+        return replace(self, observation=moved, correction=correction)
 
     def stands_at(self, goals: Array) -> bool:
         """Whether the faces of every contact that is believed look at each other at the goals, (n, 4, 4)."""
@@ -124,12 +175,18 @@ class SolvedHypothesis:
     @property
     def p_value(self) -> float:
         """Of the test of its correction; 0 if there is no solution."""
-        return self.correction.test.p_value if self.correction.test and np.isfinite(self.badness) else 0.0
+        return self.test.p_value if self.test and np.isfinite(self.badness) else 0.0
+
+    @property
+    def test(self) -> Consistency | None:
+        """Of its correction; with the noise that is, where that which is stated does not explain it."""
+        test = self.correction.test
+        return test if test is None or test.passes or self.scale == 1.0 else scaled_test(test, self.scale)
 
 
 def unbelieved(states: States) -> tuple[int, ...]:
     """Operations of which no view is believed."""
-    return tuple(k for k, state in enumerate(states) if all(belief == GROSS for belief in state))
+    return tuple(k for k, state in enumerate(states) if all(map(says_nothing, state)))
 
 
 def hypothesis(case: Case, states: States, dropped: tuple[str, ...] = ()) -> SolvedHypothesis:
@@ -137,13 +194,38 @@ def hypothesis(case: Case, states: States, dropped: tuple[str, ...] = ()) -> Sol
     believed = believed_observation(case, states)
     trusted = all(state and set(state) == {INLIER} for state in states) and not dropped
     correction = as_stated(believed) if trusted else _corrected(believed, dropped)
-    return SolvedHypothesis(case, states, dropped, believed, correction)
+    return SolvedHypothesis(case, states, dropped, believed, tested(believed, correction, unbelieved(states)))
+
+
+def tested(believed: Observation, correction: Correction, left_out: tuple[int, ...]) -> Correction:
+    """With the test of what was seen alone: directions that only left-out operations could tell of are not tested.
+
+    What is inferred agrees with its contacts, so these operations add nothing to the squared length, and the rank of
+    their own columns is no degree of freedom.
+    """
+    if not left_out or correction.test is None or not correction.ok:
+        return correction
+    kept = believed.assembly.without(correction.dropped)
+    system = seen_system(believed).among(kept)
+    n = len(correction.goals)
+    own = linearised_by(system, correction.goals, np.tile(np.eye(6), (n, 1, 1)))[1]
+    own = own.reshape(n, 6, -1)[list(left_out)].reshape(6 * len(left_out), -1)
+    freedom = max(0, correction.test.freedom - jacobian_rank(own))
+    p = p_value(correction.test.chi_square, freedom)
+    if believed.tails is not None and freedom:
+        L = noise_factor(believed)
+        xi = pose.log(pose.inverse(believed.goals) @ correction.goals)
+        _, Jt = linearised_by(system, correction.goals, right_jacobian(xi) @ L)
+        play = problem_of((believed,)).play_covariance(kept)
+        drawn = drawn_chi_squares(believed, L, Jt, play, left_out)
+        p = drawn_p_value(drawn, correction.test.chi_square)
+    return replace(correction, test=replace(correction.test, freedom=freedom, p_value=p))
 
 
 def as_stated(observation: Observation) -> Correction:
     """The correction if every observation is believed as it is stated."""
     far = (observation.covariance.diagonal(axis1=1, axis2=2)[:, 3:] > _FAR_RAD**2).any()
-    return contact_apply(observation) if far else _as_begun(observation)
+    return contact_apply(observation) if far else as_begun(observation)
 
 
 def believed_observation(case: Case, states: States) -> Observation:
@@ -153,18 +235,31 @@ def believed_observation(case: Case, states: States) -> Observation:
     covariance = np.array(first.covariance)
     unknown = list[int]()
     for k, (views, state) in enumerate(zip(case.views, states, strict=True)):
-        together = merged(views, state, case.model)
-        if together.goal is None:
+        every = merged(views, state, case.model, exchanged_view(case.views, state))
+        if every.goal is None:
             unknown.append(k)
             covariance[k] = UNKNOWN
         else:
-            goals[k] = together.goal
-            covariance[k] = together.covariance
+            goals[k] = every.goal
+            covariance[k] = every.covariance
     seen = np.ones(len(states), dtype=np.bool_)
     believed = replace(first, goals=goals, covariance=covariance, seen=seen)
     if any(len(views) > 1 for views in case.views):
         believed = replace(believed, shared=(), tails=None)
+    displaced = tuple(k for k, state in enumerate(states) if state == (DISPLACED,))
+    if displaced:
+        believed = _displaced(believed, displaced)
     return replace(believed, goals=inferred_goals(believed, unknown).goals) if unknown else believed
+
+
+def _displaced(observation: Observation, operations: tuple[int, ...]) -> Observation:
+    """With one displacement that some operations share, about their middle."""
+    P = np.eye(4)
+    P[:3, 3] = observation.goals[list(operations), :3, 3].mean(axis=0)
+    error = SharedError("view", operations, VIEW, P)
+    covariance = np.array(observation.covariance)
+    covariance[list(operations)] += error.added(observation.goals)
+    return replace(observation, covariance=covariance, shared=(*observation.shared, error))
 
 
 def soft_deviation(observation: Observation) -> Array:
@@ -174,4 +269,4 @@ def soft_deviation(observation: Observation) -> Array:
 
 def _corrected(observation: Observation, dropped: tuple[str, ...]) -> Correction:
     """Without other starts: what is not believed is where contacts say already."""
-    return _as_begun.leaving_out(observation, dropped) if dropped else _as_begun(observation)
+    return as_begun.leaving_out(observation, dropped) if dropped else as_begun(observation)

@@ -3,23 +3,27 @@
 It can ask to look again: at what it left out or did not see, and at what it is least sure of.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Hypothesis, Look, Observation, OutlierModel, largest_gap
+from apo_bench.assembly import Correction, Hypothesis, Look, Observation, OutlierModel, largest_gap, lowered_together
 from apo_bench.correction.consistency import TEST_LEVEL
 from apo_bench.correction.contact import contact_apply
 from apo_bench.correction.inferred import inferred_goals
+from apo_bench.correction.robust.beliefs import BROAD, DISPLACED, FLIPPED, GROSS, INLIER, SHIFTED, STALE, States
 from apo_bench.correction.robust.crowding import least_crowded
-from apo_bench.correction.robust.hypotheses import Case, SolvedHypothesis, as_stated
+from apo_bench.correction.robust.hypotheses import Case, SolvedHypothesis, as_begun, as_stated
+from apo_bench.correction.robust.noise_scale import LEAST, likeliest_scale, noisier, region_scale, scale_words
 from apo_bench.correction.robust.search import Search
-from apo_bench.correction.robust.views import BROAD, FLIPPED, GROSS, INLIER, Sightings, looked_again, views_of
+from apo_bench.correction.robust.views import Sightings, looked_again, views_of
 from apo_bench.correction.status import refused_correction
 from apo_bench.geometry import Array
 
+TEMPERATURE = 2.5
+"""At which weights hold, of scenes that are in no benchmark: `python -m benchmarks.weights`."""
 _SURE = 0.01
 """An operation is looked at again if it is likelier than this that another state is the right one, ..."""
 _SURE_DEVIATION = np.repeat([5e-3, np.radians(5.0)], 3)
@@ -35,6 +39,8 @@ class RobustCorrector:
     """None stands for what the observation states, or for what is usual."""
     level: float = TEST_LEVEL
     """A set of observations is believed if the p-value of its correction is not below."""
+    temperature: float = TEMPERATURE
+    """Weights of hypotheses are likelihoods to the power of its inverse."""
 
     def __call__(self, observation: Observation) -> Correction:
         """Correct an observation.
@@ -48,31 +54,65 @@ class RobustCorrector:
         """
         return self.looking(observation, None)
 
+    def together(self, observations: Sequence[Observation]) -> list[Correction]:
+        """Correct observations of one assembly with the same start poses and play: at once those that pass the test."""
+        observations = lowered_together(observations)
+        plain = [i for i, observation in enumerate(observations) if self._is_plain(observation)]
+        made: list[Correction | None] = [None] * len(observations)
+        for i, correction in zip(plain, as_begun.together([observations[i] for i in plain]), strict=True):
+            made[i] = self._believed(observations[i], correction)
+        return [one or self(observation) for one, observation in zip(made, observations, strict=True)]
+
     def looking(self, observation: Observation, look: Look | None) -> Correction:
         """Correct an observation, with looks at what is in doubt for as long as there is any and one is left."""
-        model = self.outliers or observation.outliers or OutlierModel()
-        if look is None and observation.seen.all() and model.surprises[INLIER] < model.surprises[GROSS]:
-            # One view of each operation, an inlier more likely than not: nothing is searched while the test holds.
-            correction = as_stated(observation)
-            if correction.ok and correction.test is not None and correction.test.p_value >= self.level:
-                return replace(correction, sentence=correction.sentence + _unexplained(correction))
-        views = views_of(observation)
+        if look is None and self._is_plain(observation):
+            correction = self._believed(observation, as_stated(observation))
+            if correction is not None:
+                return correction
+        model = self._model(observation)
+        views = views_of(observation, model)
         again = list[int]()
         first = None
+        best = None
         while True:
             case = Case(observation, views, model)
-            search = Search(case, self.level)
+            search = Search(case, self.level, self.temperature)
             baseless = _baseless(observation, views)
-            best = None if baseless else search.likeliest()
+            best = None if baseless else search.likeliest(best)
             first = first or search.first
             doubted = baseless or unsure(search, best)
             if look is None or not look.left or not doubted:
                 break
-            views = looked_again(views, look(doubted))
+            views = looked_again(views, look(doubted), observation, model)
             again += doubted
         if best is None:
             return contact_apply(observation) if observation.seen.all() else refused_correction(observation)
-        return _report(observation, first or best, search, with_room(best), again)
+        return _report(observation, first or best, search, with_room(best).noisier(), again)
+
+    def _model(self, observation: Observation) -> OutlierModel:
+        return self.outliers or observation.outliers or OutlierModel()
+
+    def _is_plain(self, observation: Observation) -> bool:
+        """One view of each operation, an inlier more likely than not: nothing is searched while the test holds."""
+        model = self._model(observation)
+        return bool(observation.seen.all()) and model.surprises[INLIER] < model.surprises[GROSS]
+
+    def _believed(self, observation: Observation, correction: Correction) -> Correction | None:
+        """A correction of all as it is stated, if that holds; noise that is larger makes regions larger."""
+        test = correction.test
+        if not correction.ok or test is None or test.p_value < self.level:
+            return None
+        scale = likeliest_scale(test.chi_square, test.freedom)
+        if scale < LEAST or observation.shared:
+            return correction
+        C = correction.covariance
+        return replace(
+            correction,
+            sentence=correction.sentence + scale_words(scale),
+            covariance=None if C is None else C * region_scale(scale, test.freedom) ** 2,
+            believed=noisier(observation, region_scale(scale, test.freedom)),
+            noise_scale=scale,
+        )
 
 
 contact_robust = RobustCorrector()
@@ -92,8 +132,9 @@ def unsure(search: Search, best: SolvedHypothesis | None) -> tuple[int, ...]:
 
 
 def with_room(hypothesis: SolvedHypothesis) -> SolvedHypothesis:
-    """A hypothesis whose left-out operations lead to where there is room for their parts."""
-    unknown = hypothesis.left_out
+    """A hypothesis whose operations of which little was seen lead to where there is room for their parts."""
+    shifted = tuple(k for k, state in enumerate(hypothesis.states) if state == (SHIFTED,))
+    unknown = tuple(sorted({*hypothesis.left_out, *shifted}))
     covariance = hypothesis.correction.covariance
     if not unknown or covariance is None or not np.isfinite(hypothesis.badness):
         return hypothesis
@@ -117,44 +158,54 @@ def _report(
     """The correction of what is believed, with what was seen at first."""
     correction = best.correction
     if not best.doubts and not again:
-        return replace(correction, sentence=correction.sentence + _unexplained(correction))
+        return replace(correction, sentence=correction.sentence + _unexplained(best))
     before = largest_gap(observation.assembly, observation.start, observation.goals)
     return replace(
         correction,
-        sentence=correction.sentence + _unexplained(correction) + _doubts(search, best) + _looks(again),
+        sentence=correction.sentence + _unexplained(best) + _doubts(search, best) + _looks(again),
+        covariance=best.covariance,
+        noise_scale=best.scale,
         gap_before_m=before if observation.seen.all() else np.nan,
         test=first.correction.test or correction.test,
-        test_after=correction.test,
+        test_after=best.test,
         left_out=best.left_out,
-        believed=best.observation,
+        believed=best.stated,
         hypotheses=_hypotheses(search, best),
     )
 
 
 def _hypotheses(search: Search, best: SolvedHypothesis) -> tuple[Hypothesis, ...]:
     """All that were kept; the likeliest with its parts where there is room for them, as the goals that are returned."""
+    weights = dict[tuple[States, tuple[str, ...]], float]()
+    solved_by = {(best.states, best.dropped): best}
+    for weight, solved in search.weighted():
+        # Noise that is larger than stated leaves the goals, so it is no other hypothesis.
+        what = solved.states, solved.dropped
+        weights[what] = weights.get(what, 0.0) + weight
+        solved_by.setdefault(what, solved.noisier())
+    weighted = sorted(
+        ((weight, solved_by[what]) for what, weight in weights.items()), key=lambda one: (one[1] is not best, -one[0])
+    )
     return tuple(
         Hypothesis(
             weight,
             solved.correction.goals,
-            solved.correction.covariance,
-            solved.observation,
+            solved.covariance,
+            solved.stated,
             solved.left_out,
             solved.dropped,
             _disbelieved(solved).removeprefix("; "),
+            solved.scale,
         )
-        for weight, solved in (
-            (weight, best if (solved.states, solved.dropped) == (best.states, best.dropped) else solved)
-            for weight, solved in search.weighted()
-        )
+        for weight, solved in weighted
     )
 
 
-def _unexplained(correction: Correction) -> str:
+def _unexplained(best: SolvedHypothesis) -> str:
     """What the test says that no outlier explains better."""
-    if correction.test is None or correction.test.passes:
+    if best.test is None or best.test.passes:
         return ""
-    p = correction.test.p_value
+    p = best.test.p_value
     return f"; the correction is longer than the stated noise explains (p = {p:.2g}), no outlier does"
 
 
@@ -171,11 +222,24 @@ def _doubts(search: Search, best: SolvedHypothesis) -> str:
 
 def _disbelieved(best: SolvedHypothesis) -> str:
     """`; left out what was seen of operation 2; seen turned: operation 3`, or empty."""
-    broad = tuple(k for k, state in enumerate(best.states) if BROAD in state and k not in best.left_out)
-    turned = tuple(k for k, state in enumerate(best.states) if max(state, default=0) >= FLIPPED)
-    lists = (("left out what was seen of", best.left_out), ("seen badly:", broad), ("seen turned:", turned))
+    states = best.states
+    stale = tuple(k for k in best.left_out if STALE in states[k])
+    lists = (
+        ("left out what was seen of", tuple(k for k in best.left_out if k not in stale)),
+        ("seen where the part was before:", stale),
+        ("seen badly:", _those(best, lambda belief: belief == BROAD)),
+        ("seen too near or too far:", _those(best, lambda belief: belief == SHIFTED)),
+        ("seen turned:", _those(best, lambda belief: belief >= FLIPPED)),
+        ("seen in each other's place:", _those(best, lambda belief: belief < 0)),
+        ("seen displaced together:", _those(best, lambda belief: belief == DISPLACED)),
+    )
     words = "".join(f"; {what} {_operations(those)}" for what, those in lists if those)
-    return words + "".join(f"; left out {relation}" for relation in best.dropped)
+    return words + "".join(f"; left out {relation}" for relation in best.dropped) + scale_words(best.scale)
+
+
+def _those(best: SolvedHypothesis, which: Callable[[int], bool]) -> tuple[int, ...]:
+    """Operations with a view that is believed so, and that are not left out."""
+    return tuple(k for k, state in enumerate(best.states) if any(map(which, state)) and k not in best.left_out)
 
 
 def _looks(again: list[int]) -> str:

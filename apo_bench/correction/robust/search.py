@@ -18,20 +18,22 @@ from numpy.typing import NDArray
 from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.consistency import p_value
 from apo_bench.correction.problem import seen_system
+from apo_bench.correction.robust.beliefs import DISPLACED, GROSS, INLIER, State, States, is_false
 from apo_bench.correction.robust.hypotheses import (
     Case,
     SolvedHypothesis,
-    States,
     believed_observation,
     hypothesis,
     soft_deviation,
     unbelieved,
 )
-from apo_bench.correction.robust.views import FLIPPED, GROSS, INLIER, State, beliefs
+from apo_bench.correction.robust.nearby import changed, continued, displaced_together, likely_beliefs, swaps
+from apo_bench.correction.robust.views import beliefs
 from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.posterior import jacobian_rank
 from apo_bench.correction.solvers.whitened import noise_factor
 from apo_bench.correction.suspects import contacts_of
+from apo_bench.geometry import Array
 
 MOST_EXACT = 12
 """Operations up to which every set is looked at; of more, sets grow by one operation at a time."""
@@ -44,6 +46,12 @@ _MOST_SOLVED = 24
 _BY = 15.0
 """An operation that is less likely to be wrong, by so much in -2 log, counts like one more of a set."""
 _MOST_STARTS = 32
+_EQUALLY = 2.0
+"""States of an operation that differ by less, in -2 log, are as likely as each other by themselves."""
+_MOST_OTHER = 3
+"""States of one operation that are tried in a set."""
+_MOST_ALTOGETHER = 100
+"""Hypotheses beyond which no larger sets are tried, and so many more beyond which nothing is refined."""
 _MOST_KEPT = 16
 _LEAST_KEPT = 1e-3
 """Hypotheses that are told of at most, and how likely one is at least beside the likeliest."""
@@ -53,32 +61,48 @@ _LEAST_KEPT = 1e-3
 class Search:
     """The hypotheses of one case, each solved once."""
 
-    def __init__(self, case: Case, level: float) -> None:
+    def __init__(self, case: Case, level: float, temperature: float = 1.0) -> None:
         """Args:
-        level: As of `RobustCorrector`.
+        level: As of `RobustCorrector`, and so is `temperature`.
         """
+        self._temperature = temperature
         self._case = case
         self._level = level
         self._beliefs = [beliefs(views, case.model) for views in case.views]
-        self._solved: dict[tuple[States, tuple[str, ...]], SolvedHypothesis] = {}
+        self._solved: dict[tuple[States, tuple[str, ...], bool], SolvedHypothesis] = {}
         self.operations = len(case.views)
         self.first: SolvedHypothesis | None = None
         """What is likeliest of each operation by itself."""
 
-    def likeliest(self) -> SolvedHypothesis | None:
-        """None if nothing that was tried has a solution."""
+    def likeliest(self, known: SolvedHypothesis | None = None) -> SolvedHypothesis | None:
+        """None if nothing that was tried has a solution; `known` is what was likeliest before the last look."""
         start = self._start()
         self.first = self._try(start)
         if self.first.p_value >= self._level:
-            return self.first
-        best = self._smallest(start)
+            self._rescaled()
+            return min(self._known(), key=_badness)
+        best = None
+        if known is not None:
+            best = self._try(continued(self._case.views, known.states, self._case.model), known.dropped)
+            self._refined(best)
+            best = min(self._known(), key=_badness, default=None)
+        if best is None or best.p_value < self._level or best.dropped:
+            best = self._smallest(start)
         if best is not None:
             self._refined(best)
             # Where a relation is to blame, the likeliest observation to blame in its place may have been turned.
             rival = self.rival(best) if best.dropped else None
             if rival is not None:
                 self._refined(rival)
+        self._rescaled()
         return min(self._known(), key=_badness, default=None)
+
+    def _rescaled(self) -> None:
+        """What if noise is larger than stated: all that was seen believed, or what is likeliest."""
+        best = min(self._known(), key=_badness, default=None)
+        for one in (self.first, best):
+            if one is not None and (noisier := one.noisier()).scale > one.scale:
+                self._solved[noisier.key] = noisier
 
     def share(self, best: SolvedHypothesis, k: int) -> float:
         """How likely it is, of all hypotheses that were solved, that operation k is not in the state that was found."""
@@ -92,7 +116,7 @@ class Search:
     def weight(self, best: SolvedHypothesis, which: Callable[[SolvedHypothesis], bool]) -> float:
         """How likely some of the hypotheses are together."""
         known = self._known()
-        weights = np.exp([-0.5 * (other.badness - best.badness) for other in known])
+        weights = self._weights(known, best)
         return float(weights @ [which(other) for other in known] / weights.sum())
 
     def weighted(self) -> list[tuple[float, SolvedHypothesis]]:
@@ -100,23 +124,27 @@ class Search:
         known = sorted(self._known(), key=_badness)[:_MOST_KEPT]
         if not known:
             return []
-        weights = np.exp([-0.5 * (solved.badness - known[0].badness) for solved in known])
+        weights = self._weights(known, known[0])
         kept = [(weight, solved) for weight, solved in zip(weights, known, strict=True) if weight >= _LEAST_KEPT]
         whole = sum(weight for weight, _ in kept)
         return [(float(weight / whole), solved) for weight, solved in kept]
+
+    def _weights(self, some: list[SolvedHypothesis], best: SolvedHypothesis) -> Array:
+        """How likely some are beside the best: their likelihood by the temperature."""
+        return np.exp([-0.5 / self._temperature * (one.badness - best.badness) for one in some])
 
     def _known(self) -> list[SolvedHypothesis]:
         return [solved for solved in self._solved.values() if np.isfinite(solved.badness)]
 
     def _try(self, states: States, dropped: tuple[str, ...] = ()) -> SolvedHypothesis:
-        key = states, dropped
+        key = states, dropped, False
         if key not in self._solved:
             self._solved[key] = hypothesis(self._case, states, dropped)
         return self._solved[key]
 
     def _start(self) -> States:
         """The likeliest state of each operation by itself; of those that are equally likely what contacts like best."""
-        likeliest = [[state for s, state in own if s <= own[0][0]] for own in self._beliefs]
+        likeliest = [[state for s, state in own if s <= own[0][0] + _EQUALLY] for own in self._beliefs]
         several = [one for _, one in zip(range(_MOST_STARTS), product(*likeliest), strict=False)]
         if len(several) == 1:
             return several[0]
@@ -127,6 +155,8 @@ class Search:
         tried = [self._try(start, (relation,)) for relation in self._relations(start)]
         gross = self._case.model.surprises[GROSS]
         for size, sets in enumerate(self._sets(start), start=1):
+            if len(self._solved) > _MOST_ALTOGETHER:
+                break
             tried += [self._try(states) for states in sets]
             held = [solved for solved in tried if solved.p_value >= self._level]
             # A wrong relation is no answer while as many gross views as could be tried next are likelier.
@@ -139,7 +169,7 @@ class Search:
         """States in which some operations are in another than at the start, size by size, the best agreeing first."""
         rest = ContactAgreement(self._case, start)
         seen = [k for k, views in enumerate(self._case.views) if views]
-        other = {k: [state for _, state in self._beliefs[k] if state != start[k]] for k in seen}
+        other = {k: [state for _, state in self._beliefs[k] if state != start[k]][:_MOST_OTHER] for k in seen}
         size = {k: self._size(k, start[k]) for k in other}
         for some in self._grown(size, rest):
             rated = sorted(((rest.agreement(s), s) for s in some), key=lambda set_: (-set_[0], set_[1]))
@@ -163,34 +193,43 @@ class Search:
     def _size(self, k: int, now: State) -> int:
         """How many outliers it is worth that operation k is in another state."""
         known = {state: surprise for surprise, state in self._beliefs[k]}
-        least = min(surprise for state, surprise in known.items() if state != now)
+        least = min((surprise for state, surprise in known.items() if state != now), default=known[now])
         return max(1, round((least - known[now]) / _BY))
 
     def _believed(self, k: int) -> State:
         """The likeliest state of an operation in which a view is believed."""
-        return next(state for _, state in self._beliefs[k] if set(state) != {GROSS})
+        return next(state for _, state in self._beliefs[k] if INLIER in state)
 
     def _refined(self, best: SolvedHypothesis) -> None:
         """One state after the other changed for the better, until none is; or relations in place of observations."""
-        while True:
-            near = [self._try(states, best.dropped) for states in self._near(best.states)]
+        most = len(self._solved) + _MOST_ALTOGETHER
+        while len(self._solved) < most:
+            near = [self._try(states, best.dropped) for states in self._near(best)]
             near += [self._try(states, (relation,)) for states, relation in self._instead(best)]
-            best = min(near, key=_badness, default=best)
-            if not best.badness < best.badness:
+            better = min(near, key=_badness, default=best)
+            if not better.badness < best.badness:
                 return
-            best = best
+            best = better
 
-    def _near(self, states: States) -> Iterator[States]:
-        """With one view, that is no inlier, in another state."""
+    def _near(self, best: SolvedHypothesis) -> Iterator[States]:
+        """With one view, that is no inlier, in another state; with two exchanged; with some displaced together."""
+        states = best.states
         for k, (views, state) in enumerate(zip(self._case.views, states, strict=True)):
-            for i, (view, now) in enumerate(zip(views, state, strict=True)):
-                every = range(FLIPPED + len(view.flips)) if now != INLIER else ()
-                others = (belief for belief in every if belief != now)
-                yield from (changed(states, (k,), ((*state[:i], belief, *state[i + 1 :]),)) for belief in others)
+            for i, now in enumerate(state):
+                # Of several views of an operation that is in doubt the one that is believed may be the false one.
+                if now == DISPLACED or set(state) == {INLIER}:
+                    continue
+                blank = changed(states, (k,), ((*state[:i], GROSS, *state[i + 1 :]),))
+                yield blank
+                without = self._try(blank, best.dropped)
+                for belief in likely_beliefs(self._case, without, k, views[i]):
+                    yield changed(states, (k,), ((*state[:i], belief, *state[i + 1 :]),))
+        yield from swaps(self._case, states)
+        yield from displaced_together(states)
 
     def _instead(self, best: SolvedHypothesis) -> Iterator[tuple[States, str]]:
         """A relation in place of an operation that is in doubt and that it depends on."""
-        doubted = [k for k, state in enumerate(best.states) if any(belief != INLIER for belief in state)]
+        doubted = [k for k, state in enumerate(best.states) if any(map(is_false, state))]
         for k in () if best.dropped else doubted:
             states = changed(best.states, (k,), (self._believed(k),))
             yield from ((states, relation) for relation in self._relations(states, k))
@@ -208,12 +247,6 @@ class Search:
                 single = contacts_of(assembly, relation)
                 if len(single) > 1:
                     yield from (name for name, group in single.items() if rest.agreement((), group) >= _LENIENT)
-
-
-def changed(states: States, which: Sequence[int], to: Sequence[State]) -> States:
-    """With the states of some operations replaced."""
-    new = dict(zip(which, to, strict=True))
-    return tuple(new.get(k, state) for k, state in enumerate(states))
 
 
 def _badness(solved: SolvedHypothesis) -> float:

@@ -1,9 +1,7 @@
 """What was seen of each operation, once or several times, and what comes of it if some of that is not believed.
 
-A view is an inlier, seen with the stated noise; broad, seen with some times that; gross, so that it says nothing; or
-flipped, seen with the stated noise but turned, as a part that nearly looks the same after that turn may be.
 Views of one operation that are believed are merged into one Gaussian. That they agree is evidence that they are right,
-since gross views lie anywhere.
+since false views lie anywhere, but for those that repeat the first.
 """
 
 from collections.abc import Sequence
@@ -12,36 +10,31 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Observation, OutlierModel
-from apo_bench.geometry import Array, approximate_symmetries, frozen, pose
+from apo_bench.assembly import Observation, OutlierModel, placements
+from apo_bench.correction.robust.beliefs import (
+    GROSS,
+    INLIER,
+    ROOM,
+    STALE,
+    Sighting,
+    State,
+    log_volume,
+    reading,
+    says_nothing,
+    surprise,
+    swapped_with,
+)
+from apo_bench.geometry import Array, approximate_symmetries, pose
 
-INLIER = 0
-BROAD = 1
-GROSS = 2
-FLIPPED = 3
-"""By the first of the turns of its part; the next number by the next one."""
-State = tuple[int, ...]
-"""One of these for each view of an operation; empty if it was never seen."""
-ROOM = frozen(np.diag(np.repeat([0.5, (8.0 * np.pi**2) ** (1 / 3)], 3) ** 2 / (2.0 * np.pi)))
-"""(6, 6): a Gaussian as dense in its middle as poses anywhere in half a metre, turned anyhow, are; [m, rad]."""
-_MOST_TOGETHER = 4
+_MOST_TOGETHER = 3
 """Of more views than this only those that agree are believed together."""
 _AGREE = 50.0
 """Views whose difference is longer than this, squared and in standard deviations, are not inliers both."""
-_IMPOSSIBLE = 100.0
+_IMPOSSIBLE = 60.0
 """States that are less likely than the likeliest by so much in -2 log are not looked at."""
 _ITERATIONS = 5
-
-
-class Sighting(NamedTuple):
-    """An operation as it was seen once."""
-
-    goal: Array
-    """(4, 4)."""
-    covariance: Array
-    """(6, 6), [m, rad]."""
-    flips: Array
-    """(m, 4, 4), body displacements after which its part nearly looks the same."""
+_EXACT = np.diag(np.repeat([1e-8, 1e-8], 3))
+"""(6, 6): where a part starts is known."""
 
 
 class Merged(NamedTuple):
@@ -58,58 +51,77 @@ Sightings = tuple[tuple[Sighting, ...], ...]
 """Those of each operation."""
 
 
-def views_of(observation: Observation) -> Sightings:
+def views_of(observation: Observation, model: OutlierModel | None = None) -> Sightings:
     """What was seen, once at most."""
-    return looked_again(((),) * len(observation.goals), observation)
+    return looked_again(((),) * len(observation.goals), observation, observation, model)
 
 
-def looked_again(views: Sightings, observation: Observation) -> Sightings:
-    """With what was seen this time."""
+def looked_again(
+    views: Sightings, observation: Observation, first: Observation, model: OutlierModel | None = None
+) -> Sightings:
+    """With what was seen this time; `first` is the first look, which says where parts were before."""
     assembly = observation.assembly
-    flips = [approximate_symmetries(assembly.solids[operation.main]).turns for operation in assembly.operations]
-    new = zip(views, observation.seen, observation.goals, observation.covariance, flips, strict=True)
-    return tuple((*old, Sighting(goal, C, turns)) if seen else old for old, seen, goal, C, turns in new)
+    mains = [operation.main for operation in assembly.operations]
+    before = _before(first)
+    grown = list[tuple[Sighting, ...]]()
+    for k, old in enumerate(views):
+        if not observation.seen[k]:
+            grown.append(old)
+            continue
+        T = observation.goals[k]
+        ray = None
+        if model is not None and model.camera_m is not None:
+            to = T[:3, :3].T @ (T[:3, 3] - np.array(model.camera_m))
+            ray = to / max(float(np.linalg.norm(to)), 1e-9)
+        others = [i for i in range(len(mains)) if mains[i] != mains[k] and first.seen[i]]
+        like = [i for i in others if assembly.solids[mains[i]] is assembly.solids[mains[k]]]
+        flips = approximate_symmetries(assembly.solids[mains[k]]).turns
+        seen = Sighting(T, observation.covariance[k], flips, before[k], ray, tuple(like or others) if not old else ())
+        grown.append((*old, seen))
+    return tuple(grown)
 
 
-def merged(views: Sequence[Sighting], state: State, model: OutlierModel) -> Merged:
-    """What the views of one operation say together."""
-    pairs = list(zip(views, state, strict=True))
-    believed = [_read(view, belief, model) for view, belief in pairs if belief != GROSS]
-    surprise = sum(_surprise(view, belief, model) for view, belief in pairs)
-    anywhere = _log_volume(ROOM)
+def _before(first: Observation) -> list[tuple[Array, Array] | None]:
+    """Where the part of each operation was before it, and the covariance of that; None if an operation was not seen."""
+    now: dict[str, Array | None] = dict.fromkeys(first.start, _EXACT)
+    found = list[tuple[Array, Array] | None]()
+    where = (first.start, *placements(first.assembly, first.start, first.goals)) if first.start else ()
+    for k, operation in enumerate(first.assembly.operations):
+        C = now.get(operation.main)
+        found.append(None if C is None else (where[k][operation.main], C))
+        for part in operation.moves:
+            now[part] = first.covariance[k] if first.seen[k] else None
+    return found
+
+
+def merged(views: Sequence[Sighting], state: State, model: OutlierModel, exchanged: Sighting | None = None) -> Merged:
+    """What the views of one operation say together; `exchanged` is the view of another one that belongs to this."""
+    pairs = [
+        (exchanged if belief < 0 and exchanged else view, belief) for view, belief in zip(views, state, strict=True)
+    ]
+    believed = [reading(view, belief, model) for view, belief in pairs if not says_nothing(belief)]
+    unlikely = surprise(views, state, model)
+    anywhere = log_volume(ROOM)
     if not believed:
-        return Merged(None, ROOM, surprise + anywhere * max(0, len(views) - 1))
-    surprise += anywhere * (len(views) - len(believed))
+        return Merged(None, ROOM, unlikely + anywhere * max(0, len(views) - 1))
+    unlikely += anywhere * (len(views) - len(believed))
     if len(believed) == 1:
-        return Merged(believed[0].goal, believed[0].covariance, surprise)
+        return Merged(*believed[0], unlikely)
     goal, covariance, length = _mean(believed)
-    apart = sum(_log_volume(view.covariance) for view in believed) - _log_volume(covariance)
-    return Merged(goal, covariance, surprise + length + apart)
+    apart = sum(log_volume(C) for _, C in believed) - log_volume(covariance)
+    return Merged(goal, covariance, unlikely + length + apart)
 
 
-def _read(view: Sighting, belief: int, model: OutlierModel) -> Sighting:
-    """What a view says of the goal if it is believed so."""
-    if belief == INLIER:
-        return view
-    if belief == BROAD:
-        return view._replace(covariance=view.covariance * model.times**2)
-    # The true goal is T F where T was seen, so a body twist xi at T is Ad(F^-1) xi there.
-    F = view.flips[belief - FLIPPED]
-    A = pose.adjoint(pose.inverse(F))
-    C = A @ view.covariance @ A.T
-    return view._replace(goal=view.goal @ F, covariance=(C + C.T) / 2)
-
-
-def _surprise(view: Sighting, belief: int, model: OutlierModel) -> float:
-    """-2 log of how likely a state of a view is, beside an inlier."""
-    if belief < GROSS:
-        return model.surprises[belief]
-    return model.gross_surprises(len(view.flips))[belief != GROSS]
+def exchanged_view(views: Sightings, state: State) -> Sighting | None:
+    """The view that belongs to an operation in place of its own."""
+    other = next((swapped_with(belief) for belief in state if belief < 0), None)
+    return None if other is None else views[other][0]
 
 
 def beliefs(views: Sequence[Sighting], model: OutlierModel) -> list[tuple[float, State]]:
-    """States of the views of one operation without broad ones, each with its surprise, the likeliest first;
-    those that are out of the question are left out.
+    """States of the views of one operation in which each is right, stale or gross, each with its surprise.
+
+    The likeliest is first; those that are out of the question are left out.
 
     Of equally likely ones that which believes the latest view: an earlier one was looked at again for a reason.
     """
@@ -119,12 +131,22 @@ def beliefs(views: Sequence[Sighting], model: OutlierModel) -> list[tuple[float,
         groups.update(g for size in range(1, m + 1) for g in combinations(range(m), size))
     else:
         groups.update(tuple(j for j in range(m) if i == j or _agree(views[i], views[j])) for i in range(m))
+    false = [_false(view, model) for view in views]
     rated = []
     for group in groups:
-        state = tuple(INLIER if i in group else GROSS for i in range(m))
+        state = tuple(INLIER if i in group else false[i] for i in range(m))
         rated.append((round(merged(views, state, model).surprise, 6), tuple(-i for i in group[::-1]), state))
     likely = min(rated)[0] + _IMPOSSIBLE
-    return [(surprise, state) for surprise, _, state in sorted(rated) if surprise < likely or set(state) == {GROSS}]
+    return [
+        (unlikely, state) for unlikely, _, state in sorted(rated) if unlikely < likely or all(map(says_nothing, state))
+    ]
+
+
+def _false(view: Sighting, model: OutlierModel) -> int:
+    """Whether a view that says nothing is likelier stale, or gross."""
+    if view.before is None:
+        return GROSS
+    return min((GROSS, STALE), key=lambda belief: surprise((view,), (belief,), model))
 
 
 def _agree(a: Sighting, b: Sighting) -> bool:
@@ -132,18 +154,13 @@ def _agree(a: Sighting, b: Sighting) -> bool:
     return float(xi @ np.linalg.solve(a.covariance + b.covariance, xi)) < _AGREE
 
 
-def _mean(views: Sequence[Sighting]) -> tuple[Array, Array, float]:
+def _mean(views: Sequence[tuple[Array, Array]]) -> tuple[Array, Array, float]:
     """The most likely pose, its covariance, and the squared length of all deviations from it."""
-    goals = np.array([view.goal for view in views])
-    W = np.linalg.inv([view.covariance for view in views])
+    goals = np.array([goal for goal, _ in views])
+    W = np.linalg.inv([C for _, C in views])
     C = np.linalg.inv(W.sum(axis=0))
     T = goals[-1]
     for _ in range(_ITERATIONS):
         T = T @ pose.exp(C @ np.einsum("kij,kj->i", W, pose.log(pose.inverse(T) @ goals)))
     xi = pose.log(pose.inverse(T) @ goals)
     return T, (C + C.T) / 2, float(np.einsum("ki,kij,kj->", xi, W, xi))
-
-
-def _log_volume(covariance: Array) -> float:
-    """-2 log of the density of a Gaussian in its middle."""
-    return float(np.linalg.slogdet(2.0 * np.pi * covariance)[1])

@@ -5,7 +5,7 @@ What is false is drawn apart from the noise, so that a later look can repeat it:
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple, final
+from typing import ClassVar, NamedTuple, final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +15,7 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import Array, approximate_symmetries, pose
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.isotropic import observe_displaced
-from apo_bench.observation.models.level import Level
+from apo_bench.observation.models.level import Facts, Level
 
 RATE = 0.3
 """Share of operations that are seen falsely."""
@@ -25,6 +25,8 @@ FARTHEST_M = 0.06
 VIEW_SHIFT_M = 0.02
 VIEW_TURN_RAD = float(np.radians(5.0))
 """Standard deviations of the displacement of a view, along and about each axis."""
+_MOST_REPEAT = 0.999
+"""A corrector is told no more than this, which no number of looks proves."""
 
 
 class Failures(NamedTuple):
@@ -34,6 +36,21 @@ class Failures(NamedTuple):
     """(n,)."""
     goals: Array
     """(n, 4, 4), where the parts seem to be before any noise, world frame, [m]; the true goals where nothing is."""
+
+
+def _facts(title: str, formula: str, *notes: str) -> Facts:
+    """Facts of a kind of failure."""
+    return Facts(
+        title=title,
+        formula=(f"T_seen = S exp(L e), {formula} of a failure, else S = T",),
+        frame="of the part that is seen, the same in every direction",
+        parameters=(
+            f"p = {RATE:g}: share of operations that fail",
+            "r = 0: probability that a later look repeats what was false in the first",
+        ),
+        states="L^2, the covariance of what is no failure, with p, r and where the camera stands",
+        notes=(*notes, "At level 0 nothing fails; how far a failure is off does not depend on the level"),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +103,9 @@ class CameraFailures(ABC):
         xi = rng.standard_normal((len(assembly), 6)) * sigma
         seeming = replace(demonstration, goals=failures.goals)
         seen = observe_displaced(assembly, seeming, xi, np.diag(sigma**2))
-        return replace(seen, outliers=measured_rates(self.rate, 0.0))
+        x, y, z = self.camera.T_world_camera[:3, 3].tolist()
+        rates = replace(measured_rates(self.rate, 0.0), repeat=min(self.repeat, _MOST_REPEAT), camera_m=(x, y, z))
+        return replace(seen, outliers=rates)
 
     def _drawn(self, n: int, rng: np.random.Generator) -> list[int]:
         """The operations that are false."""
@@ -96,6 +115,12 @@ class CameraFailures(ABC):
 @final
 class Flipped(CameraFailures):
     """Parts are seen turned by one of their approximate symmetries, T F; one that has none is seen rightly."""
+
+    FACTS: ClassVar[Facts] = _facts(
+        "parts that nearly look the same after a turn are seen turned",
+        "S = T F, F one of the turns after which the part nearly fills the same space",
+        "A part without such a turn is seen rightly",
+    )
 
     def _seeming(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Array:
         goals = demonstration.goals.copy()
@@ -110,6 +135,10 @@ class Flipped(CameraFailures):
 class Stale(CameraFailures):
     """Parts are seen where they were before the operation moved them."""
 
+    FACTS: ClassVar[Facts] = _facts(
+        "parts are seen where they were before they were moved", "S the pose of the part before the operation"
+    )
+
     def _seeming(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Array:
         goals = demonstration.goals.copy()
         before = (demonstration.start, *placements(assembly, demonstration.start, demonstration.goals))
@@ -121,6 +150,12 @@ class Stale(CameraFailures):
 @final
 class Swapped(CameraFailures):
     """The views of two operations on like parts are exchanged; where no two parts are alike, of any two."""
+
+    FACTS: ClassVar[Facts] = _facts(
+        "two parts are taken for each other",
+        "S the pose of another operation, which has this one's",
+        "Operations on like parts are exchanged, of any two parts where none are alike",
+    )
 
     def _seeming(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Array:
         goals = demonstration.goals.copy()
@@ -142,6 +177,11 @@ class Swapped(CameraFailures):
 class AlongRay(CameraFailures):
     """Parts are seen 20 to 60 mm too near or too far, on the ray of the camera."""
 
+    FACTS: ClassVar[Facts] = _facts(
+        "parts are seen too near or too far",
+        f"S = T shifted by {1e3 * NEAREST_M:g} to {1e3 * FARTHEST_M:g} mm towards the camera or away",
+    )
+
     def _seeming(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Array:
         goals = demonstration.goals.copy()
         rays = self.camera.rays(goals)
@@ -153,6 +193,13 @@ class AlongRay(CameraFailures):
 @final
 class DisplacedView(CameraFailures):
     """Operations one after the other, as many as the rate says and two at least, share one displacement."""
+
+    FACTS: ClassVar[Facts] = _facts(
+        "operations in a row are displaced together",
+        "S = P exp(c) P^-1 T, P the axes of the camera in the middle of them, one c",
+        f"c: {1e3 * VIEW_SHIFT_M:g} mm and {np.degrees(VIEW_TURN_RAD):g} deg along and about each axis",
+        "As many as p says, two at least",
+    )
 
     def _seeming(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Array:
         goals = demonstration.goals.copy()

@@ -6,7 +6,17 @@ from typing import ClassVar, final
 import numpy as np
 
 from apo_bench.assembly import Assembly, Demonstration, Observation
-from apo_bench.geometry import Array, Solid, across_axis, folds, nearest_alike, pose, revolution, symmetries, turn_about
+from apo_bench.geometry import (
+    Array,
+    Solid,
+    across_axis,
+    folds,
+    nearest_symmetric_pose,
+    pose,
+    revolution,
+    symmetries,
+    turn_about,
+)
 from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Facts, Level
 
@@ -46,8 +56,8 @@ class Symmetric:
         "with m equal places counts as 180 / m / sqrt(3) deg at most; exact while errors are small against 180 / m deg "
         "(up to level 4), above an upper bound",
         notes=(
-            "a part of revolution is the same after any turn about its axis: that turn is reported as it truly is, "
-            "and stated as if it had been seen",
+            "a part of revolution is the same after any turn about its axis: that turn is reported, and stated, as if "
+            "its edges told it",
             "`apo_bench.observation.models.symmetric:AnyTurn` reports any of the equal poses instead, each as likely, "
             "also at level 0: an estimator that knows nothing of faces. The same space is filled, but a contact that "
             "names a face is then asked of another side",
@@ -68,7 +78,7 @@ class Symmetric:
             if np.any(unit[k] * sigma):
                 # About the centre of volume: the body twist there is Ad(frame) xi at the part's origin.
                 off = pose.exp(about @ (unit[k] * sigma))
-                xi[k] = pose.log(nearest_alike(solid, off, np.eye(4)))
+                xi[k] = pose.log(nearest_symmetric_pose(off, group, np.eye(3)))
             covariance[k] = about @ np.diag(stated**2) @ about.T
         return observe_displaced(assembly, demonstration, xi, (covariance + np.swapaxes(covariance, 1, 2)) / 2)
 

@@ -8,7 +8,8 @@ from numpy.testing import assert_allclose
 
 from apo_bench import InputError, correct
 from apo_bench.assembly import OutlierModel
-from apo_bench.correction.robust.views import BROAD, GROSS, INLIER, Sighting, beliefs, merged, views_of
+from apo_bench.correction.robust.beliefs import BROAD, GROSS, INLIER
+from apo_bench.correction.robust.views import beliefs, merged, views_of
 from apo_bench.geometry import pose
 from tests.correction.robust.test_robust import astray, fixed_error_mm, look, shown
 
@@ -113,8 +114,9 @@ def test_views_that_agree_are_merged_and_believed():
 
 def test_of_views_that_do_not_agree_one_is_believed_the_latest_first():
     one = views_of(look("carried_bridge", 4))[0][0]
-    other = Sighting(one.goal @ pose.exp([0.1, 0.0, 0.0, 0.0, 0.0, 1.0]), one.covariance, one.flips)
-    assert [state for _, state in beliefs((one, other), MODEL)[:2]] == [(GROSS, INLIER), (INLIER, GROSS)]
+    other = one._replace(goal=one.goal @ pose.exp([0.1, 0.0, 0.0, 0.0, 0.0, 1.0]))
+    independent = OutlierModel(repeat=0.0)
+    assert [state for _, state in beliefs((one, other), independent)[:2]] == [(GROSS, INLIER), (INLIER, GROSS)]
     many = beliefs((one, other, one, one, other, one), MODEL)
     assert many[0][1] == (INLIER, GROSS, INLIER, INLIER, GROSS, INLIER)
 

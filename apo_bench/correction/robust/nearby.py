@@ -1,0 +1,117 @@
+"""Hypotheses that differ from one by what is believed of an operation, of two that are exchanged, of some in a row."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from apo_bench.assembly import OutlierModel
+from apo_bench.correction.robust.beliefs import (
+    BROAD,
+    DISPLACED,
+    GROSS,
+    INLIER,
+    ROOM,
+    Sighting,
+    State,
+    States,
+    alternatives,
+    is_false,
+    log_volume,
+    reading,
+    says_nothing,
+    surprise,
+    swapped_with,
+)
+from apo_bench.correction.robust.hypotheses import UNKNOWN, Case, SolvedHypothesis
+from apo_bench.correction.robust.views import Sightings, exchanged_view, merged
+from apo_bench.geometry import Array, pose
+
+_MOST_READINGS = 3
+"""Readings of one view that are solved."""
+_UNLIKELY = 30.0
+"""A reading that is less likely than the likeliest by so much in -2 log is not solved."""
+_FINE = np.diag(np.repeat([1e-4, 1e-3], 3) ** 2)
+"""(6, 6): goals that contacts fix are known to no less than this, [m, rad]."""
+_WIDER = 2
+"""Operations by which a row of displaced ones is made longer at either end."""
+
+
+def changed(states: States, which: Sequence[int], to: Sequence[State]) -> States:
+    """With the states of some operations replaced."""
+    new = dict(zip(which, to, strict=True))
+    return tuple(new.get(k, state) for k, state in enumerate(states))
+
+
+def likely_beliefs(case: Case, without: SolvedHypothesis, k: int, view: Sighting) -> list[int]:
+    """What may be believed of a view of operation k, the likeliest first, given the goals that are inferred without it.
+
+    Near these goals everything is Gaussian: a reading is as likely as it is near to the inferred goal, in standard
+    deviations of both. Of what contacts leave free the inferred goal knows nothing.
+    """
+    rest = [belief for belief in alternatives(view) if belief not in (BROAD, GROSS)]
+    C = without.correction.covariance
+    if C is None or not np.isfinite(without.badness):
+        return [*rest[: _MOST_READINGS - 1], BROAD]
+    told = without.states[k] and not all(map(says_nothing, without.states[k]))
+    known = _widened(C[k] + _FINE) if not told else C[k] + _FINE
+    rated = list[tuple[float, int]]()
+    for belief in (*rest, BROAD):
+        unlikely = surprise((view,), (belief,), case.model)
+        if not says_nothing(belief):
+            T, own = reading(view, belief, case.model)
+            apart = pose.log(pose.inverse(without.correction.goals[k]) @ T)
+            total = known + own
+            unlikely += float(apart @ np.linalg.solve(total, apart)) + log_volume(total) - log_volume(ROOM)
+        rated.append((unlikely, belief))
+    rated.sort()
+    return [belief for unlikely, belief in rated[:_MOST_READINGS] if unlikely < rated[0][0] + _UNLIKELY]
+
+
+def _widened(C: Array) -> Array:
+    """The covariance of an inferred goal if nothing but contacts tells of it: `UNKNOWN` is anywhere in the room."""
+    W = np.linalg.inv(C) - np.linalg.inv(UNKNOWN) + np.linalg.inv(ROOM)
+    w, V = np.linalg.eigh((W + W.T) / 2)
+    return np.asarray((V / np.maximum(w, 1.0)) @ V.T)
+
+
+def swaps(case: Case, states: States) -> Iterator[States]:
+    """With the views of two operations exchanged, of which one at least is in doubt; both if their parts differ."""
+    doubted = {k for k, state in enumerate(states) if any(map(is_false, state))}
+    solids = [case.observation.assembly.solids[one.main] for one in case.observation.assembly.operations]
+    for k in sorted(doubted):
+        for i in case.views[k][0].others if states[k] else ():
+            if states[i] and not (i in doubted and i < k) and (i in doubted or solids[i] is solids[k]):
+                exchanged = (swapped_with(i), *states[k][1:]), (swapped_with(k), *states[i][1:])
+                yield changed(states, (k, i), exchanged)
+
+
+def continued(views: Sightings, states: States, model: OutlierModel) -> States:
+    """States of what was seen before, with the likeliest of what was seen since: right, anywhere, or false again."""
+    grown = list[State]()
+    for own, state in zip(views, states, strict=True):
+        now = state
+        for j in range(len(state), len(own)):
+            exchanged = exchanged_view(views, now)
+            every = [(*now, belief) for belief in dict.fromkeys((INLIER, GROSS, *now[:1])) if belief >= 0]
+            now = min(every, key=lambda one: merged(own[: j + 1], one, model, exchanged).surprise)
+        grown.append(now)
+    return tuple(grown)
+
+
+def displaced_together(states: States) -> Iterator[States]:
+    """With operations in a row displaced together: those in doubt, and some beside them."""
+    alone = [len(state) == 1 for state in states]
+    doubted = [k for k, state in enumerate(states) if alone[k] and is_false(state[0])]
+    if not doubted:
+        return
+    n = len(states)
+    for first in range(max(0, doubted[0] - _WIDER), doubted[0] + 1):
+        for last in range(max(doubted[-1], first + 1), min(n, doubted[-1] + 1 + _WIDER)):
+            row = range(first, last + 1)
+            if all(alone[k] for k in row):
+                yield tuple((DISPLACED,) if k in row else state for k, state in enumerate(states))
+    # One operation less at either end of a row.
+    displaced = [k for k in doubted if states[k] == (DISPLACED,)]
+    if len(displaced) > 2:
+        for k in (displaced[0], displaced[-1]):
+            yield changed(states, (k,), ((INLIER,),))

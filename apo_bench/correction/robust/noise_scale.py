@@ -1,0 +1,81 @@
+"""Noise that is larger than stated: by how much is part of the estimate, as far as contacts are redundant.
+
+If all errors are s times as large, a correction is s times as long, and its goals are the same. So the squared length
+and its degrees of freedom tell s, and nothing is solved again. What is not known of s before is that its logarithm is
+normal.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+
+from apo_bench.assembly import Consistency, Observation, SharedError
+from apo_bench.correction.consistency import p_value
+
+SPREAD = 1.0
+"""Standard deviation of the logarithm of s: twice as noisy is nothing special."""
+SCALED = 0.1
+"""How often noise is of another size than stated."""
+LEAST = 1.15
+"""Noise that is less than so many times as large is taken as it is stated."""
+_SAID = 1.5
+"""What is less than so many times as large happens by chance, and nothing is said of it."""
+_LARGEST = 10.0
+_STEPS = 30
+
+
+def likeliest_scale(chi_square: float, freedom: int) -> float:
+    """The most likely s, at least 1, given the squared length of a correction and its degrees of freedom."""
+    # -2 log of the posterior of t = log s is chi^2 exp(-2 t) + 2 f t + (t / SPREAD)^2, which is convex: Newton.
+    if not np.isfinite(chi_square) or freedom < 1:
+        return 1.0
+    t = 0.0
+    for _ in range(_STEPS):
+        q = chi_square * np.exp(-2.0 * t)
+        step = (q - freedom - t / SPREAD**2) / (2.0 * q + 1.0 / SPREAD**2)
+        t += float(np.clip(step, -0.5, 0.5))
+        if abs(step) < 1e-9:
+            break
+    return float(np.clip(np.exp(t), 1.0, _LARGEST))
+
+
+def scale_surprise(scale: float, freedom: int) -> float:
+    """-2 log of how likely it is beforehand that noise is so much larger, within what the correction tells of that."""
+    width = 1.0 / np.sqrt(2.0 * freedom + 1.0 / SPREAD**2)
+    prior = (np.log(scale) / SPREAD) ** 2 - 2.0 * np.log(width / SPREAD)
+    return float(prior - 2.0 * np.log(SCALED / (1.0 - SCALED)))
+
+
+def region_scale(scale: float, freedom: int) -> float:
+    """How much larger than stated regions are made: that the scale is estimated makes them those of Student's t."""
+    return scale * float(np.sqrt(1.0 + 2.0 / freedom)) if scale > 1.0 else 1.0
+
+
+def scaled_test(test: Consistency, scale: float) -> Consistency:
+    """The test beside noise that is so much larger; that this was estimated costs a degree of freedom."""
+    chi_square = test.chi_square / scale**2
+    freedom = max(test.freedom - 1, 0)
+    return replace(test, chi_square=chi_square, freedom=freedom, p_value=p_value(chi_square, freedom))
+
+
+def noisier(observation: Observation, scale: float) -> Observation:
+    """An observation that states so many times its noise."""
+    shared = tuple(_noisier_shared(error, scale) for error in observation.shared)
+    tails = observation.tails
+    if tails is not None:
+        tails = replace(
+            tails, scales=tails.scales * scale, variances=tails.variances * scale**2, limits=tails.limits * scale
+        )
+    return replace(observation, covariance=observation.covariance * scale**2, shared=shared, tails=tails)
+
+
+def _noisier_shared(error: SharedError, scale: float) -> SharedError:
+    return replace(error, covariance=error.covariance * scale**2)
+
+
+def scale_words(scale: float) -> str:
+    """`; about twice as noisy as stated`, or empty."""
+    if scale < _SAID:
+        return ""
+    times = "twice" if 1.75 <= scale < 2.25 else f"{scale:.1f} times" if scale < 3.0 else f"{scale:.0f} times"
+    return f"; about {times} as noisy as stated"

@@ -1,0 +1,220 @@
+"""How cameras fail is found and named; what repeats is no proof; noise that is larger than stated is noticed."""
+
+from dataclasses import replace
+from math import comb
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from apo_bench import Demonstration, correct, draw_layout, load_scenario
+from apo_bench.assembly import OutlierModel, placements
+from apo_bench.correction.region import contains_truth
+from apo_bench.correction.robust.beliefs import (
+    BROAD,
+    GROSS,
+    INLIER,
+    SHIFTED,
+    STALE,
+    alternatives,
+    share,
+    surprise,
+    together,
+)
+from apo_bench.correction.robust.noise_scale import likeliest_scale
+from apo_bench.correction.robust.search import Search
+from apo_bench.correction.robust.views import views_of
+from apo_bench.geometry import pose
+from apo_bench.observation.looking import Looks
+from apo_bench.observation.models.camera import Camera
+from apo_bench.observation.models.failures import Flipped
+from apo_bench.observation.noise import Level, make_noise
+from apo_bench.observation.observing import observe
+from apo_bench.observation.relations import make_relations, with_relations
+from tests.correction.robust.test_looks import Again, at_the_same_place
+from tests.correction.robust.test_robust import astray, fixed_error_mm, look, shown
+
+TOWER = "stick_in_tower"
+
+
+def seen_at(observation, k, T):
+    """An observation in which operation k is seen at another pose, with the error that it was seen with."""
+    goals = np.array(observation.goals)
+    goals[k] = T
+    return replace(observation, goals=goals)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_part_that_is_seen_where_it_was_before_is_said_to_be(seed):
+    name = "vanished_fixture"
+    observation = look(name, seed)
+    first = shown(name, seed)[2]
+    before = (first.start, *placements(first.assembly, first.start, first.goals))[4]["stick"]
+    off = pose.exp(np.repeat([1e-3, np.radians(1.0)], 3) * np.random.default_rng(seed).standard_normal(6))
+    found = correct(seen_at(observation, 4, before @ off))
+    assert found.left_out == (4,)
+    assert found.sentence.endswith("; seen where the part was before: operation 5")
+    assert fixed_error_mm(name, seed, found) < 0.1
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_two_like_parts_that_are_seen_in_each_others_place_are_changed_back(seed):
+    observation = look(TOWER, seed)
+    found = correct(replace(observation, goals=observation.goals[[1, 0, 2]]))
+    assert "seen in each other's place: operation 1, 2" in found.sentence
+    assert found.left_out == found.dropped == ()
+    assert fixed_error_mm(TOWER, seed, found) < 0.1
+    # What is free of the contacts is as it was seen, of the right part.
+    plain = correct(observation, "contact")
+    assert_allclose(found.goals, plain.goals, atol=1e-6)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_what_is_seen_too_near_says_the_rest_all_the_same(seed):
+    """Along the ray nothing is known; across it and of the turn all that was seen is."""
+    camera = Camera()
+    observation = look(TOWER, seed)
+    goals = np.array(observation.goals)
+    goals[0, :3, 3] += 0.04 * camera.rays(goals)[0]
+    told = OutlierModel(camera_m=tuple(camera.T_world_camera[:3, 3].tolist()))
+    found = correct(replace(observation, goals=goals, outliers=told))
+    assert found.sentence.endswith("; seen too near or too far: operation 1")
+    assert found.left_out == ()
+    truth = shown(TOWER, seed)[2].goals
+    assert fixed_error_mm(TOWER, seed, found) < 0.1
+    assert contains_truth(observation, found, truth, 0.999)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_operations_in_a_row_that_are_displaced_alike_are_displaced_together(seed):
+    """What they say of each other is believed; where they all are is inferred from the others."""
+    name = "vanished_fixture"
+    observation = look(name, seed)
+    E = pose.exp([0.03, -0.02, 0.015, 0.05, 0.06, -0.04])
+    goals = np.array(observation.goals)
+    middle = pose.at(goals[2:, :3, 3].mean(axis=0))
+    goals[2:] = middle @ E @ pose.inverse(middle) @ goals[2:]
+    found = correct(replace(observation, goals=goals))
+    assert "seen displaced together: operation 3, 4, 5" in found.sentence
+    assert found.left_out == found.dropped == ()
+
+
+def test_two_looks_that_repeat_an_error_are_no_proof():
+    """Contacts contradict both, and are believed."""
+    k = 1
+    wrong = astray(look("carried_bridge", 2), k)
+    second = at_the_same_place("carried_bridge", 2, 0)
+    again = seen_at(second, k, wrong.goals[k] @ pose.exp(np.repeat([3e-4, 3e-3], 3)))
+    for repeat, believed in ((0.8, False), (0.2, False)):
+        model = OutlierModel(repeat=repeat)
+        found = correct(replace(wrong, outliers=model), look=Again(again))
+        assert found.ok
+        assert (k not in found.left_out) == believed
+        assert found.dropped == ()
+        assert fixed_error_mm("carried_bridge", 2, found) < 0.35
+
+
+def test_a_look_that_repeats_is_likelier_the_more_is_repeated():
+    one = views_of(look("carried_bridge", 4))[0][0]
+    other = one._replace(goal=one.goal @ pose.exp(np.repeat([5e-4, 5e-3], 3)))
+    seldom, often = (surprise((one, other), (GROSS, GROSS), OutlierModel(repeat=repeat)) for repeat in (0.01, 0.8))
+    assert seldom - often == pytest.approx(2.0 * np.log(80.0), abs=0.05)
+
+
+def test_all_that_may_be_believed_of_a_view_is_certain_together():
+    model = OutlierModel()
+    for name in ("stick_in_tower", "vanished_fixture"):
+        for (view,) in views_of(look(name, 0)):
+            every = sum(share(view, belief, model) for belief in alternatives(view))
+            # An exchange of two views is charged half to each, so the square of the share of one is that of the pair.
+            swapped = model.swap * model.gross / (1.0 - model.gross - model.broad) if view.others else 0.0
+            assert (every + swapped) * (1.0 - model.gross - model.broad) == pytest.approx(1.0)
+
+
+def test_rates_that_are_not_known_exactly_make_states_likely_that_add_up():
+    model = OutlierModel(gross=0.3, broad=0.01)
+    n = 6
+    total = 0.0
+    for false in range(n + 1):
+        states = ((GROSS,),) * false + ((INLIER,),) * (n - false)
+        alone = model.gross**false * (1.0 - model.gross) ** (n - false)
+        total += comb(n, false) * alone * np.exp(-0.5 * together(states, model))
+    assert total == pytest.approx(1.0)
+
+
+def test_a_stale_view_is_as_likely_as_it_is_near_to_where_the_part_was():
+    view = views_of(look("vanished_fixture", 0))[0][0]
+    T, C = view.before
+    there = view._replace(goal=T)
+    beside = view._replace(goal=T @ pose.exp([2e-3, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    model = OutlierModel()
+    near, far = (surprise((one,), (STALE,), model) for one in (there, beside))
+    assert far - near == pytest.approx((2e-3) ** 2 / (1e-6 + C[0, 0]), rel=1e-6)
+    assert near < surprise((there,), (GROSS,), model) - 40.0
+    assert {BROAD, SHIFTED, STALE} < {*alternatives(view)}
+
+
+@pytest.mark.parametrize("seed", [0, 4])
+def test_many_looks_solve_few_hypotheses(seed, monkeypatch):
+    """Ten operations, four looks, failures that repeat: no search goes through all that could be believed."""
+    counts = []
+    original = Search.likeliest
+
+    def counted(self, known=None):
+        found = original(self, known)
+        counts.append(len(self._solved))
+        return found
+
+    monkeypatch.setattr(Search, "likeliest", counted)
+    scenario = load_scenario("gearbox")
+    layout = draw_layout(scenario, np.random.default_rng([seed, 30, 0]), 0.0)
+    n = len(layout.goals)
+    first = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((n, 6, 6)))
+    noise = Flipped(Level(1.0, 1.0), repeat=0.8)
+    seen = observe(first, noise, np.random.default_rng([seed, 30, 1]))
+    looks = Looks(first, noise, np.random.default_rng([seed, 30, 2]), 4, first=np.random.default_rng([seed, 30, 1]))
+    assert correct(seen, look=looks).ok
+    assert counts
+    assert max(counts) < 300
+
+
+def test_noise_that_is_twice_what_is_stated_is_noticed_and_nothing_is_left_out():
+    scales = []
+    covered = []
+    for seed in range(30):
+        observation = look("vanished_fixture", seed, 2.0)
+        stated = replace(observation, covariance=observation.covariance / 4.0)
+        found = correct(stated)
+        assert found.left_out == found.dropped == ()
+        scales.append(found.noise_scale)
+        covered.append(contains_truth(stated, found, shown("vanished_fixture", seed)[2].goals))
+        if found.noise_scale > 1.5:
+            assert "as noisy as stated" in found.sentence
+    assert 1.7 < np.median(scales) < 2.3
+    assert np.mean(covered) > 0.8
+
+
+def test_noise_that_is_as_stated_is_left_as_it_is():
+    scales = [correct(look("vanished_fixture", seed)).noise_scale for seed in range(30)]
+    assert np.mean(np.array(scales) == 1.0) > 0.7
+    assert max(scales) < 1.5
+
+
+def test_the_likeliest_scale_is_where_the_posterior_is_largest():
+    scales = np.linspace(1.0, 5.0, 40001)
+    for chi_square, freedom in ((52.0, 13), (20.0, 3), (5.0, 5)):
+        t = np.log(scales)
+        surprises = chi_square / scales**2 + 2.0 * freedom * t + t**2
+        assert likeliest_scale(chi_square, freedom) == pytest.approx(scales[surprises.argmin()], abs=2e-4)
+
+
+def test_a_hypothesis_at_which_the_solver_finds_no_number_is_none():
+    """A contact too many in ten operations: one of the sets that are tried leads the compiled solver to no number."""
+    scenario = load_scenario("gearbox")
+    layout = draw_layout(scenario, np.random.default_rng([13, 7]), 0.0)
+    first = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((10, 6, 6)))
+    seen = make_noise("isotropic", Level(1.0, 1.0))(scenario.assembly, first, np.random.default_rng([13, 8]))
+    wrong = with_relations(seen, make_relations("false"), layout.goals, np.random.default_rng([13, 9]))
+    found = correct(wrong)
+    assert found.ok
+    assert found.dropped
