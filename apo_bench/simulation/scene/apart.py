@@ -87,7 +87,7 @@ def _asked() -> Any:
     conaffinities = _offset(model, model.geom_conaffinity, _MODEL_BYTES)
     places = _offset(data, data.geom_xpos, _DATA_BYTES)
     turns = _offset(data, data.geom_xmat, _DATA_BYTES)
-    if None in (contypes, conaffinities, places, turns):
+    if contypes is None or conaffinities is None or places is None or turns is None:
         return None
     known = int(_models().ctypes.data)
 
