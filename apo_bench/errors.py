@@ -4,7 +4,7 @@ from collections.abc import Iterable
 from difflib import get_close_matches
 from typing import Any
 
-_MOST = 20
+_MOST = 24
 """A longer list of names helps nobody."""
 _LONGEST = 200
 """So much of a name that is not known is said again."""

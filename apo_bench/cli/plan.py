@@ -133,6 +133,10 @@ def plan_command(
         print_json(plan_lines_form(lines, loaded, notes) | {"promised": promised})
         return
     typer.echo(f"{loaded.name} {where}; {axes}: mm and degrees\n")
+    if promised is not None:
+        from apo_bench.trial.promise import promise_sentence
+
+        notes.insert(0, f"promised: {promise_sentence(promised)}")
     typer.echo("\n".join([*plan_text(lines), *([""] if notes else []), *notes]))
     if robot is not None:
         typer.echo(f"\nWrote {robot}")
@@ -144,7 +148,7 @@ def _planned(
     """The scenario, the plan that a method makes of an observation of it, what it promises, and what is to be said."""
     from apo_bench.files.observation import read_observation_file
     from apo_bench.trial.planning import apply_method, plan_warning
-    from apo_bench.trial.promise import promise_sentence, promised_success
+    from apo_bench.trial.promise import promised_success
 
     seen, loaded, assumed = read_observation_file(
         observation, scenario, deviation_mm=deviations[0], deviation_deg=deviations[1]
@@ -159,7 +163,7 @@ def _planned(
     notes = [assumed_deviations(*deviations)] if assumed and result.correction is not None else []
     moved = "" if result.fitting is None else result.fitting.sentence
     promised = promised_success(result.plan, seen, result.correction, loaded)
-    notes += filter(None, (moved, warning, f"promised: {promise_sentence(promised)}"))
+    notes += filter(None, (moved, warning))
     return loaded, result.plan, promised, notes
 
 

@@ -222,6 +222,7 @@ def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(trial, "replay_and_judge", refuse)
     monkeypatch.setattr(trial, "predicted_outcome", lambda *_: "")  # which needs an arm
+    monkeypatch.setattr(trial, "promised_success", lambda *_: 1.0)  # so does this
     spec = TrialSettings("carried_bridge", level_mm=1.5, level_deg=0.5, noise=name, method="none", seed=5)
     with pytest.raises(Carried):
         trial.run_trial(spec, scene, simulated=simulated, content="any")

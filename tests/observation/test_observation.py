@@ -151,7 +151,11 @@ def test_make_noise_by_name_class_function_and_object() -> None:
         ("megapose", Level(1, 1), "did you mean 'megapose-lmo'"),
         ("megapose-lmo-inlier", Level(1, 1), "did you mean 'megapose-lmo-inliers'"),
         ("isotropc", Level(1, 1), "FILE.toml, anisotropic, "),
-        ("isotropc", Level(1, 1), "empirical:FILE.csv, heavy-tailed, isotropic, megapose-lmo, megapose-lmo-inliers"),
+        (
+            "isotropc",
+            Level(1, 1),
+            "empirical:FILE.csv, flips, heavy-tailed, isotropic, megapose-lmo, megapose-lmo-inliers",
+        ),
         ("empirical", Level(1, 1), "did you mean 'empirical:FILE.csv'"),
         ("here/mine.csv", Level(1, 1), "did you mean 'empirical:here/mine.csv'"),
         ("isotropic", Level(-1, 1), "noise level -1 mm is not possible"),
