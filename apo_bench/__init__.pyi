@@ -7,7 +7,7 @@ from apo_bench.assembly.goals import Observation as Observation
 from apo_bench.assembly.goals import Plan as Plan
 from apo_bench.assembly.reached import ReplayResult as ReplayResult
 from apo_bench.assembly.topology import Assembly as Assembly
-from apo_bench.correction.contact import ContactCorrector as ContactCorrector
+from apo_bench.correction.contact.contact import ContactCorrector as ContactCorrector
 from apo_bench.correction.correctors import correct as correct
 from apo_bench.correction.explanation import explain as explain
 from apo_bench.correction.many import correct_many as correct_many

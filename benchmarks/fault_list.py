@@ -56,7 +56,9 @@ FAULTS = (
         "chdtri(known.rank, ",
         "directions that are fixed for those that are free",
     ),
-    Fault("correction/consistency.py", "unit_m / sqrt(3.0)", "unit_m / sqrt(12.0)", "half the play instead of all"),
+    Fault(
+        "correction/checks/consistency.py", "unit_m / sqrt(3.0)", "unit_m / sqrt(12.0)", "half the play instead of all"
+    ),
     Fault(
         "correction/relation_equations.py",
         "self.operations[i] if j > k})",

@@ -20,7 +20,7 @@ import numpy as np
 from scipy.stats import kstest
 
 from apo_bench.assembly import Assembly, Contact, Observation, Operation, PartFace, largest_gap
-from apo_bench.correction.contact import contact
+from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.explanation import explain
 from apo_bench.correction.many import correct_many
 from apo_bench.correction.region import contains_truth

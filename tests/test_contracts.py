@@ -19,8 +19,8 @@ configuration.configure()
 KINDS = {"layers": LayersContract, "forbidden": ForbiddenContract}
 BREACHES = {
     "layers": [
-        ("apo_bench.correction.contact", "apo_bench.simulation.scene.world"),
-        ("apo_bench.simulation.scene.scene", "apo_bench.correction.contact"),
+        ("apo_bench.correction.contact.contact", "apo_bench.simulation.scene.world"),
+        ("apo_bench.simulation.scene.scene", "apo_bench.correction.contact.contact"),
         ("apo_bench.scenario.file", "apo_bench.trial.trial"),
         ("apo_bench.geometry.pose", "apo_bench.assembly.goals"),
         ("apo_bench.sweeps.sweep", "apo_bench.report.report"),
@@ -47,11 +47,18 @@ BREACHES = {
         ("apo_bench.cad.solids.naming", "apo_bench.cad.import_report"),
     ],
     "correction": [
-        ("apo_bench.correction.solvers.gauss_newton", "apo_bench.correction.contact"),
-        ("apo_bench.correction.solvers.posterior", "apo_bench.correction.consistency"),
-        ("apo_bench.correction.baselines.paper", "apo_bench.correction.problem"),
-        ("apo_bench.correction.starts", "apo_bench.correction.robust.views"),
+        ("apo_bench.correction.solvers.gauss_newton", "apo_bench.correction.contact.contact"),
+        ("apo_bench.correction.solvers.posterior", "apo_bench.correction.checks.consistency"),
+        ("apo_bench.correction.checks.status", "apo_bench.correction.contact.solved"),
+        ("apo_bench.correction.baselines.paper", "apo_bench.correction.contact.problem"),
+        ("apo_bench.correction.contact.starts", "apo_bench.correction.robust.views"),
+        ("apo_bench.correction.robust.views", "apo_bench.correction.directions"),
         ("apo_bench.correction.correctors", "apo_bench.correction.own_code.forms"),
+    ],
+    "contact": [
+        ("apo_bench.correction.contact.problem", "apo_bench.correction.contact.chi_square"),
+        ("apo_bench.correction.contact.heavy_tails", "apo_bench.correction.contact.inferred"),
+        ("apo_bench.correction.contact.suspects", "apo_bench.correction.contact.starts"),
     ],
     "workshop": [
         ("apo_bench.trial.trial", "apo_bench.recording.importing"),
@@ -82,10 +89,10 @@ BREACHES = {
     "judge": [
         ("apo_bench.judging.verdict", "apo_bench.observation.noise"),
         ("apo_bench.judging.contacts", "apo_bench.recognition.contacts"),
-        ("apo_bench.judging.rules", "apo_bench.correction.contact"),
+        ("apo_bench.judging.rules", "apo_bench.correction.contact.contact"),
     ],
     "corrector": [
-        ("apo_bench.correction.contact", "apo_bench.scenario.scenario"),
+        ("apo_bench.correction.contact.contact", "apo_bench.scenario.scenario"),
         ("apo_bench.correction.solvers.compact", "apo_bench.simulation.scene.settling"),
     ],
     "rows": [

@@ -171,7 +171,7 @@ def _explained(observation: Observation, correction: Correction) -> Any:
 
 def _corrector(method: str, doubt: str | None) -> Any:
     """The corrector `contact` with what it is to do in doubt, or any other as a trial knows it."""
-    from apo_bench.correction.contact import ContactCorrector, Doubt
+    from apo_bench.correction.contact.contact import ContactCorrector, Doubt
     from apo_bench.records import with_simulated
 
     if doubt is not None and doubt not in _DOUBTS:

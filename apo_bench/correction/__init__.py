@@ -4,7 +4,7 @@
 an Assembly Plan from Observation: Fine localization based on face contact constraints". `apo_bench.assembly.equations`
 writes its contact equations out, `solvers.newton` its solver.
 
-What one correction by `contact` calls:
+What one correction by `contact` calls, in the folder `contact` unless another is named:
 
     correctors.correct                      the door for all correctors: checks, and lowers round faces to planes
       contact.ContactCorrector.together     many at once; alone what is large, or states tails or shared errors
@@ -22,8 +22,10 @@ What one correction by `contact` calls:
             starts.best_start               other starts, each solved as above; none where only the test has failed
             suspects.suspects               each relation left out in turn, if the test fails; `drop` then leaves it out
             contact._report                 the Correction
-            status.opposing                 `inconsistent` where faces look the same way
+            checks.status.opposing          `inconsistent` where faces look the same way
 
-`baselines` are what `contact` is compared with (`paper` is the method as it was published), `robust` is the corrector
-that doubts observations, `own_code` the processes of correctors of one's own.
+`solvers` know equations, `checks` what all corrections are asked. `baselines` are what `contact` is compared with
+(`paper` is the method as it was published), `learning` learns noise from contacts, `robust` is the corrector that
+doubts observations. The files beside these folders stand above them: who asks for a correction, and what is said of
+one. Above these files stands only `own_code`, the processes of correctors of one's own.
 """

@@ -9,10 +9,10 @@ import numpy as np
 
 from apo_bench.assembly import Correction, Look, LookingCorrector, Observation, lowered_observation
 from apo_bench.correction.baselines.measured import gap_of, goals_as_given
-from apo_bench.correction.contact import ContactCorrector
-from apo_bench.correction.correction_checks import RIGID, check_correction, check_near
-from apo_bench.correction.observation_checks import check_observations
-from apo_bench.correction.status import opposing
+from apo_bench.correction.checks.correction_checks import RIGID, check_correction, check_near
+from apo_bench.correction.checks.observation_checks import check_observations
+from apo_bench.correction.checks.status import opposing
+from apo_bench.correction.contact.contact import ContactCorrector
 from apo_bench.errors import InputError, failed, kind
 from apo_bench.geometry import Array, NotReal, is_rigid, real
 from apo_bench.names import resolve

@@ -6,8 +6,8 @@ from math import ceil
 import numpy as np
 
 from apo_bench.assembly import Correction, Observation
-from apo_bench.correction.contact import ContactCorrector
-from apo_bench.correction.observation_checks import check_observations
+from apo_bench.correction.checks.observation_checks import check_observations
+from apo_bench.correction.contact.contact import ContactCorrector
 from apo_bench.correction.robust.robust import RobustCorrector, contact_robust
 from apo_bench.errors import InputError
 

@@ -7,11 +7,11 @@ from types import MappingProxyType
 
 CORRECTORS = MappingProxyType(
     {
-        "contact": "apo_bench.correction.contact:contact",
-        "contact-refuse": "apo_bench.correction.contact:contact_refuse",
-        "contact-drop": "apo_bench.correction.contact:contact_drop",
+        "contact": "apo_bench.correction.contact.contact:contact",
+        "contact-refuse": "apo_bench.correction.contact.contact:contact_refuse",
+        "contact-drop": "apo_bench.correction.contact.contact:contact_drop",
         "contact-robust": "apo_bench.correction.robust.robust:contact_robust",
-        "contact-fast": "apo_bench.correction.contact:contact_fast",
+        "contact-fast": "apo_bench.correction.contact.contact:contact_fast",
         "paper": "apo_bench.correction.baselines.paper:paper",
         "paper-track": "apo_bench.correction.baselines.track:paper_track",
         "last-only": "apo_bench.correction.baselines.ablations:last_only",

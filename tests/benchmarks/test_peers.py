@@ -10,7 +10,7 @@ from types import ModuleType
 import pytest
 
 from apo_bench import InputError, correct
-from tests.correction.test_baselines import noisy
+from tests.correction.baselines.test_baselines import noisy
 from tests.correction.test_round_contacts import case
 
 ADAPTED = """
@@ -21,7 +21,7 @@ import numpy as np
 from apo_bench.correction.correctors import correct
 from apo_bench.assembly.equations import equations
 from benchmarks.corrector_bench.peers_{package} import {package}
-from tests.correction.test_baselines import noisy
+from tests.correction.baselines.test_baselines import noisy
 for name in ("stick_in_tower", "fixture"):
     seen = noisy(name)
     {check}

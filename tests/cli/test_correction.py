@@ -222,7 +222,7 @@ def test_an_operation_that_was_not_seen_gives_no_correction(capsys: pytest.Captu
     assert (code, err, "x free, chosen, 50.00 mm" in out) == (0, "", True)
 
 
-@pytest.mark.parametrize("method", ["paper", "paper-track", "snap", "apo_bench.correction.contact:contact"])
+@pytest.mark.parametrize("method", ["paper", "paper-track", "snap", "apo_bench.correction.contact.contact:contact"])
 def test_any_corrector_may_be_asked(capsys: pytest.CaptureFixture[str], tmp_path: Path, method: str) -> None:
     code, out, err = run(capsys, *asked(SEEN, "--method", method, "--json", "--out", str(tmp_path / "plan.json")))
     made = json.loads(out)

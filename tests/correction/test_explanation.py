@@ -11,7 +11,7 @@ import pytest
 from apo_bench import Assembly, InputError, Observation, Scenario, explain, load_scenario
 from apo_bench.assembly import Gap, placements
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.contact import contact
+from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.directions import Direction, directions, held
 from apo_bench.correction.explanation import Explanation
 from apo_bench.correction.solvers.newton import solve_newton

@@ -13,17 +13,17 @@ from apo_bench import ContactCorrector, Correction, InputError, Observation, cor
 from apo_bench.assembly import Gap
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.contact import contact
+from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.many import BATCH
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
 from apo_bench.correction.solvers.laid_contacts import laid_contacts
 from apo_bench.geometry import Array, pose
 from tests import scenes
 from tests.assembly.test_equations import random_scene
-from tests.correction.test_consistency import shifted
-from tests.correction.test_large import of_problem
-from tests.correction.test_manifold import crooked, scales, twisted
-from tests.correction.test_walls import walled
+from tests.correction.checks.test_consistency import shifted
+from tests.correction.solvers.test_large import of_problem
+from tests.correction.solvers.test_manifold import crooked, scales, twisted
+from tests.correction.solvers.test_walls import walled
 
 SCENES: dict[str, Callable[[], scenes.Scene]] = {**scenes.ALL, "chain6": lambda: of_problem("chain6")}
 

@@ -12,11 +12,11 @@ from scipy.optimize import minimize
 from apo_bench import Assembly, ContactCorrector, InputError, Observation, correct, correct_many, explain
 from apo_bench.assembly import Gap, PartFace, SharedError, largest_gap, lowered
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.contact import contact
+from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.learning.evidence import readings
 from apo_bench.correction.own_code.forms import observation_message, parse_observation
-from apo_bench.correction.play import fit_covariance
 from apo_bench.correction.region import contains_truth
+from apo_bench.correction.solvers.play import fit_covariance
 from apo_bench.geometry import pose
 from apo_bench.records import with_simulated
 from apo_bench.show.explain_text import sentences

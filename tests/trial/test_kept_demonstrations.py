@@ -206,7 +206,7 @@ def test_all_code_that_a_demonstration_runs_through_is_in_the_key() -> None:
     assert {"simulation/human/perform.py", "judging/rules.py", "parts/mjcf.py"} <= run_through
     assert [file for file in sorted(run_through) if not decides(file)] == []
     assert decides("trial/stages.py")
-    assert not decides("correction/contact.py")
+    assert not decides("correction/contact/contact.py")
 
 
 def test_what_a_range_finder_records_is_not_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,9 +6,9 @@ import numpy as np
 
 from apo_bench.assembly import Correction, Observation, largest, largest_gap, lowered_observation
 from apo_bench.assembly.equations import equations
+from apo_bench.correction.checks.status import refused_correction, status_sentence
 from apo_bench.correction.solvers.inequalities import demanded, violations
 from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, least_step
-from apo_bench.correction.status import refused_correction, status_sentence
 from apo_bench.geometry import Array
 from apo_bench.records import outcomes
 

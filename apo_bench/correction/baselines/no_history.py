@@ -8,8 +8,8 @@ import numpy as np
 from apo_bench.assembly import Assembly, Correction, Observation, Operation, largest, largest_gap, placements
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.baselines.candidates import candidates
+from apo_bench.correction.checks.status import refused_correction, solver_status, status_sentence
 from apo_bench.correction.solvers.newton import solve_newton
-from apo_bench.correction.status import refused_correction, solver_status, status_sentence
 from apo_bench.geometry import Array
 
 

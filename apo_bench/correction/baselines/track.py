@@ -16,8 +16,8 @@ from apo_bench.assembly import Correction, Equations, Iterate, Observation, Step
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.baselines.candidates import candidates
 from apo_bench.correction.baselines.own_contacts import solve_own_contacts
+from apo_bench.correction.checks.status import refused_correction, solver_status, status_sentence
 from apo_bench.correction.solvers.newton import Solution, solve_newton
-from apo_bench.correction.status import refused_correction, solver_status, status_sentence
 from apo_bench.geometry import Array
 
 _Sets = Callable[[tuple[int, ...]], Iterable[tuple[int, ...]]]

@@ -15,8 +15,8 @@ import numpy as np
 from apo_bench.assembly import Observation, lowered_observation
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.play import fit_covariance
 from apo_bench.correction.solvers.compact import compact_equations
+from apo_bench.correction.solvers.play import fit_covariance
 from apo_bench.correction.solvers.posterior import RANK_CUT_OFF
 from apo_bench.geometry import Array, frozen, pose
 

@@ -16,8 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.consistency import p_value
-from apo_bench.correction.problem import seen_system
+from apo_bench.correction.checks.consistency import p_value
+from apo_bench.correction.contact.problem import seen_system
+from apo_bench.correction.contact.suspects import contacts_of
 from apo_bench.correction.robust.beliefs import DISPLACED, GROSS, INLIER, State, States, is_false
 from apo_bench.correction.robust.hypotheses import (
     Case,
@@ -32,7 +33,6 @@ from apo_bench.correction.robust.views import beliefs
 from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.posterior import jacobian_rank
 from apo_bench.correction.solvers.whitened import noise_factor
-from apo_bench.correction.suspects import contacts_of
 from apo_bench.geometry import Array
 
 MOST_EXACT = 12

@@ -1,1 +1,1 @@
-"""Solvers of the contact equations."""
+"""Solvers of the contact equations, and by how much play lets these equations be off."""

@@ -20,7 +20,7 @@ from apo_bench import (
     load_scenario,
 )
 from apo_bench.assembly import Gap, SharedError
-from apo_bench.correction.contact import contact
+from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise

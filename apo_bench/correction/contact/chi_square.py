@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Consistency, largest
-from apo_bench.correction.consistency import CONTRADICTION_M, p_value, softened_chi_square
-from apo_bench.correction.heavy_tails import drawn_chi_squares, drawn_p_value
-from apo_bench.correction.problem import Problem
+from apo_bench.correction.checks.consistency import CONTRADICTION_M, p_value, softened_chi_square
+from apo_bench.correction.contact.heavy_tails import drawn_chi_squares, drawn_p_value
+from apo_bench.correction.contact.problem import Problem
 from apo_bench.correction.solvers.gauss_newton import NearestGoals
 from apo_bench.correction.solvers.posterior import jacobian_rank
 from apo_bench.geometry import Array

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Consistency, Correction, Iterate, Observation, Suspect, lowered_together
-from apo_bench.correction.consistency import TEST_LEVEL
-from apo_bench.correction.problem import Problem, problem_of
-from apo_bench.correction.solved import Solved, solve
+from apo_bench.correction.checks.consistency import TEST_LEVEL
+from apo_bench.correction.checks.status import opposing, refused_correction, status_sentence
+from apo_bench.correction.contact.problem import Problem, problem_of
+from apo_bench.correction.contact.solved import Solved, solve
+from apo_bench.correction.contact.starts import best_start, turned_words
+from apo_bench.correction.contact.suspects import contact_suspects, suspects
 from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE
-from apo_bench.correction.starts import best_start, turned_words
-from apo_bench.correction.status import opposing, refused_correction, status_sentence
-from apo_bench.correction.suspects import contact_suspects, suspects
 from apo_bench.errors import InputError
 
 Doubt = Literal["apply", "warn", "refuse", "drop"]

@@ -12,12 +12,12 @@ from scipy.stats import kstest
 
 from apo_bench import Assembly, ContactCorrector, Correction, InputError, Observation, correct
 from apo_bench.assembly import Consistency, Contact, PartFace
-from apo_bench.correction.consistency import p_value
-from apo_bench.correction.suspects import MOST_SUSPECTS
+from apo_bench.correction.checks.consistency import p_value
+from apo_bench.correction.contact.suspects import MOST_SUSPECTS
 from apo_bench.geometry import Array, Face, pose
 from benchmarks.corrector_bench.problems import problem
 from tests import scenes
-from tests.correction.test_large import fence
+from tests.correction.solvers.test_large import fence
 
 ALONG = {"redundant": ("R3", "stick.py on castle1.spy"), "not redundant": ("R1", "castle1.bottom on table.top")}
 """In Fig. 3 a side of the stick contradicts the other one; in the tower nothing contradicts the height of the table."""

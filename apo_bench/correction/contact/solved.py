@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Consistency, largest
-from apo_bench.correction.chi_square import chi_square_test, chi_squares, relaxed_chi_square
-from apo_bench.correction.consistency import CONTRADICTION_M, p_value
-from apo_bench.correction.problem import Problem
+from apo_bench.correction.checks.consistency import CONTRADICTION_M, p_value
+from apo_bench.correction.contact.chi_square import chi_square_test, chi_squares, relaxed_chi_square
+from apo_bench.correction.contact.problem import Problem
 from apo_bench.correction.solvers.gauss_newton import NearestGoals
 from apo_bench.correction.solvers.inequalities import active_rank, nearest_between
 from apo_bench.correction.solvers.posterior import marginals, projections

@@ -15,8 +15,8 @@ from apo_bench.assembly import Contact, Gap, Operation
 from apo_bench.assembly.equations import equations
 from apo_bench.geometry import Array, pose, right_jacobian
 from tests import scenes
-from tests.correction.test_large import fence
-from tests.correction.test_manifold import correction, crooked, scales, twisted
+from tests.correction.solvers.test_large import fence
+from tests.correction.solvers.test_manifold import correction, crooked, scales, twisted
 
 SIDES = {"stick_on_castles": ("spy", "sny"), "pockets": ("px", "nx", "py", "ny")}
 """Sides of slots and of pockets: floors are exact."""

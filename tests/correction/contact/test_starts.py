@@ -8,7 +8,7 @@ import pytest
 from apo_bench import ContactCorrector, correct, correct_many
 from apo_bench.assembly import largest_gap, looking_away
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.contact import contact
+from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.solvers.compact import compact_equations
 from apo_bench.correction.solvers.curved import descended
 from apo_bench.correction.solvers.gauss_newton import nearest_goals

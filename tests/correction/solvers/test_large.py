@@ -19,7 +19,7 @@ from apo_bench.geometry import Array, Solid
 from benchmarks.corrector_bench.draws import draw
 from benchmarks.corrector_bench.problems import problem
 from tests import scenes
-from tests.correction.test_manifold import correction, crooked, scales, system_of, twisted
+from tests.correction.solvers.test_manifold import correction, crooked, scales, system_of, twisted
 
 BLOCK = scenes.block()
 PLATE = scenes.cuboid("plate", (600, 500, 10))

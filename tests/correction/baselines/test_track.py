@@ -19,7 +19,7 @@ from apo_bench.correction.baselines.track import nested, paper_track, reached_ba
 from apo_bench.geometry import Array, is_rigid
 from apo_bench.records import CODES
 from tests import scenes
-from tests.correction.test_paper import contradiction
+from tests.correction.baselines.test_paper import contradiction
 
 LAST = {
     "stick_in_tower": ((3,), (3, 2)),

@@ -12,7 +12,7 @@ import pytest
 import apo_bench
 from apo_bench import Correction, InputError, Observation, correct, correct_many
 from apo_bench.assembly import largest_gap
-from apo_bench.correction.contact import contact
+from apo_bench.correction.contact.contact import contact
 from apo_bench.geometry import Array
 from tests import scenes
 

@@ -12,9 +12,9 @@ import numpy as np
 
 from apo_bench.assembly import largest, looking_away
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.inferred import inferred_goals
-from apo_bench.correction.problem import Problem, problem_of
-from apo_bench.correction.solved import FAR_DEG, Solved, solve
+from apo_bench.correction.contact.inferred import inferred_goals
+from apo_bench.correction.contact.problem import Problem, problem_of
+from apo_bench.correction.contact.solved import FAR_DEG, Solved, solve
 from apo_bench.correction.solvers.curved import descended
 from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE, nearest_goals
 from apo_bench.correction.solvers.laid_contacts import laid_contacts

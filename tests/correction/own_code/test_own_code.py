@@ -54,7 +54,7 @@ HOSTILE = """
 import gc, json, os, signal, subprocess, sys, tempfile, time
 import numpy as np
 from apo_bench.judging import verdict as judge
-from apo_bench.correction.contact import contact, contact_drop
+from apo_bench.correction.contact.contact import contact, contact_drop
 from apo_bench.correction.baselines.track import paper_track
 from apo_bench.assembly.correction_record import Correction
 from apo_bench.assembly.goals import Layout

@@ -9,7 +9,7 @@ their Application", 1997, Section 4.2).
 import numpy as np
 
 from apo_bench.assembly import Observation, joint_covariance
-from apo_bench.correction.consistency import ROUNDING
+from apo_bench.correction.checks.consistency import ROUNDING
 from apo_bench.correction.solvers.whitened import coordinates_of
 from apo_bench.geometry import Array
 

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly, Contact, Suspect
-from apo_bench.correction.problem import Problem
-from apo_bench.correction.solved import pull, tested
+from apo_bench.correction.contact.problem import Problem
+from apo_bench.correction.contact.solved import pull, tested
 
 MOST_SUSPECTS = 64
 """Relations that are left out in turn; of more, those that pull hardest."""

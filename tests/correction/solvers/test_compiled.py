@@ -12,7 +12,7 @@ import pytest
 
 from apo_bench import Assembly, ContactCorrector, Correction, Observation, correct, correct_many, load_scenario
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.contact import Doubt, contact
+from apo_bench.correction.contact.contact import Doubt, contact
 from apo_bench.correction.solvers import kernels
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
 from apo_bench.correction.solvers.gauss_newton import NearestGoals, nearest_goals

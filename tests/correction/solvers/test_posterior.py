@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 from apo_bench import Correction, Observation, correct, correct_many, load_scenario
 from apo_bench.assembly import Gap, Operation
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.contact import contact
+from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.region import contains_truth
 from apo_bench.correction.solvers.compact import compact_equations
 from apo_bench.correction.solvers.gauss_newton import nearest_goals
@@ -22,7 +22,7 @@ from apo_bench.correction.solvers.kernels import PLAIN
 from apo_bench.correction.solvers.posterior import freedom_of, jacobian_rank, marginals, projections, settled_basis
 from apo_bench.geometry import Array, pose
 from tests import scenes
-from tests.correction.test_manifold import RANKS, crooked, jacobian, scales, system_of, twisted
+from tests.correction.solvers.test_manifold import RANKS, crooked, jacobian, scales, system_of, twisted
 
 
 def look(scene: scenes.Scene, L: Array, seed: int) -> Observation:

@@ -1,0 +1,1 @@
+"""What any correction is asked: is it what was agreed, how did it end, and does the stated noise explain it."""
