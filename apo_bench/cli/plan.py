@@ -76,7 +76,8 @@ def plan_command(
         Path | None, typer.Option(help="At the goals of this .json or .csv; default: the nominal ones.")
     ] = None,
     method: Annotated[
-        str | None, typer.Option(help="Who corrects them: none, a corrector, or package.module:name; default: contact.")
+        str | None,
+        typer.Option(help=f"Who corrects them: none, a corrector, or package.module:name; default: {CORRECTOR}."),
     ] = None,
     deviation_mm: StatedMm = None,
     deviation_deg: StatedDeg = None,

@@ -98,12 +98,10 @@ def _outliers(node: JsonNode) -> OutlierModel:
     """How often observations are worse than they state; what is not said is as usual."""
     keys = node.fields((), (*OUTLIER_KEYS, "camera_mm"))
     rates: dict[str, Any] = {OUTLIER_KEYS[key]: value.number(0.0) for key, value in keys.items() if key in OUTLIER_KEYS}
+    if "camera_mm" in keys:
+        rates["camera_m"] = tuple((keys["camera_mm"].numbers(3) * 1e-3).tolist())
     try:
-        model = replace(OutlierModel(), **rates)
-        if "camera_mm" not in keys:
-            return model
-        x, y, z = (keys["camera_mm"].numbers(3) * 1e-3).tolist()
-        return replace(model, camera_m=(x, y, z))
+        return replace(OutlierModel(), **rates)
     except InputError as error:
         raise InputError(f"{node.file}, {node.key}: {error}") from error
 

@@ -100,7 +100,8 @@ def correction_form(
 
 def _gaps(correction: Correction) -> str:
     """The largest gap before and, of a correction that converged, after."""
-    before = f"{correction.gap_before_m * 1e3:.3f} mm as seen"
+    known = np.isfinite(correction.gap_before_m)  # it is not where an operation was not seen
+    before = f"{correction.gap_before_m * 1e3:.3f} mm as seen" if known else "unknown as seen"
     if not correction.ok:
         return before
     of = ", relations that were left out counted too" if correction.dropped else ""

@@ -9,7 +9,7 @@ from typing import final
 
 from apo_bench.io.grouping import grouped
 from apo_bench.records import Row, knows_truth
-from apo_bench.statistics.rates import Rate, by_method, rank, rank_relations
+from apo_bench.statistics.rates import NOT_EXECUTED, Rate, by_method, rank, rank_relations
 
 ALL = "all"
 """Stands for every scenario, or every method."""
@@ -55,7 +55,7 @@ class Confusion:
     stopped: int
     """Of `fail_failed`: the robot stopped at an operation at all; of others the judge says only that they are wrong."""
     not_executed: int
-    """The method gave no plan, so nothing was predicted."""
+    """Nothing was carried out: the method gave no plan, or one that promised too little."""
     excluded: int
     """The demonstration itself was not right."""
 
@@ -121,7 +121,11 @@ def _rms(numbers: Sequence[float]) -> float | None:
 
 def _confusion(scenario: str, method: str, rows: Sequence[Row]) -> Confusion:
     counted = [row for row in rows if row["success"] is not None]
-    executed = [(row, forecast) for row in counted if (forecast := row["predicted"]) is not None]
+    executed = [
+        (row, forecast)
+        for row in counted
+        if (forecast := row["predicted"]) is not None and row["failure_stage"] not in NOT_EXECUTED
+    ]
     caught = [(row, forecast) for row, forecast in executed if forecast["fails"] and not row["as_demonstrated"]]
     stopped = [(row, forecast) for row, forecast in caught if row["failure_operation"] is not None]
     # predicted to fail, and made as demonstrated

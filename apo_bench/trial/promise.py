@@ -120,7 +120,9 @@ def promise_sentence(promised: float) -> str:
 
 def abstained(promised: float, least: float) -> Outcome:
     """The ending of a trial whose plan promises less than was asked for."""
-    why = f": {promised:.2f}, where {least:g} is asked"
+    # as many digits as tell the two apart: 0.947, where 0.95 is asked
+    said = next(text for digits in range(2, 20) if float(text := f"{promised:.{digits}f}") < least)
+    why = f": {said}, where {least:.15g} is asked"
     return Outcome("promise", "abstained", None, sentence("abstained") + why)
 
 

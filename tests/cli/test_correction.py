@@ -330,3 +330,24 @@ def _python(code: str) -> subprocess.CompletedProcess[Any]:
     return subprocess.run(
         [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=120, check=False
     )
+
+
+def test_the_gap_before_is_unknown_where_an_operation_was_not_seen(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    header, first, *others = SEEN.read_text(encoding="utf-8").splitlines()
+    path = tmp_path / "missed.csv"
+    lines = [f"{header},seen", f"{first},false", *(f"{line},true" for line in others)]
+    path.write_text("\n".join(lines), encoding="utf-8")
+    code, out, err = run(capsys, *asked(path))
+    assert (code, err) == (0, "")
+    assert "unknown as seen, 0.000 mm corrected" in out
+    assert "nan" not in out
+
+
+def test_the_help_of_plan_names_the_corrector_that_plans(capsys: pytest.CaptureFixture[str]) -> None:
+    _, told, _ = run(capsys, "plan", "--help")
+    _, out, _ = run(capsys, "plan", "stick_in_tower", "--observation", str(SEEN))
+    named = re.search(r"default: ([a-z-]+)\.", " ".join(told.split()))
+    assert named is not None
+    assert f"corrected by {named[1]};" in out

@@ -69,6 +69,8 @@ def test_rates_of_outliers_come_back_and_may_be_left_out(tmp_path: Path) -> None
     assert some.outliers == OutlierModel(0.3)
     with pytest.raises(InputError, match=r"seen\.json, outliers: rates of 1\.5 gross"):
         read(tmp_path, form() | {"outliers": {"gross_rate": 1.5}})
+    with pytest.raises(InputError, match=r"^\S*seen\.json, outliers, camera_mm: 3 finite numbers"):
+        read(tmp_path, form() | {"outliers": {"camera_mm": [1, 2]}})
 
 
 @QUICK

@@ -182,13 +182,14 @@ def test_predictions_are_counted_against_physics() -> None:
         row(seed=5, success=False, predicted=foretold(False)),
         row(seed=6, success=False, failure_stage="correct", failure_operation=None, predicted=None),
         row(seed=7, success=None),
+        row(seed=8, success=False, failure_stage="promise", failure_code="abstained", predicted=foretold(False)),
         row("oracle", seed=0),
         row(seed=0, scenario="stick_on_castles", level=None, level_deg=None, careless=None),
     ]
     ceiling, raw, measured, everything = confusions(rows)
     assert raw == Confusion(
         *("stick_in_tower", "none"), fit_fitted=1, fit_failed=1, fail_fitted=1, fail_failed=3, same_operation=1,
-        stopped=2, not_executed=1, excluded=1,
+        stopped=2, not_executed=2, excluded=1,
     )  # fmt: skip
     assert (raw.executed, raw.right, raw.agreement) == (6, 4, 4 / 6)
     assert (ceiling.method, ceiling.agreement, measured.scenario) == ("oracle", 1.0, "stick_on_castles")

@@ -17,7 +17,7 @@ from apo_bench.records import Row
 from apo_bench.statistics import tally
 from apo_bench.trial import trial
 from apo_bench.trial.planning import apply_method
-from apo_bench.trial.promise import Explanation, drawn_truths, promised_success
+from apo_bench.trial.promise import Explanation, abstained, drawn_truths, promised_success
 from apo_bench.trial.promise_table import RATES, SCORES
 from apo_bench.trial.robot_draws import brought
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, robot_error_of, simulate_demonstration
@@ -150,6 +150,12 @@ def test_below_abstain_the_arm_never_moves(
     assert (kept["success"], kept["failure_stage"], kept["failure_code"]) == (False, "promise", "abstained")
     assert (kept["sim_seconds"], kept["reached"]) == (None, None)
     assert kept["promised"] == carried_out["promised"]
+
+
+def test_a_plan_that_abstains_says_less_than_what_was_asked() -> None:
+    assert abstained(0.9472, 0.95).sentence.endswith(": 0.947, where 0.95 is asked")
+    assert abstained(0.9472, 1).sentence.endswith(": 0.95, where 1 is asked")
+    assert abstained(0.6999, 0.7).sentence.endswith(": 0.6999, where 0.7 is asked")
 
 
 def test_what_promises_enough_is_carried_out_as_without_abstaining(

@@ -178,9 +178,9 @@ class Search:
             yield [states for _, states in zip(range(_MOST_SOLVED), every, strict=False)]
 
     def _grown(self, size: dict[int, int], rest: ContactAgreement) -> Iterator[list[tuple[int, ...]]]:
-        """Sets of operations by size; not all of them together."""
+        """Sets of operations by size; not all of them together, but a single one."""
         if len(size) <= MOST_EXACT:
-            every = [s for m in range(1, len(size)) for s in combinations(size, m)]
+            every = [s for m in range(1, max(len(size), 2)) for s in combinations(size, m)]
             sizes = {s: sum(size[k] for k in s) for s in every}
             yield from (list(some) for _, some in groupby(sorted(every, key=sizes.__getitem__), sizes.__getitem__))
             return

@@ -134,6 +134,22 @@ def test_an_operation_of_which_nothing_is_told_stays_unseen():
     assert correct(observation, "contact-robust").status == "not_seen"
 
 
+def test_a_single_operation_that_was_seen_turned_is_turned_back():
+    """Its contact with the table is not blamed in its place."""
+    made = look("block_on_block", 0)
+    single = replace(made.assembly, operations=made.assembly.operations[:1])
+    about_y = np.array([[0.0, 0, 1, 0], [0, 1, 0, 0], [-1, 0, 0, 0], [0, 0, 0, 1]])
+    turned = made.goals[:1] @ about_y
+    stated = OutlierModel(gross=0.3)
+    one = {"goals": turned, "covariance": made.covariance[:1], "seen": made.seen[:1]}
+    observation = replace(made, assembly=single, outliers=stated, **one)
+    found = correct(observation, "contact-robust")
+    assert found.ok
+    assert found.dropped == ()
+    assert "seen turned: operation 1" in found.sentence
+    assert not looking_away(single, made.start, found.goals).any()
+
+
 def test_ten_times_the_noise_is_seen_badly_and_not_left_out():
     observation = look("stick_in_tower", 5, 0.5)
     goals = np.array(observation.goals)
