@@ -9,7 +9,7 @@ import gymnasium
 import numpy as np
 
 from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Poses, Step
-from apo_bench.envs.episode import Episode, Scenes, Settings, with_options
+from apo_bench.envs.episode import Episode, Scenes, Settings, watch_human, with_options
 from apo_bench.envs.infos import step_info
 from apo_bench.envs.spaces import Action, Seen, action_space, as_seen_entries, moved, observation_space
 from apo_bench.errors import InputError
@@ -32,7 +32,6 @@ from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.fitting import fitting_plan
 from apo_bench.trial.promise import abstained, promised_success
 from apo_bench.trial.stages import (
-    SimulatedDemonstration,
     demonstration_failure,
     draw_robot_error,
     looks_at,
@@ -41,15 +40,12 @@ from apo_bench.trial.stages import (
     predicted_outcome,
     range_sensor,
     replay_and_judge,
-    simulate_demonstration,
     trial_outcome,
 )
 
 PICTURE = (480, 640)
 LONGEST_REPLAY_S = 1000.0
 """Simulated time after which a replay begins no further step: seven times the longest of the benchmark."""
-MOST_TRIES = 30
-"""So many demonstrations in a row may go wrong before `reset()` gives up."""
 
 
 @final
@@ -226,7 +222,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._set(with_options(self._usual, options, self._eye))
         super().reset(seed=seed)
         self._over = True
-        trial, simulated = self._watch_human(seed)
+        trial, simulated = watch_human(self._scene, self._now.careless, self._eye, seed, self.np_random)
         noise = range_sensor(self._scene, simulated, self._now.level.mm) if self._eye == RANGE else self._noise
         seen = observe_demonstration(simulated, noise, trial)
         look = looks_at(simulated, noise, trial, self._allowed) if self._allowed else None
@@ -310,19 +306,6 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._scene = self._scenes.of(now.clearance_mm)
         self._now = now
         self._noise = noise
-
-    def _watch_human(self, seed: int | None) -> tuple[int, SimulatedDemonstration]:
-        """Trial `seed`, or the next one whose demonstration is right."""
-        for _ in range(1 if seed is not None else MOST_TRIES):
-            trial = int(seed) if seed is not None else int(self.np_random.integers(2**31))
-            simulated = simulate_demonstration(self._scene, self._now.careless, trial, self._eye)
-            if seed is not None or simulated.demonstration.code == "ok":
-                return trial, simulated
-        raise InputError(
-            f"{MOST_TRIES} demonstrations of '{self._scene.scenario.name}' in a row went wrong at carelessness "
-            f"{self._now.careless:g} and {self._scene.clearance_mm:g} mm clearance; give less carelessness, or mend "
-            "the scenario."
-        )
 
     def _replayed(self, plan: Plan) -> tuple[dict[str, bool], Outcome, Predicted | None, float | None]:
         """The verdicts, where it ended, what the plan had said, and how likely it had called its success."""

@@ -4,16 +4,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from typing import Any, final
 
+import numpy as np
+
 from apo_bench.assembly import Observation
 from apo_bench.errors import InputError, unknown
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level
 from apo_bench.records import check, level_pair
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.trial.stages import SimulatedDemonstration
+from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 
 MOST_SCENES = 8
 """So many compiled scenes of other clearances are kept."""
+MOST_TRIES = 30
+"""So many demonstrations in a row may go wrong before `reset()` gives up."""
 
 
 @final
@@ -67,6 +71,25 @@ def with_options(usual: Settings, options: object, eye: str) -> Settings:
     if "level" in changes:
         changes["level"] = Level(*level_pair(changes["level"], eye))
     return replace(usual, **changes)
+
+
+def watch_human(
+    scene: Scene, careless: float, eye: str, seed: int | None, rng: np.random.Generator
+) -> tuple[int, SimulatedDemonstration]:
+    """Trial `seed`, or the next one of those that are drawn whose demonstration is right.
+
+    Raises:
+        InputError: None of `MOST_TRIES` is right.
+    """
+    for _ in range(1 if seed is not None else MOST_TRIES):
+        trial = int(seed) if seed is not None else int(rng.integers(2**31))
+        simulated = simulate_demonstration(scene, careless, trial, eye)
+        if seed is not None or simulated.demonstration.code == "ok":
+            return trial, simulated
+    raise InputError(
+        f"{MOST_TRIES} demonstrations of '{scene.scenario.name}' in a row went wrong at carelessness {careless:g} and "
+        f"{scene.clearance_mm:g} mm clearance; give less carelessness, or mend the scenario."
+    )
 
 
 @final

@@ -19,6 +19,7 @@ import apo_bench
 from apo_bench import Correction, InputError, Observation, Scene, TrialSettings, correct, run_trial
 from apo_bench.assembly import Outcome, Step
 from apo_bench.envs import apo_replay as envs
+from apo_bench.envs import episode
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.infos import nullable, predicted_info
 from apo_bench.geometry import pose
@@ -55,7 +56,7 @@ def demonstrated(scene: Scene, careless: float, seed: int, eye: str) -> Simulate
 def watched(env: APOReplay) -> Iterator[APOReplay]:
     """The same environment, its demonstrations shown once: for tests of what comes after them."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(envs, "simulate_demonstration", demonstrated)
+        patch.setattr(episode, "simulate_demonstration", demonstrated)
         yield env
 
 
@@ -191,7 +192,7 @@ def test_looks_of_an_episode_are_those_of_its_trial(monkeypatch: pytest.MonkeyPa
 
     again: list[Observation] = []
     made = APOReplay("block_on_block", grasp="weld", noise="outliers", looks=2)
-    monkeypatch.setattr(envs, "simulate_demonstration", demonstrated)
+    monkeypatch.setattr(episode, "simulate_demonstration", demonstrated)
     corrected = apo_bench.Corrected(made, Asks())
     corrected.reset(seed=SEED)
     assert again[0].seen.tolist() == [False, bool(again[0].seen[1])]
@@ -341,7 +342,7 @@ def test_an_operation_that_was_not_seen_is_not_replayed(monkeypatch: pytest.Monk
 def test_a_failed_demonstration_is_kept_for_its_seed_and_passed_over_without(
     watched: APOReplay, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import apo_bench.envs.apo_replay as module
+    import apo_bench.envs.episode as module
 
     real = module.simulate_demonstration
     calls = []
@@ -367,7 +368,7 @@ def test_a_failed_demonstration_is_kept_for_its_seed_and_passed_over_without(
 def test_demonstrations_that_never_come_out_right_end_in_a_sentence(
     watched: APOReplay, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    import apo_bench.envs.apo_replay as module
+    import apo_bench.envs.episode as module
 
     shown = module.simulate_demonstration(watched._scene, 1.0, SEED, "noise")
     failed = replace(shown, demonstration=replace(shown.demonstration, code="demonstration_failed"))
