@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError
+from apo_bench.io.documents import JsonNode
 from apo_bench.parts import load_part, part_names, part_path, read_part
 from apo_bench.parts.load import check_part
 from apo_bench.parts.making import bore, circle, extrude, join, rectangle, shaft, write_part
+from apo_bench.parts.stated import _beside
 
 MADE = join(
     extrude(
@@ -305,3 +307,12 @@ def test_a_part_file_is_read_once_until_it_or_the_file_beside_it_changes(tmp_pat
     mine.write_text("<mujoco/>")
     with pytest.raises(InputError):
         read_part(mine)
+
+
+def test_where_a_face_points_is_taken_across_its_axis() -> None:
+    """A middle that is stated half a thousandth off is brought across the axis, not further off."""
+    axis = np.array([0.0, 0.0, 1.0])
+    toward = _beside(JsonNode([1.0, 0.0, 5e-4], "part.toml"), axis)
+    assert toward == pytest.approx([1.0, 0.0, 0.0], abs=1e-15)
+    with pytest.raises(InputError, match="a direction across the axis is needed"):
+        _beside(JsonNode([1.0, 0.0, 2e-3], "part.toml"), axis)

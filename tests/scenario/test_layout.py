@@ -14,7 +14,7 @@ from apo_bench.assembly import Contact, Poses, largest_gap, placements
 from apo_bench.geometry import Array, Solid, pose
 from apo_bench.geometry.covering import overlap
 from apo_bench.geometry.penetration import intrusion
-from apo_bench.scenario.layout import layout_at
+from apo_bench.scenario.layout import layout_at, nominal_start
 from apo_bench.scenario.scenario import Grasp, Site, Turn
 from tests import scenes
 from tests.shipped import BOXES
@@ -310,3 +310,15 @@ def test_what_is_bolted_to_the_table_follows_the_site_and_turned_parts_still_tou
         site = layout.goals[-1] @ pose.inverse(scenario.goals[-1])
         np.testing.assert_allclose(layout.start[bolted], site @ scenario.start[bolted], rtol=0, atol=1e-12)
         assert largest_gap(scenario.assembly, layout.start, layout.goals) < 1e-9
+
+
+def test_nominal_starts_are_seen_from_the_middle_of_where_the_site_may_be():
+    """What follows the site starts as the file says; the site is at (0.1, -0.2) m, turned by 10 to 50 degrees."""
+    site = Site(center_m=(0.1, -0.2), spread_m=(0.03, 0.03), yaw_rad=tuple(np.radians([10.0, 50.0])))
+    scenario = replace(load_scenario("dovetail"), site=site)
+    start = nominal_start(scenario)
+    assert {*scenario.follows_site} == {"base1"}
+    assert start["base1"] == pytest.approx(scenario.start["base1"], abs=1e-12)
+    T_world_site = pose.at((0.1, -0.2, 0.0), (0.0, 0.0, 30.0))
+    for part in ("base2", "slide", "table"):
+        assert T_world_site @ start[part] == pytest.approx(scenario.start[part], abs=1e-12)
