@@ -78,7 +78,7 @@ def rests_of(track: PoseTrack) -> tuple[RestSpan, ...]:
         if b - a + 1 >= _FEWEST and t[b] - t[a] >= 0.5 * LEAST_REST_S:
             spans += _split(T, a, b, noise)
     # Neighbouring stretches of one pose become one, unless the part went away and came back.
-    groups = grouped(spans, lambda group, span: _one_rest(T, (group[0][0], group[-1][1]), span, noise, half_window))
+    groups = consecutive(spans, lambda group, span: _one_rest(T, (group[0][0], group[-1][1]), span, noise, half_window))
     ends = [(group[0][0], group[-1][1]) for group in groups]
     spans = [(stride * a, stride * b) for a, b in ends if t[b] - t[a] >= 0.5 * LEAST_REST_S]
     means = [average(track.T[a : b + 1]) for a, b in spans]
@@ -181,7 +181,7 @@ def _alike(xi: Array) -> float:
     return (1.0 + r) / (1.0 - min(r, 0.99))
 
 
-def grouped(items: Iterable[_Item], belongs: Callable[[Sequence[_Item], _Item], bool]) -> list[list[_Item]]:
+def consecutive(items: Iterable[_Item], belongs: Callable[[Sequence[_Item], _Item], bool]) -> list[list[_Item]]:
     """Items in their order, in groups: each with those just before it, if it belongs to them."""
     groups: list[list[_Item]] = []
     for item in items:

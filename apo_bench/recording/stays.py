@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.geometry import Array, pose
 from apo_bench.recording.log import PoseTrack
-from apo_bench.recording.rests import RestSpan, grouped, rests_of
+from apo_bench.recording.rests import RestSpan, consecutive, rests_of
 
 _ADJUSTED_M = 0.01
 _ADJUSTED_RAD = np.radians(10.0)
@@ -53,7 +53,7 @@ def all_stays(tracks: Mapping[str, PoseTrack]) -> Stays:
 
 def stays_of(part: str, rests: Sequence[RestSpan]) -> tuple[Stay, ...]:
     """The stays of a part, in order of time."""
-    groups = grouped(rests, lambda before, rest: _is_adjusted(before[-1], rest))
+    groups = consecutive(rests, lambda before, rest: _is_adjusted(before[-1], rest))
     return tuple(Stay(part, tuple(together)) for together in groups)
 
 

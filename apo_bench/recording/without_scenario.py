@@ -11,7 +11,7 @@ from apo_bench.geometry import Array
 from apo_bench.recording.arranging import CameraPose, solved_camera, staying
 from apo_bench.recording.averaging import per_axis
 from apo_bench.recording.log import PoseTrack
-from apo_bench.recording.rests import RestSpan, grouped
+from apo_bench.recording.rests import RestSpan, consecutive
 from apo_bench.recording.setup_files import CameraFile
 from apo_bench.recording.stays import Stay, Stays, all_stays
 
@@ -53,7 +53,7 @@ def unplanned_recording(tracks: Mapping[str, PoseTrack], camera: CameraFile, fil
     moves = sorted((_Move(before.ends, after) for before, after in pairs), key=lambda move: move.stay.begins)
     if not moves:
         raise InputError(f"{file}: no part comes to rest at another place than before, so there is no operation.")
-    groups = grouped(moves, lambda group, move: any(_together(move, other) for other in group))
+    groups = consecutive(moves, lambda group, move: any(_together(move, other) for other in group))
     return UnplannedRecording(X, stays, tuple(map(_put, groups)))
 
 
