@@ -2,8 +2,8 @@
 
 from apo_bench.geometry.arrays import Array, Ints, NotReal, copyable, freeze, frozen, real, remembered
 from apo_bench.geometry.clearance import physical_pieces
-from apo_bench.geometry.convex import ball_around, balls_apart, passage, separating_axes, shadow
-from apo_bench.geometry.covering import Overlap, beside, face_area, overlap, overlap_area
+from apo_bench.geometry.convex import all_corners, ball_around, balls_apart, passage, separating_axes, shadow
+from apo_bench.geometry.covering import Overlap, beside, face_area, overlap, overlap_area, own_shape, plane_frame
 from apo_bench.geometry.exact_turns import depth_inside
 from apo_bench.geometry.flips import Flips, approximate_symmetries
 from apo_bench.geometry.hull import SAGITTA_M, Cylinder, Hull, cylinder_hull, first_of_each, sides_of
@@ -62,6 +62,7 @@ __all__ = (
     "Solid",
     "across_axis",
     "all_boxes",
+    "all_corners",
     "angle_between",
     "approximate_symmetries",
     "ball_around",
@@ -94,9 +95,11 @@ __all__ = (
     "nearest_symmetric_pose",
     "overlap",
     "overlap_area",
+    "own_shape",
     "passage",
     "physical_pieces",
     "plane_across",
+    "plane_frame",
     "polygons_of",
     "quarter_turns",
     "real",

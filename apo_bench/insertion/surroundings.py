@@ -71,15 +71,17 @@ def later_walls(assembly: Assembly, k: int, part: str) -> list[Array]:
     Of a round face two directions across its axis. Only those before the part is moved by itself again.
     """
     walls = list[Array]()
-    for operation in assembly.operations[k + 1 :]:
+    for later, operation in enumerate(assembly.operations[k + 1 :], start=k + 1):
         if operation.main == part:
             break
-        for contact in operation.contacts:
-            for of in contact:
-                if of.part == part:
-                    face = assembly.face_of(of)
-                    walls += [face.normal] if isinstance(face, Face) else list(face.frame[:3, :2].T)
+        walls += own_walls(assembly, later, part)
     return walls
+
+
+def own_walls(assembly: Assembly, k: int, part: str) -> list[Array]:
+    """Normals of a part's faces, (3,) each, that touch something in an operation; of a round face two directions."""
+    faces = [assembly.face_of(of) for contact in assembly.operations[k].contacts for of in contact if of.part == part]
+    return [n for face in faces for n in ([face.normal] if isinstance(face, Face) else face.frame[:3, :2].T)]
 
 
 def neighbours(contacts: tuple[Contact, ...], moved: tuple[str, ...]) -> set[str]:

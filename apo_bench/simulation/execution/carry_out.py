@@ -80,7 +80,8 @@ def bring(robot: Robot, t: Transfer, i: int) -> None:
     if left > _ARRIVED_M:
         raise Halt("attach", "force_stop")
     for other in t.centring:
-        centre(robot, t, other)
+        robot.stage = "release"
+        centre(robot, t, other, t.T_world_goal)
 
 
 def _carry(robot: Robot, t: Transfer, grip: Grip) -> None:

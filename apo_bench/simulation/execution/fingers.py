@@ -62,12 +62,21 @@ def change_grip(robot: Robot, t: Transfer, grip: Grip, second: Grip, at: Array) 
     grasp(robot, t, second, at)
 
 
-def centre(robot: Robot, t: Transfer, grip: Grip) -> None:
-    """Close the fingers on the part where it should stand, and open them again."""
-    robot.stage = "release"
-    grasp(robot, t, grip, t.T_world_goal @ grip.T_part_tip)
+def centre(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
+    """Close the fingers on the part where it should stand, a pose (4, 4), and open them again."""
+    grasp(robot, t, grip, at @ grip.T_part_tip)
     release(robot, t, grip)
     depart(robot, t)
+
+
+def grasp_again(robot: Robot, grip: Grip) -> None:
+    """Open and close where the tip is: what the first closing dragged and turned, the second takes squarely."""
+    if robot.scene.grasp == "friction":
+        robot.fingers(min(grip.half_width + OPEN_TO_PICK_M, robot.arm.opening_m))
+        robot.stand()
+        robot.fingers(grip.half_width - robot.arm.squeeze_m)
+        robot.hold_watch = robot.hold_watch.grasp(robot.in_hand())
+        check_hold(robot, grip)
 
 
 def check_hold(robot: Robot, grip: Grip) -> None:

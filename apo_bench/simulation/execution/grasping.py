@@ -84,7 +84,7 @@ def clear_across(scene: Scene, part: str, across: Array, place: RestingPart) -> 
 
     It is clear open and closed: fingers that close flush with a wall beside the part stem against it.
     """
-    up = _upwards(place.T)
+    up = upwards(place.T)
     level = across - (across @ up) * up  # without its vertical part
     level /= np.linalg.norm(level)
     stays = Stroke(place.T, up, 0.0, place.around)
@@ -130,7 +130,7 @@ def tip_frame(grasp: Grasp, T_part: Array) -> Array:
 def half_width(pieces: tuple[Piece, ...], grasp: Grasp, T: Array) -> float:
     """Half of the width between the fingers of a part that stands at T, [m]: of boxes that of the part, where they hold
     that."""
-    up = _upwards(T)
+    up = upwards(T)
     own = held_width(pieces, tuple(grasp.point), tuple(grasp.across), tuple(up))
     if own is None or (all_boxes(pieces) and holds_whole(pieces, grasp.point, grasp.across, up)):
         low, high = extent(pieces, grasp.across)
@@ -143,7 +143,7 @@ def _known_width(pieces: tuple[Piece, ...], grasp: Grasp, T: Array) -> float:
     return half_width(pieces, grasp, T) if grasp.half_width is None else grasp.half_width
 
 
-def _upwards(T: Array) -> Array:
+def upwards(T: Array) -> Array:
     """The vertical in the frame of a part at T; one of its axes where it is near to it."""
     up = T[2, :3]
     k = int(np.abs(up).argmax())
@@ -167,7 +167,7 @@ def _pair(scene: Scene, part: str, stroke: Stroke, able: Sequence[tuple[float, G
 def _candidates(scene: Scene, part: str, T: Array) -> list[Grasp]:
     """Places on the part at T: those of the box around it where they are on a part of boxes, else by its shape."""
     solid = scene.scenario.assembly.solids[part]
-    up = _upwards(T)
+    up = upwards(T)
     if all_boxes(solid.pieces):
         around = _around_box(scene, solid, T)
         if around and all(holds_whole(solid.pieces, grasp.point, grasp.across, up) for grasp in around):
@@ -221,7 +221,7 @@ def _clear(
         for place in places:
             R = (place.T @ tip_frame(Grasp(np.zeros(3), np.array(across)), place.T))[:3, :3]
             at = points @ place.T[:3, :3].T + place.T[:3, 3]
-            struck |= _depth(scene, opening, R, at, place.around, margin) > 0.0
+            struck |= gripper_depth(scene, opening, R, at, place.around, margin) > 0.0
         yield from (grasp for grasp, hit in zip(same, struck, strict=True) if not hit)
 
 
@@ -237,10 +237,10 @@ def _closed_depth(scene: Scene, part: str, grasp: Grasp, stroke: Stroke, lefts: 
     width = _known_width(scene.scenario.assembly.solids[part].pieces, grasp, stroke.T)
     tip = stroke.T @ tip_frame(grasp, stroke.T)
     at = tip[:3, 3] - lefts[:, None] * stroke.way
-    return _depth(scene, width, tip[:3, :3], at, stroke.around, margin)
+    return gripper_depth(scene, width, tip[:3, :3], at, stroke.around, margin)
 
 
-def _depth(scene: Scene, opening: float, R: Array, at: Array, around: Sequence[Obstacle], margin: float) -> Array:
+def gripper_depth(scene: Scene, opening: float, R: Array, at: Array, around: Sequence[Obstacle], margin: float) -> Array:
     """How deep the gripper is in what stands around, (k,), [m]: one orientation of the tip, k places (k, 3), world.
 
     What its way does not come by counts as far away.

@@ -1,8 +1,10 @@
 """How the gripper holds the part of a transfer, as poses of the tip."""
 
+from collections.abc import Iterable
+
 from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import Array, physical_pieces
-from apo_bench.insertion.surroundings import later_walls
+from apo_bench.insertion.surroundings import later_walls, own_walls
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.execution.grasping import (
     Grips,
@@ -66,14 +68,41 @@ def centring_grips(
     or onto the part later needs it in its place across the walls of that fit.
     """
     part = assembly.operations[k].main
-    T = after[assembly.operations[k].main]
     sides = [macro.way for macro in macros if macro.name == "slide-to-contact"]
-    settled = [T[:3, :3] @ grip.T_part_tip[:3, 0], *sides]
-    place = RestingPart(T, obstacles(assembly.solids, after, (part,)))
-    grips = []
-    for wall in later_walls(assembly, k, part):
-        if abs((T[:3, :3] @ wall)[2]) < 0.5 and all(abs(T[:3, :3] @ wall @ way) < 0.5 for way in settled):
-            settled.append(T[:3, :3] @ wall)
+    place = RestingPart(after[part], obstacles(assembly.solids, after, (part,)))
+    grasps = _across_walls(scene, part, grip, later_walls(assembly, k, part), place, sides)
+    return tuple(_grip(scene, part, grasp, place.T, place.T) for grasp in grasps)
+
+
+def squaring_grips(assembly: Assembly, scene: Scene, k: int, grip: Grip, believed: Poses) -> tuple[Grip, ...]:
+    """Grips across the level directions in which the part will have to be known and the grip itself does not settle it.
+
+    All are turned from it the same way, by a quarter: the tip that is off on the hand puts every part off alike.
+    """
+    part = assembly.operations[k].main
+    T = believed[part]
+    place = RestingPart(T, obstacles(assembly.solids, believed, (part,)))
+    walls = [*own_walls(assembly, k, part), *later_walls(assembly, k, part)]
+    pieces = physical_pieces(assembly.solids[part], scene.clearance_mm * 1e-3)
+    turned = []
+    for grasp in _across_walls(scene, part, grip, walls, place, ()):
+        tip = tip_frame(grasp, T)
+        ahead = tip[:3, 0] @ grip.T_part_tip[:3, 1] > 0.0
+        either = grasp if ahead else Grasp(grasp.point, -grasp.across)
+        turned.append(Grip(tip_frame(either, T), half_width(pieces, either, T)))
+    return tuple(turned)
+
+
+def _across_walls(
+    scene: Scene, part: str, grip: Grip, walls: Iterable[Array], place: RestingPart, sides: Iterable[Array]
+) -> list[Grasp]:
+    """A clear grasp across each level wall of the part at its place that neither the grip nor sides settle."""
+    R = place.T[:3, :3]
+    settled = [R @ grip.T_part_tip[:3, 0], *sides]
+    grasps = []
+    for wall in walls:
+        if abs((R @ wall)[2]) < 0.5 and all(abs(R @ wall @ way) < 0.5 for way in settled):
+            settled.append(R @ wall)
             grasp = clear_across(scene, part, wall, place)
-            grips += [] if grasp is None else [_grip(scene, part, grasp, T, T)]
-    return tuple(grips)
+            grasps += [] if grasp is None else [grasp]
+    return grasps

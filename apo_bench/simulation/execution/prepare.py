@@ -11,7 +11,8 @@ from apo_bench.assembly import Assembly, Plan, Poses, Step
 from apo_bench.geometry import Array, extent, pose, remembered
 from apo_bench.insertion.surroundings import OVER_M, ends_of, mouths, neighbours, slide_directions, slow_before
 from apo_bench.scenario.layout import nominal_operations
-from apo_bench.simulation.execution.grips import centring_grips, transfer_grips
+from apo_bench.simulation.execution.flush import flush_pose
+from apo_bench.simulation.execution.grips import centring_grips, squaring_grips, transfer_grips
 from apo_bench.simulation.execution.transfer import (
     PUT_DOWN,
     SAFE_M,
@@ -46,13 +47,14 @@ class Move(NamedTuple):
 
 
 @remembered
-def moves(plan: Plan, scene: Scene, searches: bool = False) -> tuple[Move, ...]:
+def moves(plan: Plan, scene: Scene, searches: bool = False, feels: bool = False) -> tuple[Move, ...]:
     """What to do for each step of the schedule; what moves with a part is believed to stay with it.
 
     Remembered, since a plan is looked at whether the arm reaches it, and then carried out.
 
     Args:
         searches: Whether the robot feels for a hole where a motion into it is stopped.
+        feels: Whether it squares parts before it takes them, and lays them flat before it inserts them.
     """
     believed: Poses = plan.start
     put_by: dict[str, int | None] = {}
@@ -74,6 +76,8 @@ def moves(plan: Plan, scene: Scene, searches: bool = False) -> tuple[Move, ...]:
             put_by[operation.main] = k
         after = after_transfer(operation, target, believed)
         transfer = _transfer(plan.assembly, scene, step, was, target, believed, after, searches)
+        if feels:
+            transfer = _felt(plan.assembly, scene, step, transfer, believed)
         prepared.append(Move(step, _turned_to_reach(scene, transfer)))
         believed = after
     return tuple(prepared)
@@ -156,6 +160,15 @@ def _transfer(
         clearance=1e-3 * scene.clearance_mm,
         front=_front(scene, part, operation.moves, after, into.way) if searches and inserts else None,
     )
+
+
+def _felt(assembly: Assembly, scene: Scene, step: Step, t: Transfer, believed: Poses) -> Transfer:
+    """The transfer of a robot that feels: what it does besides."""
+    if step.undo or t.carried:
+        return t
+    free = not (t.out.level or t.away or t.drawn)
+    squaring = squaring_grips(assembly, scene, step.operation, t.grips[0], believed) if free else ()
+    return replace(t, squaring=squaring, flush=flush_pose(assembly, scene, t, believed) if t.into.level else None)
 
 
 def _front(scene: Scene, part: str, moves: tuple[str, ...], poses: Poses, way: Array) -> Array:

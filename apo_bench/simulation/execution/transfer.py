@@ -102,6 +102,11 @@ class Transfer:
     """Guard of a slide, below the force at which what is touched would slide, [N]."""
     clearance: float
     """What lay free falls by this onto the floor of its slot, [m]."""
+    squaring: tuple[Grip, ...] = ()
+    """Before it is taken, the fingers close and open again here, at its start; none where nothing is felt."""
+    flush: Array | None = None
+    """Where the part can be laid flat on what is fixed before a level insertion, (4, 4); None where it cannot or need
+    not."""
     front: Array | None = None
     """Where the part, with what it carries, ends ahead on its way: the middle of it, in its own frame, (3,), [m]; None
     where a hole is not searched for."""
@@ -141,7 +146,8 @@ class Transfer:
         if np.array_equal(T, np.eye(4)):
             return self
         grips = tuple(grip.with_tip_at(T) for grip in self.grips)
-        return replace(self, grips=grips, centring=tuple(grip.with_tip_at(T) for grip in self.centring))
+        other = {name: tuple(g.with_tip_at(T) for g in getattr(self, name)) for name in ("centring", "squaring")}
+        return replace(self, grips=grips, **other)
 
 
 def after_transfer(operation: Operation, target: Array, poses: Poses) -> Poses:

@@ -1,0 +1,168 @@
+"""Where the closed, empty hand can touch what is fixed: three places of the floor around the goals, and walls.
+
+Known from the plan alone: believed poses of what stands, and shapes.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly import Plan
+from apo_bench.geometry import Array, Box, Face
+from apo_bench.insertion.macros import UP
+from apo_bench.simulation.execution.grasping import gripper_depth, obstacles
+from apo_bench.simulation.frames import frame
+from apo_bench.simulation.robot.gripper import gripper_boxes
+from apo_bench.simulation.robot.obstacles import Obstacle
+from apo_bench.simulation.robot.paths import shifted
+from apo_bench.simulation.scene.scene import Scene
+
+OPENING_M = 0.004
+"""Of each finger while the hand touches: as good as closed, and the pads do not push on each other."""
+_STAND_OFF_M = 0.006
+"""A touch begins so far before it is expected."""
+_ROOM_M = 0.004
+"""Everything else stays so far away."""
+_RADII_M = (0.08, 0.1, 0.06, 0.12, 0.14, 0.16, 0.18)
+_ANGLES = 24
+_SLACK = 3
+"""Places of the floor: on a ring around the goals, a third of a turn apart but for so many of its parts."""
+_LEVEL = float(np.cos(np.radians(10.0)))
+_OVER_M = 0.003
+"""A wall is touched so high over its foot, with the lowest part of the fingers."""
+_LIFT_M = 0.12
+_LOOKS_M = 0.004
+"""The hand comes straight down from so far above; it is looked at so often."""
+
+
+class TouchPlace(NamedTuple):
+    """One guarded motion of the empty hand, and what it will touch."""
+
+    T_world_tip: Array
+    """Where the motion begins, (4, 4), [m]."""
+    way: Array
+    """Unit vector, (3,), world: into the face."""
+    point: Array
+    """What touches, (3,), in the frame of the tip, [m]."""
+    normal: Array
+    """Of the face, outwards, (3,), world."""
+    offset: float
+    """normal . x = offset on it, [m]."""
+
+
+def floor_places(plan: Plan, scene: Scene) -> tuple[TouchPlace, ...]:
+    """Up to three places of what carries everything, around the goals; none where the hand has no room."""
+    found = _floor(plan)
+    if found is None:
+        return ()
+    part, face = found
+    T = plan.start[part]
+    n = T[:3, :3] @ face.normal
+    d = float(n @ (T[:3, :3] @ face.outline[0] + T[:3, 3]))
+    around = obstacles(plan.assembly.solids, plan.start, (part,))
+    rest = scene.kinematics.forward(scene.arm.home)[:3, :3]
+    point = _lowest(_boxes(scene))
+    middle = plan.goals[:, :2, 3].mean(axis=0)
+
+    def at(radius: float, k: int) -> TouchPlace | None:
+        angle = 2.0 * np.pi * (k % _ANGLES) / _ANGLES
+        x, y = middle + radius * np.array([np.cos(angle), np.sin(angle)])
+        touched = np.array([x, y, (d - n[0] * x - n[1] * y) / n[2]])
+        begins = frame(rest, touched + _STAND_OFF_M * n - rest @ point)
+        return TouchPlace(begins, -n, point, n, d) if _free(scene, begins, around) else None
+
+    best: list[TouchPlace] = []
+    for radius in _RADII_M:
+        free = {k: place for k in range(_ANGLES) if (place := at(radius, k)) is not None}
+        for first in free:
+            three = [free[first]]
+            for third in (_ANGLES // 3, 2 * _ANGLES // 3):
+                near = sorted(range(-_SLACK, _SLACK + 1), key=abs)
+                three += [free[k] for s in near if (k := (first + third + s) % _ANGLES) in free][:1]
+            best = max(best, three, key=len)
+            if len(best) == 3:
+                return tuple(best)
+    return tuple(best)
+
+
+def wall_places(plan: Plan, scene: Scene) -> tuple[TouchPlace, ...]:
+    """One place on each wall of what is fixed that tells where something will be fitted in."""
+    around = {part: obstacles(plan.assembly.solids, plan.start, (part,)) for part in plan.assembly.fixed}
+    places = []
+    for part, face in _walls(plan):
+        T = plan.start[part]
+        place = _at_wall(scene, face, T)
+        own = obstacles(plan.assembly.solids, plan.start, tuple(set(plan.assembly.solids) - {part}))
+        if place is not None and _free(scene, place.T_world_tip, (*around[part], *own)):
+            places.append(place)
+    return tuple(places)
+
+
+def _floor(plan: Plan) -> tuple[str, Face] | None:
+    """The largest fixed face that looks up."""
+    up = [
+        (part, face)
+        for part in sorted(plan.assembly.fixed)
+        for face in plan.assembly.solids[part].faces.values()
+        if plan.start[part][2, :3] @ face.normal > _LEVEL
+    ]
+    return max(up, key=lambda each: float(np.ptp(each[1].outline, axis=0).prod(where=np.ptp(each[1].outline, axis=0) > 0)), default=None)
+
+
+def _walls(plan: Plan) -> Iterator[tuple[str, Face]]:
+    """Upright flat faces that something is fitted to, and those around a bore that something is fitted into."""
+    done = set[tuple[str, str]]()
+    for operation in plan.assembly.operations:
+        for contact in operation.contacts:
+            for of in contact:
+                if of.part not in plan.assembly.fixed:
+                    continue
+                solid = plan.assembly.solids[of.part]
+                named = [of.face] if of.face in solid.faces else list(solid.faces)
+                for name in named:
+                    face = solid.faces[name]
+                    upright = abs(float(plan.start[of.part][2, :3] @ face.normal)) < np.sqrt(1.0 - _LEVEL**2)
+                    if upright and (of.part, name) not in done:
+                        done.add((of.part, name))
+                        yield of.part, face
+
+
+def _at_wall(scene: Scene, face: Face, T: Array) -> TouchPlace | None:
+    """The middle of a wall, touched low by the side of the fingers."""
+    n = T[:3, :3] @ face.normal
+    corners = face.outline @ T[:3, :3].T + T[:3, 3]
+    low, high = float(corners[:, 2].min()), float(corners[:, 2].max())
+    d = float(n @ corners[0]) - (1e-3 * scene.clearance_mm if face.fit else 0.0)
+    x = -n + n[2] * UP
+    x /= np.linalg.norm(x)
+    R = np.column_stack([x, np.cross(-UP, x), -UP])
+    boxes = _boxes(scene)
+    bottom = _lowest(boxes)[2]
+    side = max((b for b in boxes if b.center[2] + b.half[2] > bottom - 1e-3), key=lambda b: float(b.center[0] + b.half[0]))
+    height = low + min(_OVER_M, (high - low) / 2)
+    middle = corners.mean(axis=0)
+    point = np.array([side.center[0] + side.half[0], side.center[1], bottom - (min(high, height + 2 * side.half[2]) - height) / 2])
+    touched = np.array([middle[0], middle[1], height + bottom - point[2]])
+    touched += (d - n @ touched) * n
+    return TouchPlace(frame(R, touched + _STAND_OFF_M * n - R @ point), -n, point, n, d)
+
+
+def _boxes(scene: Scene) -> tuple[Box, ...]:
+    return gripper_boxes(scene.kinematics, scene.arm, OPENING_M)
+
+
+def _lowest(boxes: Sequence[Box]) -> Array:
+    """The middle of what reaches farthest ahead, (3,), in the frame of the tip."""
+    reach = max(float(box.center[2] + box.half[2]) for box in boxes)
+    ends = [box.center for box in boxes if box.center[2] + box.half[2] > reach - 1e-4]
+    return np.array([*np.mean(ends, axis=0)[:2], reach])
+
+
+def _free(scene: Scene, T: Array, around: Sequence[Obstacle]) -> bool:
+    """Whether the hand can come straight down to a pose that the arm reaches."""
+    lifts = np.arange(0.0, _LIFT_M, _LOOKS_M)[:, None] * UP
+    if gripper_depth(scene, OPENING_M, T[:3, :3], T[:3, 3] + lifts, around, _ROOM_M).max() > 0.0:
+        return False
+    above = scene.kinematics.inverse(shifted(T, UP, _LIFT_M), np.array(scene.arm.home))
+    return above is not None and scene.kinematics.inverse(T, above) is not None

@@ -1,0 +1,90 @@
+"""Where a part that is held can be laid flat on what is fixed, before it is inserted level.
+
+Laid flush, its height and its two tilts in the hand are known (a plane on a plane, Eq. 1 of the paper), which a level
+insertion needs and pads that only centre across cannot give.
+"""
+
+import numpy as np
+from shapely import MultiPoint
+
+from apo_bench.assembly import Assembly, Poses
+from apo_bench.geometry import Array, Face, all_corners, extent, intrusion_depths, own_shape, plane_frame, pose
+from apo_bench.insertion.macros import UP
+from apo_bench.simulation.execution.grasping import gripper_depth, obstacles, upwards
+from apo_bench.simulation.execution.transfer import Transfer, first_contact_pose
+from apo_bench.simulation.robot.paths import shifted
+from apo_bench.simulation.scene.scene import Scene
+
+_LEVEL = float(np.cos(np.radians(10.0)))
+"""A face that looks up by less than ten degrees off is one to lie on."""
+_LOWEST_M = 1e-4
+"""Corners this near to the lowest one lie on the floor."""
+_ROOM_M = 0.002
+_LOOKS_M = 0.003
+"""On the way down everything else stays this far away; it is looked at this often."""
+
+
+def before_insertion(t: Transfer) -> Array:
+    """Where a part is when its last motion begins, (4, 4), world."""
+    before = shifted(first_contact_pose(t), t.into.way, -t.begins)
+    return shifted(before, UP, t.floats) if t.into.level else before
+
+
+def flush_pose(assembly: Assembly, scene: Scene, t: Transfer, believed: Poses) -> Array | None:
+    """The part flat on a fixed face straight below where its last motion begins, (4, 4), world; None where it cannot.
+
+    Args:
+        believed: Where all parts are before the transfer.
+    """
+    T = before_insertion(t)
+    up = upwards(T)
+    lying = [
+        each
+        for part in assembly.fixed
+        for face in assembly.solids[part].faces.values()
+        if believed[part][2, :3] @ face.normal > _LEVEL
+        for each in [_on(scene, t.part, T, up, face, believed[part])]
+        if each is not None and each[2, 3] < T[2, 3]
+    ]
+    if not lying:
+        return None
+    flush = max(lying, key=lambda each: float(each[2, 3]))
+    far = float(T[2, 3] - flush[2, 3])
+    lifts = np.linspace(far, 0.0, max(2, round(far / _LOOKS_M)))[:, None] * UP
+    others = obstacles(assembly.solids, believed, (t.part, *assembly.fixed))
+    fixed = obstacles(assembly.solids, believed, (t.part, *(set(assembly.solids) - assembly.fixed)))
+    R = flush[:3, :3]
+    pieces = scene.pieces[t.part]
+    for each in others:
+        if intrusion_depths(pieces, R, flush[:3, 3] + lifts, each.pieces, each.T).max() > -_ROOM_M:
+            return None
+    for each in fixed:  # down to the floor itself, which it shall touch
+        if intrusion_depths(pieces, R, flush[:3, 3] + lifts + _LOWEST_M * UP, each.pieces, each.T).max() > 0.0:
+            return None
+    tip = flush @ t.grips[0].T_part_tip
+    width = t.grips[0].half_width
+    if gripper_depth(scene, width, tip[:3, :3], tip[:3, 3] + lifts, (*others, *fixed), 0.0).max() > 0.0:
+        return None
+    return flush
+
+
+def _on(scene: Scene, part: str, T: Array, up: Array, floor: Face, T_floor: Array) -> Array | None:
+    """The part above a face put down flat on it, if all that lies on it is inside of its outline."""
+    n = T_floor[:3, :3] @ floor.normal
+    axis = np.cross(T[:3, :3] @ up, n)
+    sine = float(np.linalg.norm(axis))
+    flat = np.array(T)
+    if sine > 0.0:
+        flat[:3, :3] = pose.exp(np.append(np.zeros(3), np.arcsin(sine) / sine * axis))[:3, :3] @ T[:3, :3]
+    origin = T_floor @ plane_frame(floor)
+    height = float(n @ (flat[:3, 3] - origin[:3, 3])) + extent(scene.pieces[part], flat[:3, :3].T @ n)[0]
+    flat[:3, 3] -= height / float(n @ UP) * UP
+    feet = pose.apply(pose.inverse(origin), floor_points(scene, part, flat, n))[:, :2]
+    return flat if own_shape(floor).covers(MultiPoint(feet).convex_hull) else None
+
+
+def floor_points(scene: Scene, part: str, T: Array, n: Array) -> Array:
+    """The corners on which a part at T lies on a plane with the normal n, (k, 3), world, [m]."""
+    corners = all_corners(scene.pieces[part])[0] @ T[:3, :3].T + T[:3, 3]
+    heights = corners @ n
+    return np.asarray(corners[heights < heights.min() + _LOWEST_M])
