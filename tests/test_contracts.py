@@ -60,6 +60,11 @@ BREACHES = {
         ("apo_bench.correction.contact.heavy_tails", "apo_bench.correction.contact.inferred"),
         ("apo_bench.correction.contact.suspects", "apo_bench.correction.contact.starts"),
     ],
+    "touches": [
+        ("apo_bench.correction.touches.robot_model", "apo_bench.correction.touches.robust_estimate"),
+        ("apo_bench.correction.touches.robust_estimate", "apo_bench.correction.touches.belief"),
+        ("apo_bench.correction.touches.touch", "apo_bench.correction.touches.robot_model"),
+    ],
     "workshop": [
         ("apo_bench.trial.trial", "apo_bench.recording.importing"),
         ("apo_bench.show.card", "apo_bench.drafting.draft"),
