@@ -53,6 +53,21 @@ class RobotBelief:
         freeze(self, middle=(3,), sigmas=(u,), mean=(u,), covariance=(u, u))
 
     @property
+    def hand_eye(self) -> Array:
+        """Where the robot is believed to go, (4, 4), for what it takes to be the world's frame, [m]."""
+        return hand_eye_displacement(self.mean, self.middle)
+
+    @property
+    def tool(self) -> Array:
+        """How far the tip is believed to be off on the hand, (3,), in its own frame, [m]."""
+        return self.mean[TOOL]
+
+    @property
+    def encoders(self) -> Array:
+        """How far each joint is believed to be off what its encoder says, (joints,), [rad]."""
+        return self.mean[joints_in(self.joints)]
+
+    @property
     def touches(self) -> tuple[Touch, ...]:
         """Those that count."""
         return tuple(touch for (touch, _), counts in zip(self.felt, self.taken, strict=True) if counts)

@@ -73,6 +73,13 @@ class Kinematics:
         data = self.configuration.data
         return frame(data.site_xmat[self.site], data.site_xpos[self.site])
 
+    def jacobian(self, q: Array) -> Array:
+        """The body Jacobian of the tip, (6, joints): its twist in its own frame, [m, rad], per radian of each joint."""
+        self._full[self.adr] = q
+        self.configuration.update(self._full)
+        whole = self.configuration.get_frame_jacobian(str(self.model.site(self.site).name), "site")
+        return np.asarray(whole[:, self.model.jnt_dofadr[self.ids]])
+
     def inverse(self, T: Array, near: Array, turns: int = 40) -> Array | None:
         """Joint angles that bring the tip to T, found by Newton steps from `near`; None if there are none there."""
         self._task.set_target(mink.SE3(np.concatenate([quaternion(T), T[:3, 3]])))

@@ -4,11 +4,13 @@ Each is a sequence of straight motions of the tip, by `Robot.follow` and `Robot.
 the plan are carried out in force: guarded where contacts close, by position along those that stay closed.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 
 from apo_bench.geometry import Array
 from apo_bench.insertion.macros import UP
-from apo_bench.simulation.execution.fingers import centre, change_grip, check_hold, depart, grasp, release
+from apo_bench.simulation.execution.fingers import centre, change_grip, check_hold, depart, grasp, grasp_again, release
 from apo_bench.simulation.execution.search import after_search, press_in
 from apo_bench.simulation.execution.transfer import ASIDE_M, Grip, Transfer, first_contact_pose
 from apo_bench.simulation.robot.forces import Guard
@@ -47,14 +49,22 @@ _LOOSE_M = 0.00005
 """Faces this far apart touch for the judge, and do not rub."""
 
 
-def take(robot: Robot, t: Transfer) -> int:
+def take(robot: Robot, t: Transfer, again: bool = False) -> int:
     """Pick the part and lift it; returns which of its grips is then in use.
+
+    Args:
+        again: Whether it is squared and grasped twice.
 
     Raises:
         Halt: Something went wrong; the stage and code say what.
     """
+    for other in t.squaring:
+        robot.stage = "pick"
+        centre(robot, t, other, t.T_world_start)
     robot.stage = "pick"
     grasp(robot, t, t.grips[0], t.T_world_start @ t.grips[0].T_part_tip)
+    if again:
+        grasp_again(robot, t.grips[0])
     in_use = _pull_out(robot, t) if t.out.level else 0
     robot.stage = "lift"
     if t.carried:
@@ -66,14 +76,20 @@ def take(robot: Robot, t: Transfer) -> int:
     return in_use
 
 
-def bring(robot: Robot, t: Transfer, i: int) -> None:
+def bring(robot: Robot, t: Transfer, i: int, lay: Callable[[Transfer, Grip], Grip] | None = None) -> None:
     """Carry the part that is held by its i-th grip, attach it, let go and depart.
+
+    Args:
+        lay: Lays it flat before a level insertion, and says how it is held then.
 
     Raises:
         Halt: Something went wrong; the stage and code say what.
     """
     grip = t.grips[i]
     _carry(robot, t, grip)
+    if lay is not None:
+        robot.stage = "attach"
+        grip = lay(t, grip)
     left, grip = _attach(robot, t, grip, t.grips[i + 1] if t.into.left is not None else None)
     release(robot, t, grip)
     depart(robot, t)

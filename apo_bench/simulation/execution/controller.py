@@ -1,6 +1,7 @@
 """The robot repeats a plan: open loop in the poses, closed loop only in force. The same controller for every method."""
 
 import math
+from functools import partial
 from collections.abc import Callable
 from typing import Any
 
@@ -10,6 +11,9 @@ from apo_bench.assembly import Outcome, Plan, Poses, Reached, ReplayResult, Snap
 from apo_bench.prediction.stability import first_unstable
 from apo_bench.records import sentence
 from apo_bench.simulation.execution.carry_out import bring, take
+from apo_bench.simulation.execution.feel.feeling import Feeling, Feels
+from apo_bench.simulation.execution.feel.laying import lay_flat
+from apo_bench.simulation.execution.feel.touching import find_out
 from apo_bench.simulation.execution.prepare import Move, key_angles, moves
 from apo_bench.simulation.execution.replay_cache import Progress, ReplayCache, cache_keys
 from apo_bench.simulation.hooks import Hooks, hooks_of
@@ -49,6 +53,7 @@ def replay(
     searches: bool = False,
     most_s: float = math.inf,
     error: RobotError | None = None,
+    feels: Feels | None = None,
 ) -> ReplayResult:
     """Carry out a plan.
 
@@ -61,15 +66,18 @@ def replay(
         searches: The robot feels for a hole where a motion into it is stopped by force.
         most_s: Simulated time after which no step is begun; a schedule that takes longer for sure is not begun at all.
         error: What is wrong with the robot; it goes by the plan as if nothing were.
+        feels: How a robot finds out what is wrong with it, by what it touches; None: it does not.
     """
+    feeling = None if feels is None else Feeling(feels, plan, scene, error)
+    searches = searches or (feels is not None and "search" in feels.acts)
     start = plan.start if parts_at is None else parts_at
     if len(plan.schedule) * _SHORTEST_STEP_S > most_s:
         todo: tuple[Move, ...] = ()
         refused: Outcome | None = _outcome(plan, "plan", "time_limit", plan.schedule[0].operation)
     else:
-        todo = _todo(plan, scene, searches, error)
+        todo = _todo(plan, scene, searches, error, () if feels is None else feels.acts)
         refused = _refusal(plan, scene, todo)
-    cache = ReplayCache() if cache is None or watch is not None else cache
+    cache = ReplayCache() if cache is None or watch is not None or feeling is not None else cache
     keys = cache_keys(scene, start, fidelity, todo, error)
     same = None if refused or not keys or most_s < math.inf else cache.ended(keys[-1])
     if same is not None:
@@ -79,7 +87,7 @@ def replay(
     robot = Robot(scene, start, hooks, fidelity, error)
     progress = Progress([None] * len(plan.assembly), [])
     with sleeping(scene.work, scene.grasp == "friction"), left_out(scene.work):
-        outcome = refused or _run_schedule(plan, robot, todo, progress, cache, keys, most_s)
+        outcome = refused or _run_schedule(plan, robot, todo, progress, cache, keys, most_s, feeling)
         final = _settled(robot, plan) if outcome.code != "unstable_simulation" else None
     result = ReplayResult(
         reached=Reached(after=tuple(progress.after), final=final),
@@ -88,17 +96,20 @@ def replay(
         sim_seconds=float(robot.data.time),
         timeline=tuple(progress.timeline),
         in_hand=robot.hold_watch.finished,
+        felt=None if feeling is None else feeling.felt,
     )
     if keys and not refused and outcome.code != "time_limit":
         cache.end(keys[-1], result)
     return result
 
 
-def _todo(plan: Plan, scene: Scene, searches: bool, error: RobotError | None) -> tuple[Move, ...]:
+def _todo(
+    plan: Plan, scene: Scene, searches: bool, error: RobotError | None, acts: tuple[str, ...]
+) -> tuple[Move, ...]:
     """The transfers of a plan, as a robot carries them out whose base and tool are not where it believes them."""
     if error is None:
-        return moves(plan, scene, searches)
-    planned = moves(error.plan(plan), scene, searches)
+        return moves(plan, scene, searches, acts)
+    planned = moves(error.plan(plan), scene, searches, acts)
     return tuple(Move(step, transfer.with_tip_at(error.tool)) for step, transfer in planned)
 
 
@@ -122,12 +133,17 @@ def _run_schedule(
     cache: ReplayCache,
     keys: list[bytes],
     most_s: float,
+    feeling: Feeling | None,
 ) -> Outcome:
     """One step of the schedule after the other, from the furthest state that the cache has."""
     kept_states, grip = cache.resume(keys, robot, progress)
     if not kept_states:
         try:
             robot.wait(_AT_FIRST_S)
+            if feeling is not None:
+                find_out(robot, feeling)
+                searches = "search" in feeling.acts
+                todo = _todo(plan, robot.scene, searches, feeling.residual, feeling.acts)
         except Halt as halt:
             return _outcome(plan, "pick", halt.code, plan.schedule[0].operation, halt.part)
     for i, (step, transfer) in list(enumerate(todo))[kept_states // 2 :]:
@@ -137,10 +153,14 @@ def _run_schedule(
         robot.hooks.before_step(step)
         try:
             if kept_states <= 2 * i:
-                grip = take(robot, transfer)
+                grip = take(robot, transfer, again=feeling is not None and "square" in feeling.acts)
                 robot.slip(step.operation)
                 cache.keep(keys[2 * i], robot, grip, progress)
-            bring(robot, transfer, grip)
+            lay = None
+            if feeling is not None:
+                feeling.taken(step.operation)
+                lay = partial(lay_flat, robot, feeling, step.operation)
+            bring(robot, transfer, grip, lay)
             _note_hold(robot, step)
             _until_rest(robot)
         except Halt as halt:

@@ -4,6 +4,8 @@ Laid flush, its height and its two tilts in the hand are known (a plane on a pla
 insertion needs and pads that only centre across cannot give.
 """
 
+from typing import NamedTuple
+
 import numpy as np
 from shapely import MultiPoint
 
@@ -24,14 +26,25 @@ _LOOKS_M = 0.003
 """On the way down everything else stays this far away; it is looked at this often."""
 
 
+class Flush(NamedTuple):
+    """A part laid flat."""
+
+    T: Array
+    """Its pose, (4, 4), world."""
+    normal: Array
+    """Of the floor, upwards, (3,), world."""
+    feet: Array
+    """Corners of the part on which it lies, (k, 3), in its own frame, [m]: at most four, far apart."""
+
+
 def before_insertion(t: Transfer) -> Array:
     """Where a part is when its last motion begins, (4, 4), world."""
     before = shifted(first_contact_pose(t), t.into.way, -t.begins)
     return shifted(before, UP, t.floats) if t.into.level else before
 
 
-def flush_pose(assembly: Assembly, scene: Scene, t: Transfer, believed: Poses) -> Array | None:
-    """The part flat on a fixed face straight below where its last motion begins, (4, 4), world; None where it cannot.
+def flush_pose(assembly: Assembly, scene: Scene, t: Transfer, believed: Poses) -> Flush | None:
+    """The part flat on a fixed face straight below where its last motion begins; None where it cannot.
 
     Args:
         believed: Where all parts are before the transfer.
@@ -44,11 +57,12 @@ def flush_pose(assembly: Assembly, scene: Scene, t: Transfer, believed: Poses) -
         for face in assembly.solids[part].faces.values()
         if believed[part][2, :3] @ face.normal > _LEVEL
         for each in [_on(scene, t.part, T, up, face, believed[part])]
-        if each is not None and each[2, 3] < T[2, 3]
+        if each is not None and each.T[2, 3] < T[2, 3]
     ]
     if not lying:
         return None
-    flush = max(lying, key=lambda each: float(each[2, 3]))
+    highest = max(lying, key=lambda each: float(each.T[2, 3]))
+    flush = highest.T
     far = float(T[2, 3] - flush[2, 3])
     lifts = np.linspace(far, 0.0, max(2, round(far / _LOOKS_M)))[:, None] * UP
     others = obstacles(assembly.solids, believed, (t.part, *assembly.fixed))
@@ -65,10 +79,10 @@ def flush_pose(assembly: Assembly, scene: Scene, t: Transfer, believed: Poses) -
     width = t.grips[0].half_width
     if gripper_depth(scene, width, tip[:3, :3], tip[:3, 3] + lifts, (*others, *fixed), 0.0).max() > 0.0:
         return None
-    return flush
+    return highest
 
 
-def _on(scene: Scene, part: str, T: Array, up: Array, floor: Face, T_floor: Array) -> Array | None:
+def _on(scene: Scene, part: str, T: Array, up: Array, floor: Face, T_floor: Array) -> Flush | None:
     """The part above a face put down flat on it, if all that lies on it is inside of its outline."""
     n = T_floor[:3, :3] @ floor.normal
     axis = np.cross(T[:3, :3] @ up, n)
@@ -79,12 +93,20 @@ def _on(scene: Scene, part: str, T: Array, up: Array, floor: Face, T_floor: Arra
     origin = T_floor @ plane_frame(floor)
     height = float(n @ (flat[:3, 3] - origin[:3, 3])) + extent(scene.pieces[part], flat[:3, :3].T @ n)[0]
     flat[:3, 3] -= height / float(n @ UP) * UP
-    feet = pose.apply(pose.inverse(origin), floor_points(scene, part, flat, n))[:, :2]
-    return flat if own_shape(floor).covers(MultiPoint(feet).convex_hull) else None
+    corners = all_corners(scene.pieces[part])[0]
+    heights = corners @ (flat[:3, :3].T @ n)
+    feet = corners[heights < heights.min() + _LOWEST_M]
+    on_floor = pose.apply(pose.inverse(origin) @ flat, feet)[:, :2]
+    if not own_shape(floor).covers(MultiPoint(on_floor).convex_hull):
+        return None
+    return Flush(flat, n, feet[_far_apart(on_floor)])
 
 
-def floor_points(scene: Scene, part: str, T: Array, n: Array) -> Array:
-    """The corners on which a part at T lies on a plane with the normal n, (k, 3), world, [m]."""
-    corners = all_corners(scene.pieces[part])[0] @ T[:3, :3].T + T[:3, 3]
-    heights = corners @ n
-    return np.asarray(corners[heights < heights.min() + _LOWEST_M])
+def _far_apart(points: Array) -> list[int]:
+    """Which of points in a plane, (k, 2), are the ends of the longest way and the ends across it; each once."""
+    ahead = points - points.mean(axis=0)
+    first = int(np.argmax((ahead * ahead).sum(axis=1)))
+    along = ahead @ ahead[first]
+    across = ahead @ np.array([-ahead[first][1], ahead[first][0]])
+    ends = (first, int(np.argmin(along)), int(np.argmin(across)), int(np.argmax(across)))
+    return sorted(set(ends))

@@ -47,14 +47,14 @@ class Move(NamedTuple):
 
 
 @remembered
-def moves(plan: Plan, scene: Scene, searches: bool = False, feels: bool = False) -> tuple[Move, ...]:
+def moves(plan: Plan, scene: Scene, searches: bool = False, acts: tuple[str, ...] = ()) -> tuple[Move, ...]:
     """What to do for each step of the schedule; what moves with a part is believed to stay with it.
 
     Remembered, since a plan is looked at whether the arm reaches it, and then carried out.
 
     Args:
         searches: Whether the robot feels for a hole where a motion into it is stopped.
-        feels: Whether it squares parts before it takes them, and lays them flat before it inserts them.
+        acts: What it does besides: `square` parts before it takes them, `lay` them flat before it inserts them.
     """
     believed: Poses = plan.start
     put_by: dict[str, int | None] = {}
@@ -76,8 +76,8 @@ def moves(plan: Plan, scene: Scene, searches: bool = False, feels: bool = False)
             put_by[operation.main] = k
         after = after_transfer(operation, target, believed)
         transfer = _transfer(plan.assembly, scene, step, was, target, believed, after, searches)
-        if feels:
-            transfer = _felt(plan.assembly, scene, step, transfer, believed)
+        if acts and not (step.undo or transfer.carried):
+            transfer = _with_acts(plan.assembly, scene, k, transfer, believed, acts)
         prepared.append(Move(step, _turned_to_reach(scene, transfer)))
         believed = after
     return tuple(prepared)
@@ -162,13 +162,17 @@ def _transfer(
     )
 
 
-def _felt(assembly: Assembly, scene: Scene, step: Step, t: Transfer, believed: Poses) -> Transfer:
-    """The transfer of a robot that feels: what it does besides."""
-    if step.undo or t.carried:
-        return t
-    free = not (t.out.level or t.away or t.drawn)
-    squaring = squaring_grips(assembly, scene, step.operation, t.grips[0], believed) if free else ()
-    return replace(t, squaring=squaring, flush=flush_pose(assembly, scene, t, believed) if t.into.level else None)
+def _with_acts(
+    assembly: Assembly, scene: Scene, k: int, t: Transfer, believed: Poses, acts: tuple[str, ...]
+) -> Transfer:
+    """The transfer of a robot that feels, with what it does besides: a part that stands between others stays so."""
+    squared = "square" in acts and not (t.out.level or t.away or t.drawn)
+    laid = "lay" in acts and t.into.level
+    return replace(
+        t,
+        squaring=squaring_grips(assembly, scene, k, t.grips[0], believed) if squared else (),
+        flush=flush_pose(assembly, scene, t, believed) if laid else None,
+    )
 
 
 def _front(scene: Scene, part: str, moves: tuple[str, ...], poses: Poses, way: Array) -> Array:

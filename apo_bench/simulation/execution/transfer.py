@@ -1,7 +1,7 @@
 """What the controller needs to know to move one part, with what it carries: grips, lines, macros, guards."""
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 
@@ -104,9 +104,8 @@ class Transfer:
     """What lay free falls by this onto the floor of its slot, [m]."""
     squaring: tuple[Grip, ...] = ()
     """Before it is taken, the fingers close and open again here, at its start; none where nothing is felt."""
-    flush: Array | None = None
-    """Where the part can be laid flat on what is fixed before a level insertion, (4, 4); None where it cannot or need
-    not."""
+    flush: Any = None
+    """A `Flush`: the part laid flat on what is fixed before a level insertion; None where it cannot or need not."""
     front: Array | None = None
     """Where the part, with what it carries, ends ahead on its way: the middle of it, in its own frame, (3,), [m]; None
     where a hole is not searched for."""

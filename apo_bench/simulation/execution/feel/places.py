@@ -7,9 +7,10 @@ from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from shapely import Point
 
 from apo_bench.assembly import Plan
-from apo_bench.geometry import Array, Box, Face
+from apo_bench.geometry import Array, Box, Face, face_area, own_shape, plane_frame, pose
 from apo_bench.insertion.macros import UP
 from apo_bench.simulation.execution.grasping import gripper_depth, obstacles
 from apo_bench.simulation.frames import frame
@@ -20,12 +21,14 @@ from apo_bench.simulation.scene.scene import Scene
 
 OPENING_M = 0.004
 """Of each finger while the hand touches: as good as closed, and the pads do not push on each other."""
-_STAND_OFF_M = 0.006
+STAND_OFF_M = 0.006
 """A touch begins so far before it is expected."""
 _ROOM_M = 0.004
 """Everything else stays so far away."""
 _RADII_M = (0.08, 0.1, 0.06, 0.12, 0.14, 0.16, 0.18)
 _ANGLES = 24
+_PATCH_M = 0.025
+"""The hand touches a floor that is whole so far around."""
 _SLACK = 3
 """Places of the floor: on a ring around the goals, a third of a turn apart but for so many of its parts."""
 _LEVEL = float(np.cos(np.radians(10.0)))
@@ -64,12 +67,15 @@ def floor_places(plan: Plan, scene: Scene) -> tuple[TouchPlace, ...]:
     rest = scene.kinematics.forward(scene.arm.home)[:3, :3]
     point = _lowest(_boxes(scene))
     middle = plan.goals[:, :2, 3].mean(axis=0)
+    to_face = pose.inverse(T @ plane_frame(face))
 
     def at(radius: float, k: int) -> TouchPlace | None:
         angle = 2.0 * np.pi * (k % _ANGLES) / _ANGLES
         x, y = middle + radius * np.array([np.cos(angle), np.sin(angle)])
         touched = np.array([x, y, (d - n[0] * x - n[1] * y) / n[2]])
-        begins = frame(rest, touched + _STAND_OFF_M * n - rest @ point)
+        begins = frame(rest, touched + STAND_OFF_M * n - rest @ point)
+        if not own_shape(face).contains(Point(pose.apply(to_face, touched[None])[0, :2]).buffer(_PATCH_M)):
+            return None
         return TouchPlace(begins, -n, point, n, d) if _free(scene, begins, around) else None
 
     best: list[TouchPlace] = []
@@ -107,7 +113,7 @@ def _floor(plan: Plan) -> tuple[str, Face] | None:
         for face in plan.assembly.solids[part].faces.values()
         if plan.start[part][2, :3] @ face.normal > _LEVEL
     ]
-    return max(up, key=lambda each: float(np.ptp(each[1].outline, axis=0).prod(where=np.ptp(each[1].outline, axis=0) > 0)), default=None)
+    return max(up, key=lambda each: face_area(each[1]), default=None)
 
 
 def _walls(plan: Plan) -> Iterator[tuple[str, Face]]:
@@ -145,7 +151,7 @@ def _at_wall(scene: Scene, face: Face, T: Array) -> TouchPlace | None:
     point = np.array([side.center[0] + side.half[0], side.center[1], bottom - (min(high, height + 2 * side.half[2]) - height) / 2])
     touched = np.array([middle[0], middle[1], height + bottom - point[2]])
     touched += (d - n @ touched) * n
-    return TouchPlace(frame(R, touched + _STAND_OFF_M * n - R @ point), -n, point, n, d)
+    return TouchPlace(frame(R, touched + STAND_OFF_M * n - R @ point), -n, point, n, d)
 
 
 def _boxes(scene: Scene) -> tuple[Box, ...]:

@@ -1,0 +1,142 @@
+"""What a robot that feels knows in the course of one replay: its belief, its wrist, and which plan that makes.
+
+It knows commands, encoders, the opening, the wrench at its wrist, the plan, the files of parts and where what is fixed
+is believed to be. The drawn errors enter in two ways, as in every replay: they put the hand where it does not believe
+it to be, and `believed_tip` takes them off again, since what it tells is what the robot's own encoders say.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly import Plan
+from apo_bench.correction.touches import UNSTATED, RobotBelief, Touch, believe, slip_sigmas
+from apo_bench.geometry import Array, pose
+from apo_bench.records import NO_ROBOT_ERROR, USUAL_WRENCH, robot_sigmas
+from apo_bench.simulation.execution.flush import Flush
+from apo_bench.simulation.robot.feeling import wrist_of, zero
+from apo_bench.simulation.robot.robot import Robot
+from apo_bench.simulation.robot.robot_error import RobotError
+from apo_bench.simulation.robot.wrist import WristSensor
+from apo_bench.simulation.scene.scene import Scene
+
+ACTS = ("square", "touch", "lay", "search")
+"""Parts are squared before they are taken, what is fixed is touched, what is inserted level is laid flat first, and
+what is stopped all the same is searched for."""
+_TOUCH_SIGMA_M = 3e-5
+"""How exactly a guarded touch tells a plane: the patch of the finger that meets it may be tilted."""
+_SQUARED = np.array([5e-5, 5e-5, 5e-5, 5e-4, 3e-4, 3e-4])
+"""How exactly a part lies between pads that closed twice, [m, rad], a twist in the frame of the tip."""
+_TOUCH_N = 2.0
+_SIGMAS = 8.0
+"""A touch ends by this force, or by so many standard deviations of what the wrist feels."""
+
+
+@final
+@dataclass(frozen=True)
+class Feels:
+    """How a robot feels."""
+
+    stated: str | None = NO_ROBOT_ERROR
+    """How wrong the robot is said to be, as in a row; None: nobody says, and what is usual is assumed."""
+    wrench: str = USUAL_WRENCH
+    """The sensor at its wrist, as in `wrench_noise`."""
+    acts: tuple[str, ...] = ACTS
+    """What it does besides."""
+    seed: tuple[int, ...] = (0,)
+    """Of the noise of its sensor."""
+
+
+class Feeling:
+    """The state of a robot that feels, during one replay."""
+
+    def __init__(self, feels: Feels, plan: Plan, scene: Scene, error: RobotError | None) -> None:
+        sigmas = UNSTATED if feels.stated is None else robot_sigmas(feels.stated)
+        joints = len(scene.arm.joints)
+        none = RobotError(np.eye(4), np.zeros(joints), np.eye(4), np.tile(np.eye(4), (len(plan.assembly), 1, 1)))
+        self.acts = feels.acts
+        self._feels = feels
+        self._wrist: WristSensor | None = None
+        self.plan = plan
+        self.sigmas = sigmas
+        self.belief = believe(sigmas, joints, plan.goals[:, :3, 3].mean(axis=0))
+        self._scene = scene
+        self._error = error or none
+        self.residual = self._error
+        """What is still wrong once commands make up for what is believed."""
+
+    def begin(self, robot: Robot) -> None:
+        """Zero the sensor at the wrist, in free air."""
+        self._wrist = wrist_of(robot, self._feels.wrench, np.random.default_rng(self._feels.seed))
+        zero(robot, self._wrist)
+
+    @property
+    def wrist(self) -> WristSensor:
+        assert self._wrist is not None, "begin first"
+        return self._wrist
+
+    @property
+    def felt(self) -> RobotBelief:
+        return self.belief
+
+    @property
+    def touch_n(self) -> float:
+        """The force that ends a touch, [N]: well above what the sensor shows of nothing."""
+        return max(_TOUCH_N, _SIGMAS * self.wrist.sigma[0])
+
+    def as_seen(self, normal: Array, point: Array) -> tuple[Array, float]:
+        """Normal and offset of a plane, (3,) and [m], in the world as the eye has it, from where the arm takes it."""
+        back = pose.inverse(self.residual.hand_eye)
+        n = back[:3, :3] @ normal
+        return n, float(n @ (back[:3, :3] @ point + back[:3, 3]))
+
+    def believed_tip(self, robot: Robot) -> Array:
+        """Where the robot would believe its tip if it made up for nothing, (4, 4), world, and the Jacobian there."""
+        left = self.residual
+        corrected = pose.inverse(left.hand_eye) @ robot.T @ pose.inverse(left.tool)
+        return self.belief.command(corrected, self.jacobian(robot))
+
+    def jacobian(self, robot: Robot) -> Array:
+        """The body Jacobian of the tip, (6, joints)."""
+        return self._scene.kinematics.jacobian(robot.q)
+
+    def learn(self, robot: Robot, touches: Iterable[Touch]) -> None:
+        """Believe what was felt; from now on commands make up for it."""
+        self.belief = self.belief.touch(*touches)
+        left = self._error
+        E = self.belief.hand_eye
+        tool = np.array(left.tool)
+        tool[:3, 3] -= self.belief.tool
+        self.residual = replace(
+            left, hand_eye=left.hand_eye @ pose.inverse(E), tool=tool, joints=left.joints - self.belief.encoders
+        )
+        robot.compensate(self.residual.joints)
+
+    def taken(self, operation: int) -> None:
+        """A part was taken between pads that closed twice; it may have slipped since."""
+        self.belief = self.belief.grasp(operation, np.hypot(slip_sigmas(self.sigmas), _SQUARED))
+
+    def lain(self, robot: Robot, operation: int, flush: Flush, T_tip_part: Array) -> Array:
+        """Believe that a held part lies flat; returns where it is believed in the frame of the tip now, (4, 4).
+
+        What hand and eye are off is not believed anew: what has been put down stands where it was put.
+        """
+        on_floor = pose.apply(flush.T, flush.feet[:1])[0]
+        plane = self.as_seen(flush.normal, on_floor)
+        touches = [self.touch(robot, *plane, foot, (operation, T_tip_part)) for foot in flush.feet]
+        self.belief = self.belief.touch(*touches)
+        return self.belief.held(operation, T_tip_part)
+
+    def touch(
+        self, robot: Robot, normal: Array, offset: float, point: Array, held: tuple[int, Array] | None = None
+    ) -> Touch:
+        """What touching a plane tells: the robot stands where it felt it.
+
+        Args:
+            held: The grasp, and where the part is believed in the frame of the tip, (4, 4); None of an empty hand.
+        """
+        J = self.jacobian(robot)
+        grasp, T_tip_part = held or (None, None)
+        return Touch(self.believed_tip(robot), normal, offset, point, _TOUCH_SIGMA_M, J, grasp, T_tip_part)

@@ -1,0 +1,63 @@
+"""Touching what is fixed with the closed, empty hand: down on the floor around the goals, and against walls."""
+
+from apo_bench.correction.touches import Touch
+from apo_bench.insertion.macros import UP
+from apo_bench.simulation.execution.feel.feeling import Feeling
+from apo_bench.simulation.execution.feel.places import (
+    OPENING_M,
+    STAND_OFF_M,
+    TouchPlace,
+    floor_places,
+    wall_places,
+)
+from apo_bench.simulation.robot.feeling import feeling as by_wrist
+from apo_bench.simulation.robot.feeling import press
+from apo_bench.simulation.robot.paths import shifted, smooth, steady, with_height
+from apo_bench.simulation.robot.robot import Robot
+from apo_bench.simulation.scene.world import sleeping
+
+_SPEED = 0.004
+"""Steady speed of a touch, [m/s]: a stiff hand twice as fast strikes harder than an arm may."""
+_BEYOND_M = 0.005
+"""So far beyond where it is expected the floor or a wall is felt for."""
+_DOWN = 0.4
+_OVER = 0.8
+_BACK = 0.3
+"""Peak speeds of the empty hand, [m/s]."""
+_HIGH_M = 0.1
+"""The hand passes from one place to the next so far above them."""
+
+
+def find_out(robot: Robot, feeling: Feeling) -> None:
+    """Touch the floor, then walls from where the floor has told to be; the robot believes what it felt after each.
+
+    Raises:
+        Halt: The hand struck something, or a place is out of reach.
+    """
+    robot.stage = "pick"
+    feeling.begin(robot)
+    if "touch" not in feeling.acts:
+        return
+    robot.fingers(OPENING_M)
+    for places in (floor_places, wall_places):
+        found = places(feeling.residual.plan(feeling.plan), robot.scene)
+        feeling.learn(robot, [touch for place in found for touch in _touched(robot, feeling, place)])
+
+
+def _touched(robot: Robot, feeling: Feeling, place: TouchPlace) -> list[Touch]:
+    """Go there, press, come back; what it tells, if anything was felt."""
+    T = place.T_world_tip @ feeling.residual.tool
+    high = max(robot.T[2, 3], T[2, 3] + _HIGH_M)
+    robot.follow(smooth(robot.T, with_height(robot.T, high), _OVER))
+    robot.go(with_height(T, high), _OVER)
+    robot.follow(smooth(robot.T, T, _DOWN))
+    robot.stand()
+    # While what is fixed is let sleep, no collision of the arm with it is noticed.
+    with sleeping(robot.scene.work, False), by_wrist(robot, feeling.wrist):
+        end = shifted(robot.T, place.way, STAND_OFF_M + _BEYOND_M)
+        left = press(robot, steady(robot.T, end, _SPEED), place.way, feeling.touch_n, feeling.wrist)
+        plane = feeling.as_seen(place.normal, place.offset * place.normal)
+        felt = [] if left is None else [feeling.touch(robot, *plane, place.point)]
+        robot.follow(smooth(robot.T, T, _BACK))
+    robot.follow(smooth(robot.T, with_height(T, T[2, 3] + _HIGH_M), _BACK))
+    return felt
