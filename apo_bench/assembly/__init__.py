@@ -38,7 +38,7 @@ from apo_bench.assembly.joint_play import apart_limit_mm, deep_limit_mm, joint_p
 from apo_bench.assembly.kinds import CONTACT_KINDS, ContactKind, contact_kind, geometric_play, play_mm
 from apo_bench.assembly.lowering import lowered, lowered_observation, lowered_together
 from apo_bench.assembly.pattern import Pattern, looking_away
-from apo_bench.assembly.reached import InHand, Outcome, Reached, ReplayResult, Snapshot
+from apo_bench.assembly.reached import Felt, InHand, Outcome, Reached, ReplayResult, Snapshot
 from apo_bench.assembly.topology import (
     ODL,
     Assembly,

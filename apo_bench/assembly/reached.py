@@ -76,6 +76,23 @@ class InHand:
 
 
 @final
+@dataclass(frozen=True)
+class Felt:
+    """What a robot has found out about itself by touching, and how sure it is."""
+
+    touches: int
+    """How many touches told something."""
+    refused: int
+    """How many contradict the others and what is stated of the robot."""
+    mm: float
+    deg: float
+    """How far the base is believed to be off, at the middle of the goals."""
+    sure_mm: float
+    sure_deg: float
+    """Standard deviations of that, as root mean squares."""
+
+
+@final
 @dataclass(frozen=True, eq=False)
 class ReplayResult:
     """One replay: what was reached and how it went."""
@@ -90,3 +107,5 @@ class ReplayResult:
     """Each step that was finished, with the simulated time at which it was over, [s]."""
     in_hand: tuple[InHand, ...] = ()
     """Of each operation whose part was grasped; no controller reads it."""
+    felt: Felt | None = None
+    """None of a robot that does not feel."""

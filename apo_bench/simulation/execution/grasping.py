@@ -38,6 +38,7 @@ _MOST_LEFT_M = 0.1
 """A grip is changed so near to the goal that the part already lies in what it was put into."""
 _HEIGHT = 0.65
 """Height of the tip over the part's lowest point, as a part of its height."""
+_SQUARE = 1e-12
 _UPRIGHT = float(np.cos(np.radians(10.0)))
 """Parts that were seen tilted stand as they stood, up to 10 degrees."""
 
@@ -124,7 +125,12 @@ def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[Rest
 def tip_frame(grasp: Grasp, T_part: Array) -> Array:
     """The tip in the part's frame, (4, 4): looking down where the part stands like this, closing along `across`."""
     ahead = T_part[:3, :3].T @ np.array([0.0, 0.0, -1.0])
-    return frame(np.column_stack([grasp.across, np.cross(ahead, grasp.across), ahead]), grasp.point)
+    across = grasp.across
+    along = float(across @ ahead)
+    if abs(along) > _SQUARE:  # of a part that stands tilted
+        across = across - along * ahead
+        across = across / np.linalg.norm(across)
+    return frame(np.column_stack([across, np.cross(ahead, across), ahead]), grasp.point)
 
 
 def half_width(pieces: tuple[Piece, ...], grasp: Grasp, T: Array) -> float:

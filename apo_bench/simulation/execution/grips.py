@@ -21,6 +21,9 @@ from apo_bench.simulation.execution.transfer import ApproachLine, Grip, Motion
 from apo_bench.simulation.robot.paths import turn_from
 from apo_bench.simulation.scene.scene import Scene
 
+_WRIST_ENDS = 2.5
+"""A hand that looks down is turned by no more than this from its rest where there is another way, [rad]."""
+
 
 def transfer_grips(
     scene: Scene, part: str, preferred: Grasp, out: ApproachLine, into: ApproachLine, believed: Poses, after: Poses
@@ -77,19 +80,21 @@ def centring_grips(
 def squaring_grips(assembly: Assembly, scene: Scene, k: int, grip: Grip, believed: Poses) -> tuple[Grip, ...]:
     """Grips across the level directions in which the part will have to be known and the grip itself does not settle it.
 
-    All are turned from it the same way, by a quarter: the tip that is off on the hand puts every part off alike.
+    All are turned from it the same way, by a quarter, unless the wrist ends there: a tip that is off on the hand then
+    puts every part off alike.
     """
     part = assembly.operations[k].main
     T = believed[part]
     place = RestingPart(T, obstacles(assembly.solids, believed, (part,)))
     walls = [*own_walls(assembly, k, part), *later_walls(assembly, k, part)]
     pieces = physical_pieces(assembly.solids[part], scene.clearance_mm * 1e-3)
+    rest = scene.kinematics.forward(scene.arm.home)
     turned = []
     for grasp in _across_walls(scene, part, grip, walls, place, ()):
-        tip = tip_frame(grasp, T)
-        ahead = tip[:3, 0] @ grip.T_part_tip[:3, 1] > 0.0
-        either = grasp if ahead else Grasp(grasp.point, -grasp.across)
-        turned.append(Grip(tip_frame(either, T), half_width(pieces, either, T)))
+        ahead = tip_frame(grasp, T)[:3, 0] @ grip.T_part_tip[:3, 1] > 0.0
+        other = Grasp(grasp.point, -grasp.across)
+        tip, back = (tip_frame(each, T) for each in ((grasp, other) if ahead else (other, grasp)))
+        turned.append(Grip(back if abs(turn_from(rest, T @ tip)) > _WRIST_ENDS else tip, half_width(pieces, grasp, T)))
     return tuple(turned)
 
 

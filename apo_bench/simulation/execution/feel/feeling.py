@@ -11,7 +11,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.assembly import Plan
+from apo_bench.assembly import Felt, Plan
 from apo_bench.correction.touches import UNSTATED, RobotBelief, Touch, believe, slip_sigmas
 from apo_bench.geometry import Array, pose
 from apo_bench.records import NO_ROBOT_ERROR, USUAL_WRENCH, robot_sigmas
@@ -78,8 +78,10 @@ class Feeling:
         return self._wrist
 
     @property
-    def felt(self) -> RobotBelief:
-        return self.belief
+    def felt(self) -> Felt:
+        """What was found out so far."""
+        b = self.belief
+        return Felt(len(b.touches), len(b.refused), b.felt_mm, b.felt_deg, b.deviation_mm, b.deviation_deg)
 
     @property
     def touch_n(self) -> float:

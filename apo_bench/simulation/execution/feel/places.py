@@ -32,6 +32,7 @@ _PATCH_M = 0.025
 _SLACK = 3
 """Places of the floor: on a ring around the goals, a third of a turn apart but for so many of its parts."""
 _LEVEL = float(np.cos(np.radians(10.0)))
+_END_M = 1e-4
 _OVER_M = 0.003
 """A wall is touched so high over its foot, with the lowest part of the fingers."""
 _LIFT_M = 0.12
@@ -135,21 +136,23 @@ def _walls(plan: Plan) -> Iterator[tuple[str, Face]]:
 
 
 def _at_wall(scene: Scene, face: Face, T: Array) -> TouchPlace | None:
-    """The middle of a wall, touched low by the side of the fingers."""
+    """The middle of a wall, touched low by the side of the fingers across which they do not give way."""
     n = T[:3, :3] @ face.normal
     corners = face.outline @ T[:3, :3].T + T[:3, 3]
     low, high = float(corners[:, 2].min()), float(corners[:, 2].max())
     d = float(n @ corners[0]) - (1e-3 * scene.clearance_mm if face.fit else 0.0)
-    x = -n + n[2] * UP
-    x /= np.linalg.norm(x)
-    R = np.column_stack([x, np.cross(-UP, x), -UP])
+    y = n[2] * UP - n
+    y /= np.linalg.norm(y)
+    R = np.column_stack([np.cross(y, -UP), y, -UP])
     boxes = _boxes(scene)
-    bottom = _lowest(boxes)[2]
-    side = max((b for b in boxes if b.center[2] + b.half[2] > bottom - 1e-3), key=lambda b: float(b.center[0] + b.half[0]))
-    height = low + min(_OVER_M, (high - low) / 2)
-    middle = corners.mean(axis=0)
-    point = np.array([side.center[0] + side.half[0], side.center[1], bottom - (min(high, height + 2 * side.half[2]) - height) / 2])
-    touched = np.array([middle[0], middle[1], height + bottom - point[2]])
+    ahead = _lowest(boxes)[2]
+    ends = [box for box in boxes if box.center[2] + box.half[2] > ahead - _END_M]
+    side = max(float(box.center[1] + box.half[1]) for box in ends)
+    x = float(np.mean([box.center[0] for box in ends if box.center[1] + box.half[1] > side - _END_M]))
+    foot = low + min(_OVER_M, (high - low) / 2)
+    common = min(high - foot, 2.0 * min(float(box.half[2]) for box in ends))
+    point = np.array([x, side, ahead - common / 2])
+    touched = np.append(corners[:, :2].mean(axis=0), foot + common / 2)
     touched += (d - n @ touched) * n
     return TouchPlace(frame(R, touched + STAND_OFF_M * n - R @ point), -n, point, n, d)
 
