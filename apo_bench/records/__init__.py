@@ -49,6 +49,7 @@ from apo_bench.records.short_names import (
     WRONG_RELATIONS,
 )
 from apo_bench.records.thresholds import MEANINGS, Criteria, Meaning, Thresholds
+from apo_bench.records.wrench_sensor import USUAL_WRENCH, WrenchNoise, checked_wrench, wrench_noise
 
 __all__ = (
     "CODES",
@@ -79,6 +80,7 @@ __all__ = (
     "UNCORRECTED",
     "USUAL",
     "USUAL_LIMITS",
+    "USUAL_WRENCH",
     "WRONG",
     "WRONG_RELATIONS",
     "Criteria",
@@ -94,11 +96,13 @@ __all__ = (
     "SettingInfo",
     "Thresholds",
     "TrialSettings",
+    "WrenchNoise",
     "as_seen",
     "check",
     "check_same_salt",
     "check_together",
     "checked_robot_error",
+    "checked_wrench",
     "finite",
     "in_python",
     "is_own",
@@ -121,4 +125,5 @@ __all__ = (
     "trial_key",
     "with_salt",
     "with_simulated",
+    "wrench_noise",
 )

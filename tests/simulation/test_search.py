@@ -15,6 +15,7 @@ from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.execution.search import press_in
 from apo_bench.simulation.execution.spiral import PITCH_M, RADIUS_M, Easing, Spiral
 from apo_bench.simulation.execution.transfer import Grip
+from apo_bench.simulation.robot.feeling import servo
 from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.robot.paths import shifted, steady
 from apo_bench.simulation.robot.robot import Robot
@@ -168,7 +169,7 @@ def test_the_tip_goes_where_a_law_says():
     robot = Robot(its, layout("stick_in_tower").start)
     before = robot.T
     offsets = iter([np.array([1e-3, -1e-3, 1e-3]) * s for s in np.linspace(0.0, 1.0, 200)])
-    robot.servo(lambda _: next(offsets, None))
+    servo(robot, lambda _: next(offsets, None))
     assert robot.T[:3, 3] - before[:3, 3] == pytest.approx([1e-3, -1e-3, 1e-3])
     reached = its.kinematics.forward(robot.q)
     assert reached == pytest.approx(robot.T, abs=2e-5), "straight joint motions leave the line by some micrometres"

@@ -9,6 +9,7 @@ from apo_bench.geometry import Array, pose
 from apo_bench.simulation.execution.spiral import RADIUS_M, Easing, Spiral
 from apo_bench.simulation.execution.transfer import Grip, Transfer
 from apo_bench.simulation.frames import frame
+from apo_bench.simulation.robot.feeling import servo
 from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth
 from apo_bench.simulation.robot.robot import Robot
@@ -88,7 +89,7 @@ def search_hole(robot: Robot, stopped: Array, front: Array, guard: Guard, press:
         turned = Guard(turn[:3, :3] @ guard.way, guard.newton)
         far = min(radius, _YAWED_RADIUS_M) if yaw else radius
         spiral = Spiral(turned, press, far, _BACK_M + _DEEP_M, robot.step_s)
-        robot.servo(spiral)
+        servo(robot, spiral)
         if spiral.found:
             return shifted(turn, spiral.aside, 1.0)
     _bring(robot, off, guard.way)
@@ -100,7 +101,7 @@ def _ease_in(robot: Robot, end: Array, guard: Guard) -> Array:
     """Go on as deep as a tip pose, giving way across; returns how far aside of it that led, (3,), world, [m]."""
     while (left := float((end - robot.T)[:3, 3] @ guard.way)) > _NOTHING_M:
         easing = Easing(guard, min(left, _PIECE_M), robot.step_s)
-        robot.servo(easing)
+        servo(robot, easing)
         if easing.stopped:
             break
     off = (robot.T - end)[:3, 3]

@@ -44,16 +44,17 @@ class ForceSensors:
     """The contact sensors of a scene, as the robot reads them.
 
     The scene has, first for each movable part, what the part exerts on all that it touches; then, for each part, what
-    it exerts on the arm; three numbers each.
+    it exerts on the arm; three numbers each. The sensors of the wrist, which come last, are none of them.
     """
 
     def __init__(self, work: World, sensordata: Array) -> None:
         self._free = work.free
         self._names = (*work.free, *work.fixed)
-        self._sensors = sensordata
-        self._on_arm_flat = sensordata[3 * len(work.free) :]
+        contacts = sensordata[: 3 * (len(work.free) + len(self._names))]
+        self._sensors = contacts
+        self._on_arm_flat = contacts[3 * len(work.free) :]
         self._on_arm = self._on_arm_flat.reshape(-1, 3)
-        self._net_of_sensors = np.zeros((3, len(sensordata)))
+        self._net_of_sensors = np.zeros((3, len(contacts)))
         self._net = np.zeros(3)
         self._handled: int | None = None
         self.held: tuple[str, ...] = ()

@@ -1,14 +1,14 @@
 """The arm in motion: lines followed with feed-forward, guards, and watching for trouble.
 
 Every physics step of a replay is taken in `_tick`, where motions come by `_run` (`follow`) or `wait` (`fingers`), or in
-`servo`, where each depends on the force that was felt in the one before it. The robot knows what it commanded, its own
-joint and finger positions and the force on the part in its hand: no command depends on where a part is. What reads or
-sets poses of parts is the simulation's own: `_look` and `slip` shift the part in the hand, `in_hand` records it, and at
-fidelity `contact` `follow` and `fingers` leave out steps while nothing is near. One class: all of this shares steps.
+`nudge`, for motions of which each depends on what was felt in the one before it. The robot knows what it commanded, its
+own joint and finger positions and the force on the part in its hand: no command depends on where a part is. What reads
+or sets poses of parts is the simulation's own: `_look` and `slip` shift the part in the hand, `in_hand` records it, and
+at fidelity `contact` `follow` and `fingers` leave out steps while nothing is near. One class: all of this shares steps.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import mujoco
@@ -21,17 +21,16 @@ from apo_bench.simulation.robot.forces import WRIST_S, ForceSensors, Guard
 from apo_bench.simulation.robot.gripper import fingers_of
 from apo_bench.simulation.robot.in_hand import Carried, HoldWatch, fast_forward, steadied, take_along, weld
 from apo_bench.simulation.robot.obstacles import clear, moving_with_tip, near_spans
-from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth, waypoints_unwound
+from apo_bench.simulation.robot.paths import Trajectory, smooth, waypoints_unwound
 from apo_bench.simulation.robot.reach import along, at_end, within_speed
 from apo_bench.simulation.robot.robot_error import RobotError
+from apo_bench.simulation.robot.wrist import WristSensor
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import has_failed, initial_state, part_pose, timestep, unfelt
 
 _REST_RAD_S = 2e-3
 _REST_M_S = 3e-3
 """Joints and fingers that move slower than this rest."""
-_SHIFT_M = 0.001
-"""How far the tip is shifted in thought to see how the joints turn."""
 
 
 class Halt(Exception):
@@ -66,6 +65,8 @@ class Robot:
         self.hold_watch = HoldWatch()
         self.left_out_s = 0.0
         """How much of the time passed without being simulated."""
+        self.wrist: WristSensor | None = None
+        """Reads every step and stops guarded motions, while it is on (`feeling`)."""
         self._error = error
         self._off: Array = np.zeros(len(scene.arm.joints)) if error is None else error.joints
         # What is near is looked for where the tip is believed, so with joints that are off nothing is left out.
@@ -111,8 +112,8 @@ class Robot:
         for begin, end in self._spans(line, s):
             q = self.q
             if begin > done:
-                q = self._reached(at_end(kinematics, line, s[done], s[begin], q))
-            path = self._reached(along(kinematics, line, s[begin : end + 1], q, knots))
+                q = self.reached(at_end(kinematics, line, s[done], s[begin], q))
+            path = self.reached(along(kinematics, line, s[begin : end + 1], q, knots))
             velocity = np.gradient(path, self.step_s, axis=0) if end > begin else np.zeros((1, len(q)))
             if begin > done:
                 joints = (self._qpos, self._dof)
@@ -121,7 +122,7 @@ class Robot:
                 self._pass((begin - done) * self.step_s)
             if self._run((path + self._lead * velocity)[1:], guard) < end - begin:
                 # The measured joint positions become the command, which takes the pressure away.
-                self.q = self.data.qpos[self._qpos] - self._off
+                self.q = self.encoders()
                 self.T = kinematics.forward(self.q)
                 self.stand(0.06)
                 return float(np.linalg.norm(line.end[:3, 3] - self.T[:3, 3]))
@@ -139,7 +140,7 @@ class Robot:
         kinematics = self.scene.kinematics
         line, knots = within_speed(kinematics, line, self.q, self.arm.limits.speed_rad_s)
         n = max(2, round(line.seconds / self.step_s))
-        path = self._reached(along(kinematics, line, line.progress(np.arange(n + 1) / n), self.q, knots))
+        path = self.reached(along(kinematics, line, line.progress(np.arange(n + 1) / n), self.q, knots))
         tips = []
         for target in (path + self._lead * np.gradient(path, self.step_s, axis=0))[1:]:
             self._tick(self._commands(target[None]))
@@ -153,37 +154,18 @@ class Robot:
         for T in waypoints_unwound(self._rest, self.T, end):
             self.follow(smooth(self.T, T, speed, turn_speed))
 
-    def servo(self, law: Callable[[Sequence[float]], Array | None]) -> None:
-        """Shift the tip a little, step by step, as the force on the part in the hand has it.
+    def nudge(self, q: Array, passed: int) -> list[float]:
+        """One physics step towards joint angles, (joints,), [rad]; whenever a tick of them has passed, a look.
 
-        Args:
-            law: Called with the force, (3,) world, [N], before each physics step; returns how far the tip shall be off
-                where it began, (3,) world, [m], or None to end.
-
-        Raises:
-            Halt: The arm does not reach around there, or something went wrong on the way.
+        Returns:
+            The force on the part in the hand, (3,) world, [N].
         """
-        q = self.q
-        offset = np.zeros(3)
-        passed = 0
-        # How the joints turn while the tip is shifted along each axis, [rad/m], by central differences of the inverse
-        # kinematics: as good as exact over some millimetres.
-        ends = [
-            [self._reached(self.scene.kinematics.inverse(shifted(self.T, axis, by), q)) for by in (-_SHIFT_M, _SHIFT_M)]
-            for axis in np.eye(3)
-        ]
-        J_inverse = np.array([(after - before) / (2 * _SHIFT_M) for before, after in ends])
-        force = self.forces.net()
-        while (wanted := law(force)) is not None:
-            offset = wanted
-            passed += 1
-            self.data.ctrl[self._drives] = q + offset @ J_inverse + self._off
-            mujoco.mj_step(self.model, self.data)
-            force = self.forces.feel(self.step_s)
-            if passed % self._steps_of_tick == 0:
-                self._look()
-        self.q = q + offset @ J_inverse
-        self.T = shifted(self.T, offset, 1.0)
+        self.data.ctrl[self._drives] = q + self._off
+        mujoco.mj_step(self.model, self.data)
+        force = self.forces.feel(self.step_s)
+        if passed % self._steps_of_tick == 0:
+            self._look()
+        return force
 
     def wait(self, seconds: float, parts: int = 1) -> None:
         """Stand still; each physics step may be taken in so many parts."""
@@ -232,6 +214,10 @@ class Robot:
     def opening(self) -> float:
         """What the fingers measure, [m] per finger."""
         return self._fingers.opening(self.data)
+
+    def encoders(self) -> Array:
+        """What the joints' encoders say, (joints,), [rad]."""
+        return np.asarray(self.data.qpos[self._qpos] - self._off)
 
     def tip(self) -> Array:
         """Where the tip is, (4, 4), world, by where the joints really are."""
@@ -283,7 +269,8 @@ class Robot:
         self.forces.wrist((0.0, 0.0, 0.0), min(seconds, WRIST_S))
         self.left_out_s += seconds
 
-    def _reached(self, q: Array | None) -> Array:
+    def reached(self, q: Array | None) -> Array:
+        """Joint angles, if the arm can be there; else it gives up."""
         if q is None:
             raise Halt(self.stage, "unreachable_start" if self.stage in ("pick", "lift") else "unreachable")
         return q
@@ -309,15 +296,15 @@ class Robot:
     def _tick(self, commands: Array, guard: Guard | None = None) -> int:
         """One physics step for each command, (n, controls), between two looks.
 
-        What is held is felt at each step. Of an empty hand nothing is asked before the look, so sensors are computed
-        in the last step only.
+        What is held is felt at each step, and all of it while the sensor at the wrist is on. Otherwise nothing is asked
+        of an empty hand before the look, so sensors are computed in the last step only.
 
         Returns:
             After how many steps the guard stopped it; 0 if it did not.
         """
         model = self.model
         data = self.data
-        if not self.forces.held:
+        if self.wrist is None and not self.forces.held:
             with unfelt(model):
                 for command in commands[:-1]:
                     data.ctrl[:] = command
@@ -332,7 +319,10 @@ class Robot:
             data.ctrl[:] = command
             mujoco.mj_step(model, data)
             x, y, z = self.forces.feel(step_s)
-            if -(x * a + y * b + z * c) > newton:
+            if self.wrist is not None:
+                if self.wrist.take(step_s) and self.wrist.stops(guard):
+                    return steps
+            elif -(x * a + y * b + z * c) > newton:
                 return steps
         return 0
 

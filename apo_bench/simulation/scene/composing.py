@@ -18,6 +18,7 @@ from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.physics import Physics, set_contact, set_options
 from apo_bench.simulation.scene.geoms import dress
 from apo_bench.simulation.scene.walls import simulated_pieces
+from apo_bench.simulation.scene.world import WRIST_SENSORS
 
 HANDS = ("hand0", "hand1")
 _HAND_SOLREF = (0.01, 1.0)
@@ -34,6 +35,10 @@ _NEAREST_M = 1e-10
 by less are at times found to be millimetres inside of each other, and leap apart."""
 _NET_FORCE = (1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 3, 1)
 """Of a contact sensor: its data field, how contacts are put together (3: one net force), how many it gives."""
+
+_WRIST_SITE = "wrist"
+_HIDDEN_GROUP = 5
+"""The site of the wrist's sensors, in a group that no picture shows; names of arms and parts have a slash."""
 
 
 def with_hands(room: Any, scenario: Scenario) -> Any:
@@ -56,6 +61,8 @@ def with_hands(room: Any, scenario: Scenario) -> Any:
 def with_arm(room: Any, scenario: Scenario, settings: Physics, arm: Arm, grasp: str, first_link: str) -> Any:
     """Where the robot replays: a room with parts, the arm, sensors of force, and welds where it grasps by them.
 
+    Last come the sensors of the wrist, which stay off until they are asked for (`wrist_felt`).
+
     Args:
         first_link: The first body of the arm that moves.
     """
@@ -65,6 +72,7 @@ def with_arm(room: Any, scenario: Scenario, settings: Physics, arm: Arm, grasp: 
             _add_weld(spec, f"grasp_{part}", f"arm/{arm.mount}", body, _ARM_SOLREF, _ARM_SOLIMP)
     _add_arm(spec, arm, settings)
     _add_force_sensors(spec, scenario, f"arm/{first_link}")
+    _add_wrist_sensors(spec, f"arm/{arm.mount}")
     return spec
 
 
@@ -180,3 +188,13 @@ def _add_force_sensor(spec: Any, name: str, subtree: str, other: str | None) -> 
     if other is not None:
         sensor.reftype = mujoco.mjtObj.mjOBJ_XBODY
         sensor.refname = other
+
+
+def _add_wrist_sensors(spec: Any, mount: str) -> None:
+    """What the arm exerts on its hand where that is mounted: force and torque, in the frame of the mount.
+
+    MuJoCo has weight and inertia of the hand in it, and all that is held or touched by it, welded or by friction.
+    """
+    spec.body(mount).add_site(name=_WRIST_SITE, group=_HIDDEN_GROUP)
+    for name, kind in zip(WRIST_SENSORS, (mujoco.mjtSensor.mjSENS_FORCE, mujoco.mjtSensor.mjSENS_TORQUE), strict=True):
+        spec.add_sensor(name=name, type=kind, objtype=mujoco.mjtObj.mjOBJ_SITE, objname=_WRIST_SITE)

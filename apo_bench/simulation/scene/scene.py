@@ -16,7 +16,7 @@ from apo_bench.simulation.physics import Physics, physics
 from apo_bench.simulation.scene.bounds import bounds_of
 from apo_bench.simulation.scene.composing import fixed_parts, movable_parts, room_with_parts, with_arm, with_hands
 from apo_bench.simulation.scene.holdable import check_holdable
-from apo_bench.simulation.scene.world import World, world
+from apo_bench.simulation.scene.world import World, leave_wrist_unfelt, world
 
 _Grasp = Literal["friction", "weld"]
 _DROWSY_M_S = 5e-5
@@ -72,6 +72,7 @@ def build_scene(
     shown = _compiled(scenario, with_hands(room, scenario), clearance)
     shown.model.opt.sleep_tolerance = _DROWSY_M_S
     work = _compiled(scenario, with_arm(room, scenario, settings, robot, grasp, kinematics.first_link), clearance)
+    leave_wrist_unfelt(work.model)
     if grasp == "friction":
         check_holdable(scenario, work, robot)
     return Scene(

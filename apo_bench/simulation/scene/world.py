@@ -15,6 +15,10 @@ from apo_bench.simulation.frames import frame, quaternion, rotation
 
 SLEEP = int(mujoco.mjtEnableBit.mjENBL_SLEEP)
 _NO_SENSORS = int(mujoco.mjtDisableBit.mjDSBL_SENSOR)
+_WHEN_FELT = int(mujoco.mjtStage.mjSTAGE_ACC)
+_NEVER = int(mujoco.mjtStage.mjSTAGE_NONE)
+WRIST_SENSORS = ("wrist_force", "wrist_torque")
+"""What the arm exerts on its hand, (3,) [N] and (3,) [Nm], in the frame of the body that the hand begins with."""
 
 
 @final
@@ -103,6 +107,23 @@ def timestep(model: Any, seconds: float) -> AbstractContextManager[None]:
 def unfelt(model: Any) -> AbstractContextManager[None]:
     """Steps after which no sensor is asked: they need not be computed for a while."""
     return _with_option(model, "disableflags", int(model.opt.disableflags) | _NO_SENSORS)
+
+
+@contextmanager
+def wrist_felt(model: Any) -> Iterator[None]:
+    """Steps after which the sensors of the wrist are asked; else MuJoCo leaves them, and what only they need, out."""
+    sensors = [model.sensor(name).id for name in WRIST_SENSORS]
+    before = model.sensor_needstage[sensors]
+    model.sensor_needstage[sensors] = _WHEN_FELT
+    try:
+        yield
+    finally:
+        model.sensor_needstage[sensors] = before
+
+
+def leave_wrist_unfelt(model: Any) -> None:
+    """From now on the sensors of the wrist are computed in `wrist_felt` only: they cost a tenth of every step."""
+    model.sensor_needstage[[model.sensor(name).id for name in WRIST_SENSORS]] = _NEVER
 
 
 @contextmanager

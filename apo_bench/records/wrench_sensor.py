@@ -1,0 +1,70 @@
+"""How noisy the force and torque sensor at the wrist is, by the names that rows use.
+
+`ideal`             no noise
+`external`          0.1 N, 5 mNm: a good sensor between arm and hand (Robotiq FT 300-S: signal noise 0.1 N, 5 mNm)
+`external-coarse`   0.2 N, 10 mNm: OnRobot HEX-E, noise-free resolution 0.2 N, 10 mNm across its axis
+`cobot`             3.5 N, 0.2 Nm: an arm's own (Universal Robots UR5e, precision of its force sensing at the flange)
+`0.5/0.02`          N and Nm; without the second one, 0.05 Nm to each N, as the external ones have
+
+Each is the standard deviation of the white noise of one reading, per axis, at 1,000 readings a second.
+"""
+
+import math
+from types import MappingProxyType
+from typing import NamedTuple
+
+from apo_bench.errors import InputError, unknown
+
+
+class WrenchNoise(NamedTuple):
+    """Standard deviations of one reading, per axis."""
+
+    force_n: float
+    torque_nm: float
+
+
+USUAL_WRENCH = "external"
+_PRESETS = MappingProxyType(
+    {
+        "ideal": WrenchNoise(0.0, 0.0),
+        "external": WrenchNoise(0.1, 0.005),
+        "external-coarse": WrenchNoise(0.2, 0.01),
+        "cobot": WrenchNoise(3.5, 0.2),
+    }
+)
+_N_PER_NM = 20.0
+_LARGEST = WrenchNoise(50.0, 5.0)
+
+
+def wrench_noise(name: str) -> WrenchNoise:
+    """The noise that a name stands for.
+
+    Raises:
+        InputError: An unknown name, or a number that is not allowed.
+    """
+    if name in _PRESETS:
+        return _PRESETS[name]
+    if not name[:1].isdigit() and name[:1] not in ("-", "+", ".", "/"):
+        raise InputError(f"{unknown('wrench sensor', name, _PRESETS)} Or give its noise in N and Nm: 0.1/0.005.")
+    try:
+        force, *rest = (float(size) + 0.0 for size in name.split("/"))
+        (torque,) = rest or [force / _N_PER_NM]
+    except ValueError:
+        force = torque = math.nan
+    if not (0.0 <= force <= _LARGEST.force_n and 0.0 <= torque <= _LARGEST.torque_nm):
+        raise InputError(
+            f"the wrench sensor '{name}' was given; standard deviations from 0 to {_LARGEST.force_n:g} N and from 0 to "
+            f"{_LARGEST.torque_nm:g} Nm are allowed, 0.1/0.005, or a name: {', '.join(_PRESETS)}."
+        )
+    return WrenchNoise(force, torque)
+
+
+def checked_wrench(name: str) -> str:
+    """A sensor as rows spell it: by its name where it has one, else by numbers that read back as they are.
+
+    Raises:
+        InputError: As in `wrench_noise`.
+    """
+    noise = wrench_noise(name)
+    known = next((preset for preset, its in _PRESETS.items() if its == noise), None)
+    return known or "/".join(repr(x).removesuffix(".0") for x in noise)

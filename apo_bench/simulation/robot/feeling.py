@@ -1,0 +1,160 @@
+"""Motions that depend on what is felt: by the force on the part in the hand, or by the sensor at the wrist.
+
+Nothing is left out while the wrist feels: its motions are simulated in full at either fidelity.
+"""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+
+import numpy as np
+
+from apo_bench.geometry import Array, pose
+from apo_bench.records import wrench_noise
+from apo_bench.simulation.robot.forces import Guard
+from apo_bench.simulation.robot.paths import Trajectory, shifted
+from apo_bench.simulation.robot.reach import turned_by
+from apo_bench.simulation.robot.robot import Robot
+from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, WristSensor, hand_load
+from apo_bench.simulation.scene.world import wrist_felt
+
+ZERO_S = 0.5
+"""So long a wrist is zeroed: the mean of 500 readings has 0.045 times the noise of one."""
+_SETTLE_S = 0.06
+"""A low pass has forgotten its first reading but for 0.25 % then."""
+_SHIFT_M = 0.001
+_TURN_RAD = 0.002
+"""How far the tip is moved in thought to see how the joints turn."""
+_FAR_M = 0.002
+_FAR_RAD = 0.01
+"""Moved farther than this, it is looked at again."""
+
+
+def servo(robot: Robot, law: Callable[[Sequence[float]], Array | None]) -> None:
+    """Shift the tip a little, step by step, as the force on the part in the hand has it.
+
+    Args:
+        law: Called with the force, (3,) world, [N], before each physics step; returns how far the tip shall be off
+            where it began, (3,) world, [m], or None to end.
+
+    Raises:
+        Halt: The arm does not reach around there, or something went wrong on the way.
+    """
+    q = robot.q
+    offset = np.zeros(3)
+    ends = [(shifted(robot.T, axis, -_SHIFT_M), shifted(robot.T, axis, _SHIFT_M)) for axis in np.eye(3)]
+    J_inverse = robot.reached(turned_by(robot.scene.kinematics, ends, q, _SHIFT_M))
+    force: Sequence[float] = robot.forces.net()
+    passed = 0
+    while (wanted := law(force)) is not None:
+        offset = wanted
+        passed += 1
+        force = robot.nudge(q + offset @ J_inverse, passed)
+    robot.q = q + offset @ J_inverse
+    robot.T = shifted(robot.T, offset, 1.0)
+
+
+def wrist_of(robot: Robot, name: str, rng: np.random.Generator, bandwidth_hz: float = BANDWIDTH_HZ) -> WristSensor:
+    """The sensor of a robot, by the name of its noise.
+
+    Raises:
+        InputError: An unknown name, or a number that is not allowed.
+    """
+    sensors = robot.data.sensordata
+    return WristSensor(robot.scene, sensors, robot.encoders, wrench_noise(name), rng, bandwidth_hz)
+
+
+@contextmanager
+def feeling(robot: Robot, wrist: WristSensor) -> Iterator[None]:
+    """The wrist reads at every step, and guards of motions are its; what the robot does here stands still at first."""
+    if robot.wrist is wrist:
+        yield
+        return
+    before = robot.wrist, robot.fidelity
+    robot.wrist, robot.fidelity = wrist, "full"
+    wrist.begin(hand_load(robot.scene.kinematics, robot.arm, robot.opening()))
+    try:
+        with wrist_felt(robot.model):
+            robot.wait(_SETTLE_S)
+            yield
+    finally:
+        robot.wrist, robot.fidelity = before
+
+
+def zero(robot: Robot, wrist: WristSensor, seconds: float = ZERO_S) -> None:
+    """Stand still in free air; what the sensor shows on average, but for the known weights, is nothing from now on.
+
+    Raises:
+        Halt: Something went wrong meanwhile.
+    """
+    with feeling(robot, wrist):
+        robot.stand()
+        wrist.start_zero()
+        robot.wait(seconds)
+        wrist.end_zero()
+
+
+def press(robot: Robot, line: Trajectory, way: Array, newton: float, wrist: WristSensor) -> float | None:
+    """Follow a line until the filtered force against `way` passes `newton`, and stop there at once.
+
+    The arm goes on while the sensor lags behind by its time constant: with some 100 N per mm, at 2 mm/s by 2 N.
+    `newton` should be several times `wrist.sigma`. An empty stiff hand passes the collision limit faster than 4 mm/s.
+
+    Args:
+        way: The direction of pressing, a unit vector, (3,), world.
+
+    Returns:
+        What is left of the line, [m], the robot being where its encoders say (`robot.T`); None if it was followed to
+        its end, and nothing was felt.
+
+    Raises:
+        Halt: The line leaves the arm's reach, or something went wrong on the way.
+    """
+    with feeling(robot, wrist):
+        return robot.follow(line, Guard(way, newton)) or None
+
+
+def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wrist: WristSensor) -> None:
+    """Move the hand a little, reading by reading, as the wrench has it: `servo` in six directions.
+
+    Args:
+        law: Called at each reading (`READING_S`) with the filtered wrench, (6,), [N] and [Nm], world, about the point
+            where it is then; returns how far the hand shall be off where it began, (6,): the shift of the point, [m],
+            and a rotation vector about it, [rad], world; or None to end.
+        about: The point, (3,), world, [m]; it moves with the hand.
+
+    Raises:
+        Halt: The arm does not reach around there, or something went wrong on the way.
+    """
+    with feeling(robot, wrist):
+        q = robot.q
+        offset = np.zeros(6)
+        looked = offset
+        J = _joint_turns(robot, q, about)
+        passed = 0
+        while (wanted := law(wrist.wrench(about + offset[:3]))) is not None:
+            q = q + (wanted - offset) @ J
+            offset = np.array(wanted)
+            taken = False
+            while not taken:
+                passed += 1
+                robot.nudge(q, passed)
+                taken = wrist.take(robot.step_s)
+            far = np.abs(offset - looked)
+            if far[:3].max() > _FAR_M or far[3:].max() > _FAR_RAD:
+                looked = offset
+                J = _joint_turns(robot, q, about + offset[:3])
+        robot.q = q
+        robot.T = robot.scene.kinematics.forward(q)
+
+
+def _joint_turns(robot: Robot, q: Array, about: Array) -> Array:
+    """How the joints turn, (6, joints), per metre along each axis and per radian about each through a point."""
+    kinematics = robot.scene.kinematics
+    T = kinematics.forward(q)
+    to = pose.at(about)
+    T_point_tip = pose.inverse(to) @ T
+    turns = []
+    for ways, by in ((np.eye(6)[:3], _SHIFT_M), (np.eye(6)[3:], _TURN_RAD)):
+        ends = [(to @ pose.exp(-by * way) @ T_point_tip, to @ pose.exp(by * way) @ T_point_tip) for way in ways]
+        turns.append(robot.reached(turned_by(kinematics, ends, q, by)))
+    return np.vstack(turns)

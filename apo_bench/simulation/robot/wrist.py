@@ -1,0 +1,198 @@
+"""A sensor of force and torque at the wrist, as arms have it: noise, an offset, a low pass, and what it cannot know.
+
+It measures what the arm exerts on its hand. What the surroundings exert on the hand, and on what is in it, is that, the
+other way round, less the weights. The robot knows the weight of its hand by its own model, that of a part by the file
+of the part where it believes it to be, and how the hand is turned by its encoders. Inertia stays in: a hand of 1 kg
+that gains 1 m/s in a second feels 1 N.
+"""
+
+import math
+from collections.abc import Callable, Mapping
+from typing import NamedTuple, final
+
+import mujoco
+import numpy as np
+
+from apo_bench.geometry import Array, pose
+from apo_bench.parts import read_part
+from apo_bench.records import WrenchNoise
+from apo_bench.simulation.arms.arm import Arm
+from apo_bench.simulation.arms.kinematics import Kinematics
+from apo_bench.simulation.frames import body_frame
+from apo_bench.simulation.robot.forces import Guard
+from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene.world import WRIST_SENSORS
+
+READING_S = 0.001
+"""Time from one reading to the next. Each is the mean since the one before, with new noise, whatever the step."""
+BANDWIDTH_HZ = 16.0
+"""Of the low pass, a time constant of 10 ms: so much the robot feels late, and a reading's noise is 0.22 times."""
+OFFSETS = 20.0
+"""Standard deviation of what a sensor shows of nothing until it is zeroed, in standard deviations of its noise."""
+_GRAVITY = 9.81
+_ROUNDING_S = 1e-9
+
+
+class Load(NamedTuple):
+    """What hangs on the sensor."""
+
+    mass_kg: float
+    center: Array
+    """Its centre of mass, (3,), in the frame of the tip, [m]."""
+
+
+def hand_load(kinematics: Kinematics, arm: Arm, opening: float) -> Load:
+    """The hand at an opening [m], by the model of the arm alone."""
+    model = kinematics.model
+    data = mujoco.MjData(model)
+    for finger, joint in zip(arm.fingers, arm.finger_joints(opening), strict=True):
+        data.qpos[model.jnt_qposadr[model.joint(finger).id]] = joint
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mount = model.body(arm.mount).id
+    tip = model.site(arm.tip).id
+    center = data.site_xmat[tip].reshape(3, 3).T @ (data.subtree_com[mount] - data.site_xpos[tip])
+    return Load(float(model.body_subtreemass[mount]), center)
+
+
+def part_loads(scene: Scene, T_tip_part: Mapping[str, Array]) -> tuple[Load, ...]:
+    """Parts by their files, each (4, 4) where it is believed to lie in the hand."""
+    scenario = scene.scenario
+    loads = []
+    for part, T in T_tip_part.items():
+        solid = scenario.assembly.solids[part]
+        mass = read_part(scenario.part_files[part]).density * solid.volume
+        loads.append(Load(mass, T[:3, :3] @ solid.centroid + T[:3, 3]))
+    return tuple(loads)
+
+
+@final
+class WristSensor:
+    """What one arm feels at its wrist during one replay."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        sensordata: Array,
+        encoders: Callable[[], Array],
+        noise: WrenchNoise,
+        rng: np.random.Generator,
+        bandwidth_hz: float = BANDWIDTH_HZ,
+    ) -> None:
+        """Draw the offset of the trial.
+
+        Args:
+            sensordata: That of the simulation; of it, the sensors of the wrist are read.
+            encoders: What the joints' encoders say, (joints,), [rad].
+            rng: Six numbers now, and six at each reading.
+        """
+        model = scene.work.model
+        first = [int(model.sensor_adr[model.sensor(name).id]) for name in WRIST_SENSORS]
+        self._raw = sensordata[first[0] : first[1] + 3]
+        self._kinematics = scene.kinematics
+        self._encoders = encoders
+        self._sigma = np.repeat(noise, 3)
+        self._rng = rng
+        self._part = 1.0 - math.exp(-2.0 * math.pi * bandwidth_hz * READING_S)
+        self._offset = OFFSETS * self._sigma * rng.standard_normal(6)
+        self._zero: Array = np.zeros(6)
+        self._T_tip_sensor = _sensor_frame(scene.kinematics, scene.arm)
+        self._sum: Array = np.zeros(6)
+        self._summed_s = 0.0
+        self._clock_s = 0.0
+        self._felt: Array | None = None
+        self._readings: list[Array] | None = None
+        self.hand = hand_load(scene.kinematics, scene.arm, scene.arm.opening_m)
+        self.held: tuple[Load, ...] = ()
+        """What is in the hand, as it is believed; the robot says it."""
+
+    @property
+    def sigma(self) -> tuple[float, float]:
+        """Standard deviation of what is felt behind the low pass, per axis, [N] and [Nm].
+
+        y' = (1 - a) y + a x has the variance a / (2 - a) of the white noise x.
+        """
+        force, torque = (self._sigma[[0, 3]] * math.sqrt(self._part / (2.0 - self._part))).tolist()
+        return force, torque
+
+    def begin(self, hand: Load) -> None:
+        """Feel anew, after time in which nothing was read: the first reading is taken as it is."""
+        self.hand = hand
+        self._sum = np.zeros(6)
+        self._summed_s = self._clock_s = 0.0
+        self._felt = None
+
+    def take(self, step_s: float) -> bool:
+        """Take up what the last physics step left in the sensors; whether that made a reading."""
+        self._sum += step_s * self._raw
+        self._summed_s += step_s
+        self._clock_s += step_s
+        if self._clock_s < READING_S - _ROUNDING_S:
+            return False
+        reading = self._sum / self._summed_s + self._offset + self._sigma * self._rng.standard_normal(6)
+        self._sum[:] = 0.0
+        self._summed_s = 0.0
+        self._clock_s -= READING_S
+        self._felt = reading if self._felt is None else self._felt + self._part * (reading - self._felt)
+        if self._readings is not None:
+            self._readings.append(reading)
+        return True
+
+    def start_zero(self) -> None:
+        """From now on the arm stands still in free air."""
+        self._readings = []
+
+    def end_zero(self) -> None:
+        """What the readings since `start_zero` show on average, but for the weights, is no force of anything."""
+        if self._readings:
+            self._zero = np.mean(self._readings, axis=0) - self._of_weights()
+        self._readings = None
+
+    def wrench(self, about: Array) -> Array:
+        """Force and torque about a point, (3,) world, of the surroundings on the hand and what is in it, filtered.
+
+        Returns:
+            (6,): [N] and [Nm], along world axes; zero before the first reading.
+        """
+        out = np.zeros(6)
+        if self._felt is None:
+            return out
+        T = self._sensor()
+        f, t = (self._of_weights() + self._zero - self._felt).reshape(2, 3) @ T[:3, :3].T
+        out[:3] = f
+        out[3:] = t + np.cross(T[:3, 3] - about, f)
+        return out
+
+    def stops(self, guard: Guard | None) -> bool:
+        """Whether the hand is pushed back along the way of a guard by more than it allows."""
+        if guard is None:
+            return False
+        return -float(self.wrench(np.zeros(3))[:3] @ guard.way) > guard.newton
+
+    def _sensor(self) -> Array:
+        """Where the sensor is by the encoders, (4, 4), world."""
+        return np.asarray(self._kinematics.forward(self._encoders()) @ self._T_tip_sensor)
+
+    def _of_weights(self) -> Array:
+        """What the sensor shows while the known weights hang on it and nothing touches them, (6,), in its frame."""
+        T_sensor_tip = pose.inverse(self._T_tip_sensor)
+        up = self._sensor()[2, :3]
+        out = np.zeros(6)
+        for load in (self.hand, *self.held):
+            # The arm carries each weight: m g upwards at its centre.
+            force = load.mass_kg * _GRAVITY * up
+            out[:3] += force
+            out[3:] += np.cross(T_sensor_tip[:3, :3] @ load.center + T_sensor_tip[:3, 3], force)
+        return out
+
+
+def _sensor_frame(kinematics: Kinematics, arm: Arm) -> Array:
+    """The mount of the hand in the frame of the tip, (4, 4): both are on the same rigid body."""
+    model = kinematics.model
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    tip = model.site(arm.tip).id
+    T_tip = np.eye(4)
+    T_tip[:3, :3] = data.site_xmat[tip].reshape(3, 3)
+    T_tip[:3, 3] = data.site_xpos[tip]
+    return np.asarray(pose.inverse(T_tip) @ body_frame(data, model.body(arm.mount).id))

@@ -1,0 +1,190 @@
+"""The sensor at the wrist: what it shows of nothing, of weights, of noise, of a blow, and that it costs nothing off."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import mujoco
+import numpy as np
+import pytest
+
+from apo_bench import Scene, build_scene, load_scenario
+from apo_bench.geometry import pose
+from apo_bench.records import WrenchNoise
+from apo_bench.simulation.robot.feeling import feeling, wrist_of, zero
+from apo_bench.simulation.robot.forces import Guard
+from apo_bench.simulation.robot.robot import Robot
+from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, OFFSETS, Load, WristSensor, hand_load
+from apo_bench.simulation.scene.world import wrist_felt
+
+ARMS = ("six_axis", "ur5e_primitive", "panda_primitive")
+POSES = (((0.1, 0.16, 0.2), (0, 0, 0)), ((0.2, -0.1, 0.25), (20, 0, 0)), ((0.1, 0.1, 0.22), (0, -25, 40)))
+
+
+def wrist(scene: Scene, noise: WrenchNoise, seed: int = 1, **settings) -> SimpleNamespace:
+    """A sensor whose signal is set by hand, of an arm at home."""
+    data = np.zeros(scene.work.model.nsensordata)
+    rng = np.random.default_rng(seed)
+    sensor = WristSensor(scene, data, lambda: np.array(scene.arm.home), noise, rng, **settings)
+    return SimpleNamespace(sensor=sensor, signal=data[-6:])
+
+
+def shown(made: SimpleNamespace, steps: int, step_s: float = 0.001) -> np.ndarray:
+    """What is felt at the sensor's origin after each reading, (readings, 6), world."""
+    at = made.sensor._sensor()[:3, 3]
+    return np.array([made.sensor.wrench(at) for _ in range(steps) if made.sensor.take(step_s)])
+
+
+def test_the_hand_is_known_by_the_model_of_the_arm(tower: Scene) -> None:
+    """0.8 kg at 30 mm and two fingers of 0.05 kg at 90 mm, the tip at 125 mm."""
+    load = hand_load(tower.kinematics, tower.arm, 0.02)
+    assert load.mass_kg == pytest.approx(0.9)
+    assert load.center == pytest.approx([0.0, 0.0, (0.8 * 0.03 + 0.1 * 0.09) / 0.9 - 0.125], abs=1e-9)
+
+
+def test_noise_is_white_at_a_thousand_readings_a_second_and_behind_the_low_pass_as_stated(tower: Scene) -> None:
+    made = wrist(tower, WrenchNoise(0.1, 0.005))
+    felt = shown(made, 60_000)[100:]
+    force, torque = made.sensor.sigma
+    assert (force, torque) == pytest.approx((0.1 * 0.2241, 0.005 * 0.2241), rel=1e-3)
+    assert felt[:, :3].std(axis=0) == pytest.approx(force, rel=0.05)
+    assert felt[:, 3:].std(axis=0) == pytest.approx(torque, rel=0.05)
+    # Behind a first-order low pass neighbours k readings apart have the correlation (1 - a)^k.
+    part = np.exp(-2 * np.pi * BANDWIDTH_HZ * 0.001)
+    for k in (1, 10):
+        assert np.corrcoef(felt[:-k, 0], felt[k:, 0])[0, 1] == pytest.approx(part**k, abs=0.03)
+
+
+@pytest.mark.parametrize("bandwidth_hz", [8.0, 16.0, 50.0])
+def test_a_sine_at_the_bandwidth_is_felt_at_seven_tenths(tower: Scene, bandwidth_hz: float) -> None:
+    made = wrist(tower, WrenchNoise(0.0, 0.0), bandwidth_hz=bandwidth_hz)
+    axis = made.sensor._sensor()[:3, 0]
+    felt = []
+    for k in range(round(8000 / bandwidth_hz)):
+        made.signal[0] = np.sin(2 * np.pi * bandwidth_hz * 0.001 * k)
+        felt.append(shown(made, 1)[0, :3] @ axis)
+    # Sampled at 1 kHz, the low pass of 50 Hz lets 0.76 through where a continuous one has sqrt(0.5).
+    assert np.ptp(felt[-round(2000 / bandwidth_hz) :]) / 2 == pytest.approx(np.sqrt(0.5), rel=0.09)
+
+
+@pytest.mark.parametrize("step_s", [0.0005, 0.00025, 0.0001])
+def test_a_blow_and_the_noise_are_felt_alike_whatever_the_step(tower: Scene, step_s: float) -> None:
+    """0.03 Ns in a millisecond, in one step or in ten: each reading is a mean, and has the same noise."""
+    felt = []
+    for step in (0.001, step_s):
+        made = wrist(tower, WrenchNoise(0.1, 0.005))
+        per_ms = round(0.001 / step)
+        before = shown(made, 20 * per_ms, step)
+        made.signal[2] = 0.03 / step
+        blow = shown(made, 1, step)
+        made.signal[2] = 0.0
+        after = shown(made, 50 * per_ms - (1 if per_ms > 1 else 0), step)
+        felt.append(np.concatenate([before, blow.reshape(-1, 6), after])[:70])
+    assert len(felt[0]) == len(felt[1])
+    assert felt[1] == pytest.approx(felt[0], abs=1e-9)
+
+
+def test_the_same_generator_gives_the_same_bytes_and_another_one_others(tower: Scene) -> None:
+    first, again, other = (shown(wrist(tower, WrenchNoise(0.1, 0.005), seed), 50).tobytes() for seed in (1, 1, 2))
+    assert first == again != other
+
+
+def test_the_offset_of_a_trial_is_drawn_and_zeroing_removes_it(tower: Scene) -> None:
+    offsets = []
+    for seed in range(200):
+        made = wrist(tower, WrenchNoise(0.1, 0.005), seed)
+        offsets.append(made.sensor._offset)
+    assert np.std(offsets, axis=0)[:3] == pytest.approx(0.1 * OFFSETS, rel=0.15)
+    weight = np.array(made.sensor._of_weights())
+    made.signal[:] = weight
+    assert np.abs(shown(made, 500)[-1][:3]).max() > 0.5
+    made.sensor.start_zero()
+    shown(made, 500)
+    made.sensor.end_zero()
+    # 500 readings have a mean with 0.1 / sqrt(500) = 0.0045 N, what is felt then 0.022 N.
+    felt = shown(made, 500)[-200:].mean(axis=0)
+    assert np.abs(felt[:3]).max() < 0.03
+    assert np.abs(felt[3:]).max() < 0.0015
+
+
+def test_force_and_torque_are_those_of_the_surroundings_about_the_point_that_is_asked(tower: Scene) -> None:
+    """5 N upwards at a point 50 mm in front of the sensor's origin, in x: about that point there is no torque."""
+    made = wrist(tower, WrenchNoise(0.0, 0.0))
+    T = made.sensor._sensor()
+    point = T[:3, 3] + [0.05, 0.0, 0.0]
+    force = np.array([0.0, 0.0, 5.0])
+    torque = np.cross(point - T[:3, 3], force)
+    made.signal[:] = made.sensor._of_weights() - np.concatenate([T[:3, :3].T @ force, T[:3, :3].T @ torque])
+    made.sensor.take(0.001)
+    assert made.sensor.wrench(point) == pytest.approx([0, 0, 5, 0, 0, 0], abs=1e-9)
+    assert made.sensor.wrench(T[:3, 3]) == pytest.approx([0, 0, 5, 0, -0.25, 0], abs=1e-9)
+    assert made.sensor.stops(Guard(np.array([0.0, 0.0, -1.0]), 4.9))
+    assert not made.sensor.stops(Guard(np.array([0.0, 0.0, -1.0]), 5.1))
+    assert not made.sensor.stops(None)
+
+
+def test_a_part_that_is_said_to_be_held_weighs_at_its_centre(tower: Scene) -> None:
+    made = wrist(tower, WrenchNoise(0.0, 0.0))
+    made.signal[:] = made.sensor._of_weights()
+    made.sensor.held = (Load(0.5, np.array([0.02, 0.0, 0.0])),)
+    made.sensor.take(0.001)
+    tip = tower.kinematics.forward(np.array(tower.arm.home))
+    felt = made.sensor.wrench(tip[:3, :3] @ [0.02, 0.0, 0.0] + tip[:3, 3])
+    # The sensor shows the hand alone, so something holds the part up: 0.5 kg at its centre.
+    assert felt == pytest.approx([0, 0, 0.5 * 9.81, 0, 0, 0], abs=1e-9)
+
+
+@pytest.mark.parametrize("arm", ARMS)
+def test_in_free_air_nothing_is_felt_at_any_pose(arm: str) -> None:
+    scene = build_scene(load_scenario("stick_in_tower"), arm=arm)
+    robot = Robot(scene, scene.scenario.start)
+    sensor = wrist_of(robot, "external", np.random.default_rng(3))
+    robot.fingers(0.01)
+    zero(robot, sensor)
+    home = robot.T
+    for at, turn in POSES:
+        T = pose.at(at, turn) @ pose.inverse(pose.at(home[:3, 3])) @ home
+        robot.go(T, 0.8)
+        with feeling(robot, sensor):
+            robot.wait(0.1)
+            felt = []
+            for _ in range(100):
+                robot.wait(0.004)
+                felt.append(sensor.wrench(robot.T[:3, 3]))
+        # The mean of 500 readings, which zeroed it, and this one have 0.0045 and 0.005 N; 1 mNm comes of that at the
+        # tip, 0.1 to 0.13 m from the sensor.
+        mean = np.abs(np.mean(felt, axis=0))
+        assert mean[:3].max() < 0.025
+        assert mean[3:].max() < 0.004
+
+
+def test_the_sensors_of_the_wrist_are_off_unless_they_are_asked(tower: Scene) -> None:
+    model = tower.work.model
+    data = mujoco.MjData(model)
+    for _ in range(3):
+        mujoco.mj_step(model, data)
+    assert not data.sensordata[-6:].any()
+    with wrist_felt(model):
+        mujoco.mj_step(model, data)
+        assert data.sensordata[-6:].any()
+        with pytest.raises(RuntimeError), wrist_felt(model):
+            raise RuntimeError
+        assert model.sensor_needstage[-2:].tolist() == [3, 3]
+    assert model.sensor_needstage[-2:].tolist() == [0, 0]
+
+
+def test_a_motion_is_the_same_to_the_byte_while_the_wrist_feels(tower: Scene) -> None:
+    ends = []
+    for feels in (False, True):
+        robot = Robot(tower, tower.scenario.start)
+        sensor = wrist_of(robot, "external", np.random.default_rng(3))
+        robot.wait(0.06)
+        if feels:
+            robot = Robot(tower, tower.scenario.start)
+            sensor = wrist_of(robot, "external", np.random.default_rng(3))
+            with feeling(robot, sensor):
+                robot.go(pose.at((0.02, 0.0, -0.02)) @ robot.T, 0.3)
+        else:
+            robot.go(pose.at((0.02, 0.0, -0.02)) @ robot.T, 0.3)
+        ends.append((robot.data.qpos.tobytes(), robot.data.qvel.tobytes()))
+    assert ends[0] == ends[1]
