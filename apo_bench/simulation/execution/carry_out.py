@@ -86,9 +86,10 @@ def bring(robot: Robot, t: Transfer, i: int, lay: Callable[[Transfer, Grip], Gri
         Halt: Something went wrong; the stage and code say what.
     """
     grip = t.grips[i]
+    if lay is not None and not t.into.level:
+        grip = lay(t, grip)
     _carry(robot, t, grip)
-    if lay is not None:
-        robot.stage = "attach"
+    if lay is not None and t.into.level:
         grip = lay(t, grip)
     left, grip = _attach(robot, t, grip, t.grips[i + 1] if t.into.left is not None else None)
     release(robot, t, grip)
@@ -172,7 +173,7 @@ def _come_down(robot: Robot, t: Transfer, grip: Grip) -> None:
     left, T_search = press_in(robot, t, grip, above, down, 0.0)
     if left == 0.0:
         end = after_search(T_search, shifted(goal, t.into.way, _OVERTRAVEL_M))
-        press_in(robot, t, grip, steady(robot.T, end, _TOUCH), down, _OVERTRAVEL_M + t.depth / 2)
+        press_in(robot, t, grip, steady(robot.T, end, _TOUCH), down, _OVERTRAVEL_M + t.stuck)
     robot.stand()
 
 

@@ -159,7 +159,8 @@ def _run_schedule(
             lay = None
             if feeling is not None:
                 feeling.taken(step.operation)
-                lay = partial(lay_flat, robot, feeling, step.operation)
+                if transfer.flush is not None:
+                    lay = partial(lay_flat, robot, feeling, step.operation)
             bring(robot, transfer, grip, lay)
             _note_hold(robot, step)
             _until_rest(robot)

@@ -21,6 +21,8 @@ _LEVEL = float(np.cos(np.radians(10.0)))
 """A face that looks up by less than ten degrees off is one to lie on."""
 _LOWEST_M = 1e-4
 """Corners this near to the lowest one lie on the floor."""
+_LIFT_M = 0.01
+"""What stood is lifted so far before it is laid down again."""
 _ROOM_M = 0.002
 _LOOKS_M = 0.003
 """On the way down everything else stays this far away; it is looked at this often."""
@@ -44,12 +46,13 @@ def before_insertion(t: Transfer) -> Array:
 
 
 def flush_pose(assembly: Assembly, scene: Scene, t: Transfer, believed: Poses) -> Flush | None:
-    """The part flat on a fixed face straight below where its last motion begins; None where it cannot.
+    """The part flat on a fixed face straight below where a level insertion begins; before one from above, where it
+    stood. None where it cannot.
 
     Args:
         believed: Where all parts are before the transfer.
     """
-    T = before_insertion(t)
+    T = before_insertion(t) if t.into.level else shifted(t.T_world_start, UP, _LIFT_M)
     up = upwards(T)
     lying = [
         each

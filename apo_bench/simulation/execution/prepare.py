@@ -166,10 +166,12 @@ def _with_acts(
     assembly: Assembly, scene: Scene, k: int, t: Transfer, believed: Poses, acts: tuple[str, ...]
 ) -> Transfer:
     """The transfer of a robot that feels, with what it does besides: a part that stands between others stays so."""
-    squared = "square" in acts and not (t.out.level or t.away or t.drawn)
-    laid = "lay" in acts and t.into.level
+    free = not (t.out.level or t.away or t.drawn)
+    squared = "square" in acts and free
+    laid = "lay" in acts and (t.into.level or (bool(t.mouths) and free))
     return replace(
         t,
+        in_last="search" in acts,
         squaring=squaring_grips(assembly, scene, k, t.grips[0], believed) if squared else (),
         flush=flush_pose(assembly, scene, t, believed) if laid else None,
     )

@@ -102,10 +102,14 @@ class Transfer:
     """Guard of a slide, below the force at which what is touched would slide, [N]."""
     clearance: float
     """What lay free falls by this onto the floor of its slot, [m]."""
+    in_last: bool = False
+    """Whether a motion from above that comes between the last walls only half of their way is searched on, and not one
+    that comes half of the way of all."""
     squaring: tuple[Grip, ...] = ()
     """Before it is taken, the fingers close and open again here, at its start; none where nothing is felt."""
     flush: Any = None
-    """A `Flush`: the part laid flat on what is fixed before a level insertion; None where it cannot or need not."""
+    """A `Flush`: the part laid flat on what is fixed, below where a level insertion begins, or where it stood before one
+    from above; None where it cannot or need not."""
     front: Array | None = None
     """Where the part, with what it carries, ends ahead on its way: the middle of it, in its own frame, (3,), [m]; None
     where a hole is not searched for."""
@@ -119,6 +123,11 @@ class Transfer:
     def depth(self) -> float:
         """How deep a motion from above goes between walls, [m]."""
         return self.slow - WALL_MARGIN_M
+
+    @property
+    def stuck(self) -> float:
+        """A motion from above that is stopped farther than this before its end has not found its hole, [m]."""
+        return min(self.mouths) / 2 if self.in_last and self.mouths else self.depth / 2
 
     @property
     def sides(self) -> tuple[Array, ...]:

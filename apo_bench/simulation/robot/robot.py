@@ -248,6 +248,12 @@ class Robot:
             mujoco.mj_forward(self.model, self.data)
             weld(self.scene, self.data, held[0], True)
 
+    def compensate(self, off: Array) -> None:
+        """From now on the joints are off what is commanded by so much, (joints,), [rad], and no longer by what was."""
+        self._off = off
+        if off.any():
+            self.fidelity = "full"
+
     def steady(self, on: bool) -> None:
         """From now on what is in the hand is carried through the air, or no longer; begin and end at rest."""
         friction = self.scene.grasp == "friction"

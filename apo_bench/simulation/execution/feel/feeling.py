@@ -5,7 +5,7 @@ is believed to be. The drawn errors enter in two ways, as in every replay: they 
 it to be, and `believed_tip` takes them off again, since what it tells is what the robot's own encoders say.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import final
 
@@ -27,8 +27,9 @@ ACTS = ("square", "touch", "lay", "search")
 what is stopped all the same is searched for."""
 _TOUCH_SIGMA_M = 3e-5
 """How exactly a guarded touch tells a plane: the patch of the finger that meets it may be tilted."""
-_SQUARED = np.array([5e-5, 5e-5, 5e-5, 5e-4, 3e-4, 3e-4])
-"""How exactly a part lies between pads that closed twice, [m, rad], a twist in the frame of the tip."""
+_SQUARED = np.array([5e-5, 2e-4, 1e-3, 5e-3, 3e-3, 3e-3])
+"""How exactly a part lies between pads that closed twice, [m, rad], a twist in the frame of the tip: closing tips a
+round part by 0.3 degrees, and pressed on a floor it slides up between the pads."""
 _TOUCH_N = 2.0
 _SIGMAS = 8.0
 """A touch ends by this force, or by so many standard deviations of what the wrist feels."""
@@ -97,12 +98,21 @@ class Feeling:
     def believed_tip(self, robot: Robot) -> Array:
         """Where the robot would believe its tip if it made up for nothing, (4, 4), world, and the Jacobian there."""
         left = self.residual
-        corrected = pose.inverse(left.hand_eye) @ robot.T @ pose.inverse(left.tool)
+        measured = self._scene.kinematics.forward(robot.encoders())
+        corrected = pose.inverse(left.hand_eye) @ measured @ pose.inverse(left.tool)
         return self.belief.command(corrected, self.jacobian(robot))
 
     def jacobian(self, robot: Robot) -> Array:
         """The body Jacobian of the tip, (6, joints)."""
         return self._scene.kinematics.jacobian(robot.q)
+
+    def without_common(self, touches: Sequence[Touch]) -> list[Touch]:
+        """Touches of one wall less what they have in common beyond what is believed: their differences stay."""
+        if len(touches) < 2:
+            return []
+        tips = [self.belief.real(touch.T_world_tip, touch.jacobian) for touch in touches]
+        beyond = [t.normal @ pose.apply(X, t.point[None])[0] - t.offset for t, X in zip(touches, tips, strict=True)]
+        return [replace(t, offset=t.offset + float(np.mean(beyond))) for t in touches]
 
     def learn(self, robot: Robot, touches: Iterable[Touch]) -> None:
         """Believe what was felt; from now on commands make up for it."""

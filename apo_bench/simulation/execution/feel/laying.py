@@ -9,11 +9,11 @@ import numpy as np
 from apo_bench.geometry import Array, pose
 from apo_bench.insertion.macros import UP
 from apo_bench.simulation.execution.feel.feeling import Feeling
-from apo_bench.simulation.execution.flush import before_insertion
+from apo_bench.simulation.execution.flush import Flush, before_insertion
 from apo_bench.simulation.execution.transfer import Grip, Transfer
 from apo_bench.simulation.robot.feeling import comply
 from apo_bench.simulation.robot.feeling import feeling as by_wrist
-from apo_bench.simulation.robot.paths import shifted, smooth
+from apo_bench.simulation.robot.paths import shifted, smooth, with_height
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.wrist import READING_S, part_loads
 from apo_bench.simulation.scene.world import sleeping
@@ -28,16 +28,18 @@ _OFF = 0.02
 _OFF_M = 0.002
 """Peak speeds, [m/s]; off the floor it goes slowly at first."""
 _YIELD_M = 0.0005
-_YIELD_RAD = 0.06
-"""How fast it gives way, [m/s] to a newton and [rad/s] to a newton metre."""
+_TURN_RAD = 0.015
+"""How fast it gives way, [m/s] to a newton, and how fast it turns, [rad/s], while it lies on one foot only."""
 _FASTEST = 0.005
 _FASTEST_RAD = 0.05
 """[m/s], [rad/s]."""
 _CALM = 0.15
 _CALM_RAD = 6e-4
-"""It lies when the press is met within this part of it, and it turns slower than this, [rad/s], for a while, [s]."""
+"""It lies when the press is met within this part of it, and it turns slower than this, [rad/s], for a while, [s]; how
+fast it turns is averaged over as long, since a sensor is noisy."""
 _CALM_S = 0.1
-_MOST_S = 6.0
+_AVERAGED = READING_S / _CALM_S
+_MOST_S = 15.0
 _DEEPEST_M = 0.012
 
 
@@ -48,23 +50,24 @@ def lay_flat(robot: Robot, feeling: Feeling, operation: int, t: Transfer, grip: 
         Halt: It fell out of the hand, or something was struck.
     """
     flush = t.flush
-    if flush is None:
-        return grip
+    T_before = robot.T
     tool = feeling.residual.tool
     held = pose.inverse(grip.T_part_tip @ pose.inverse(tool))
-    far = float(robot.T[2, 3] - (flush.T @ grip.T_part_tip)[2, 3])
     robot.macro = "lay-flat"
-    robot.follow(smooth(robot.T, shifted(robot.T, UP, _NEAR_M - far), _DOWN))
+    robot.follow(smooth(robot.T, shifted(flush.T @ grip.T_part_tip, UP, _NEAR_M), _DOWN))
     robot.stand()
-    law = _Laying(flush.normal)
+    law = _Laying(flush)
     with sleeping(robot.scene.work, False), by_wrist(robot, feeling.wrist):
         feeling.wrist.held = part_loads(robot.scene, {t.part: held})
-        comply(robot, law, robot.T[:3, 3], feeling.wrist)
+        # About the middle of the feet: there, what rubs has no lever.
+        feet = pose.apply(robot.T @ pose.inverse(grip.T_part_tip), flush.feet)
+        comply(robot, law, feet.mean(axis=0), feeling.wrist)
         if law.lies:
             grip = Grip(pose.inverse(feeling.lain(robot, operation, flush, held)) @ tool, grip.half_width)
         robot.follow(smooth(robot.T, shifted(robot.T, UP, _OFF_M), _OFF))
         feeling.wrist.held = ()
-    robot.follow(smooth(robot.T, before_insertion(t) @ grip.T_part_tip, _UP))
+    above = before_insertion(t) @ grip.T_part_tip if t.into.level else with_height(robot.T, float(T_before[2, 3]))
+    robot.follow(smooth(robot.T, above, _UP))
     robot.stand()
     return grip
 
@@ -72,9 +75,12 @@ def lay_flat(robot: Robot, feeling: Feeling, operation: int, t: Transfer, grip: 
 class _Laying:
     """Down until pushed back by the press, turning about level axes as the torque has it, until it lies."""
 
-    def __init__(self, n: Array) -> None:
-        self._n = n
+    def __init__(self, flush: Flush) -> None:
+        self._n = flush.normal
+        lever = float(np.linalg.norm(flush.feet - flush.feet.mean(axis=0), axis=1).max())
+        self._yield = _TURN_RAD / (_PRESS_N * lever)
         self._offset = np.zeros(6)
+        self._turning = np.full(3, _TURN_RAD)
         self._calm = 0
         self._left = round(_MOST_S / READING_S)
         self.lies = False
@@ -84,10 +90,11 @@ class _Laying:
         push = float(wrench[:3] @ self._n)
         torque = wrench[3:] - (wrench[3:] @ self._n) * self._n
         down = float(np.clip(_YIELD_M * (_PRESS_N - push), -_FASTEST, _FASTEST))
-        turn = np.zeros(3) if push < _PRESS_N / 4 else np.clip(_YIELD_RAD * torque, -_FASTEST_RAD, _FASTEST_RAD)
+        turn = np.zeros(3) if push < _PRESS_N / 4 else np.clip(self._yield * torque, -_FASTEST_RAD, _FASTEST_RAD)
         self._offset = self._offset + READING_S * np.concatenate([-down * self._n, turn])
         self._left -= 1
-        calm = abs(push - _PRESS_N) < _CALM * _PRESS_N and float(np.abs(turn).max()) < _CALM_RAD
+        self._turning = self._turning + _AVERAGED * (turn - self._turning)
+        calm = abs(push - _PRESS_N) < _CALM * _PRESS_N and float(np.abs(self._turning).max()) < _CALM_RAD
         self._calm = self._calm + 1 if calm else 0
         self.lies = self._calm * READING_S >= _CALM_S
         if self.lies or self._left <= 0 or -float(self._offset[:3] @ self._n) > _DEEPEST_M:

@@ -95,15 +95,22 @@ def floor_places(plan: Plan, scene: Scene) -> tuple[TouchPlace, ...]:
 
 def wall_places(plan: Plan, scene: Scene) -> tuple[TouchPlace, ...]:
     """One place on each wall of what is fixed that tells where something will be fitted in."""
-    around = {part: obstacles(plan.assembly.solids, plan.start, (part,)) for part in plan.assembly.fixed}
-    places = []
+    around = obstacles(plan.assembly.solids, plan.start, ())
+    places = [_at_wall(scene, face, plan.start[part], np.array([0.0, 1.0])) for part, face in _walls(plan)]
+    return tuple(place for place in places if _free(scene, place.T_world_tip, around))
+
+
+def opposite_places(plan: Plan, scene: Scene) -> tuple[TouchPlace, ...]:
+    """One wall touched by either side of the fingers along which they close, the hand turned by half; none without.
+
+    There the fingers give way, on both sides alike: only the difference of the two tells something.
+    """
+    around = obstacles(plan.assembly.solids, plan.start, ())
     for part, face in _walls(plan):
-        T = plan.start[part]
-        place = _at_wall(scene, face, T)
-        own = obstacles(plan.assembly.solids, plan.start, tuple(set(plan.assembly.solids) - {part}))
-        if place is not None and _free(scene, place.T_world_tip, (*around[part], *own)):
-            places.append(place)
-    return tuple(places)
+        both = [_at_wall(scene, face, plan.start[part], np.array([sign, 0.0])) for sign in (1.0, -1.0)]
+        if all(_free(scene, place.T_world_tip, around) for place in both):
+            return tuple(both)
+    return ()
 
 
 def _floor(plan: Plan) -> tuple[str, Face] | None:
@@ -135,23 +142,30 @@ def _walls(plan: Plan) -> Iterator[tuple[str, Face]]:
                         yield of.part, face
 
 
-def _at_wall(scene: Scene, face: Face, T: Array) -> TouchPlace | None:
-    """The middle of a wall, touched low by the side of the fingers across which they do not give way."""
+def _at_wall(scene: Scene, face: Face, T: Array, ahead: Array) -> TouchPlace:
+    """The middle of a wall, touched low by a side of the fingers.
+
+    Args:
+        ahead: The side, a direction of the tip, (2,): x or y, up to its sign.
+    """
     n = T[:3, :3] @ face.normal
     corners = face.outline @ T[:3, :3].T + T[:3, 3]
     low, high = float(corners[:, 2].min()), float(corners[:, 2].max())
     d = float(n @ corners[0]) - (1e-3 * scene.clearance_mm if face.fit else 0.0)
-    y = n[2] * UP - n
-    y /= np.linalg.norm(y)
-    R = np.column_stack([np.cross(y, -UP), y, -UP])
+    into = n[2] * UP - n
+    into /= np.linalg.norm(into)
+    # Looking down, y = z x x = -up x x: of the way into the wall, ahead is what it is in the frame of the tip.
+    x = ahead[0] * into + ahead[1] * np.cross(into, -UP)
+    R = np.column_stack([x, np.cross(-UP, x), -UP])
     boxes = _boxes(scene)
-    ahead = _lowest(boxes)[2]
-    ends = [box for box in boxes if box.center[2] + box.half[2] > ahead - _END_M]
-    side = max(float(box.center[1] + box.half[1]) for box in ends)
-    x = float(np.mean([box.center[0] for box in ends if box.center[1] + box.half[1] > side - _END_M]))
+    reach = _lowest(boxes)[2]
+    ends = [box for box in boxes if box.center[2] + box.half[2] > reach - _END_M]
+    sides = [float(ahead @ box.center[:2] + np.abs(ahead) @ box.half[:2]) for box in ends]
+    level = np.mean([box.center[:2] for box, side in zip(ends, sides, strict=True) if side > max(sides) - _END_M], axis=0)
+    level += (max(sides) - ahead @ level) * ahead
     foot = low + min(_OVER_M, (high - low) / 2)
     common = min(high - foot, 2.0 * min(float(box.half[2]) for box in ends))
-    point = np.array([x, side, ahead - common / 2])
+    point = np.array([*level, reach - common / 2])
     touched = np.append(corners[:, :2].mean(axis=0), foot + common / 2)
     touched += (d - n @ touched) * n
     return TouchPlace(frame(R, touched + STAND_OFF_M * n - R @ point), -n, point, n, d)

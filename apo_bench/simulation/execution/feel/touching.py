@@ -8,6 +8,7 @@ from apo_bench.simulation.execution.feel.places import (
     STAND_OFF_M,
     TouchPlace,
     floor_places,
+    opposite_places,
     wall_places,
 )
 from apo_bench.simulation.robot.feeling import feeling as by_wrist
@@ -39,9 +40,12 @@ def find_out(robot: Robot, feeling: Feeling) -> None:
     if "touch" not in feeling.acts:
         return
     robot.fingers(OPENING_M)
-    for places in (floor_places, wall_places):
+    for places in (floor_places, wall_places, opposite_places):
         found = places(feeling.residual.plan(feeling.plan), robot.scene)
-        feeling.learn(robot, [touch for place in found for touch in _touched(robot, feeling, place)])
+        felt = [touch for place in found for touch in _touched(robot, feeling, place)]
+        if places is opposite_places:
+            felt = feeling.without_common(felt)
+        feeling.learn(robot, felt)
 
 
 def _touched(robot: Robot, feeling: Feeling, place: TouchPlace) -> list[Touch]:
