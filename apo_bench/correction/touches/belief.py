@@ -170,11 +170,8 @@ class RobotBelief:
         """Which of the grasps that were made has a number now; -1 for the empty hand."""
         if number is None:
             return -1
-        made = [str(one) for one in self.grasps if one is not None]
-        require(
-            number in self.grasps,
-            f"grasp {number} was given, but grasps {', '.join(made) or 'none'} were made; call `grasp` first.",
-        )
+        made = ", ".join(str(one) for one in self.grasps if one is not None) or "none"
+        require(number in self.grasps, f"grasp {number} was given; grasps so far: {made}; call `grasp` first.")
         return self.grasps.index(number)
 
     def _jacobian(self, jacobian: ArrayLike | None) -> Array:
