@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -35,17 +37,20 @@ def felt(rng: np.random.Generator, truth: Array, n: int) -> tuple[Felt, ...]:
         v = rng.uniform(-0.05, 0.05, 3)
         touch = Touch(B, normal, 0.0, v, SIGMA_M, J, *grasp)
         one = Felt(touch, 0 if i % 2 else -1)
-        touches.append(moved(one, height(one, truth) + SIGMA_M * rng.standard_normal()))
+        touches.append(moved(one, heights([one], truth)[0] + SIGMA_M * rng.standard_normal()))
     return tuple(touches)
 
 
-def height(one: Felt, unknowns: Array) -> float:
-    """How far above its plane the point of a touch is."""
-    t = one.touch
-    held = np.eye(4) if t.T_tip_part is None else t.T_tip_part
-    place = Places(t.T_world_tip[None], t.jacobian[None], held[None], np.array([one.grasp]))  # type: ignore[index]
-    T = part_poses(unknowns, MIDDLE, place)[0][0]
-    return float(t.normal @ pose.apply(T, t.point[None])[0] - t.offset)
+def heights(felt: Sequence[Felt], unknowns: Array) -> Array:
+    """How far above its plane the point of each touch is, (t,)."""
+    held = [np.eye(4) if t.T_tip_part is None else t.T_tip_part for t, _ in felt]
+    jacobians = [t.jacobian for t, _ in felt]
+    tips = [t.T_world_tip for t, _ in felt]
+    places = Places(*map(np.array, (tips, jacobians, held, [grasp for _, grasp in felt])))
+    T = part_poses(unknowns, MIDDLE, places)[0]
+    return np.array(
+        [t.normal @ (Ti[:3, :3] @ t.point + Ti[:3, 3]) - t.offset for Ti, (t, _) in zip(T, felt, strict=True)]
+    )
 
 
 def moved(one: Felt, by_m: float) -> Felt:
@@ -56,7 +61,7 @@ def moved(one: Felt, by_m: float) -> Felt:
     )
 
 
-@settings(deadline=None, max_examples=15)
+@settings(deadline=None, max_examples=10)
 @given(seed=st.integers(0, 10**6), times=st.sampled_from([1.0, 20.0]), n=st.integers(1, 12))
 def test_it_is_the_least_squares_of_another_solver(seed: int, times: float, n: int) -> None:
     """Also where a robot is twenty times as wrong as any is."""
@@ -65,10 +70,10 @@ def test_it_is_the_least_squares_of_another_solver(seed: int, times: float, n: i
     touches = felt(rng, sigmas * rng.standard_normal(len(SIGMAS)), n)
 
     def residuals(z: Array) -> Array:
-        return np.array([*(height(one, sigmas * z) / SIGMA_M for one in touches), *z])
+        return np.concatenate([heights(touches, sigmas * z) / SIGMA_M, z])
 
     mean, covariance, taken = robust_estimate(touches, sigmas, JOINTS, MIDDLE)
-    other = least_squares(residuals, np.zeros(len(sigmas)), jac="3-point", xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    other = least_squares(residuals, np.zeros(len(sigmas)), jac="3-point", xtol=1e-12, ftol=1e-12, gtol=1e-9)
     assert taken.all()
     # In prior standard deviations; the other solver has its derivatives from differences.
     free = np.flatnonzero(sigmas)
