@@ -1,5 +1,5 @@
 """Do touches tell of a robot what they say they tell? `python benchmarks/touches.py [--draws N] [--out FILE.csv]`
-(five minutes).
+(a quarter of an hour).
 
 Static draws: no physics. What is wrong with a robot of six joints is drawn from what is stated of it, as a trial draws
 it; its kinematics are exact, not linear, and of places where it really touches the robot knows what its encoders say.
