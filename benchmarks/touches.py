@@ -262,7 +262,7 @@ def main() -> int:
         print("| " + " | ".join(map(str, rows[-1].values())) + " |", flush=True)
     if given.out:
         with given.out.open("w", newline="", encoding="utf-8") as file:
-            writer = csv.DictWriter(file, rows[0])
+            writer = csv.DictWriter(file, rows[0], lineterminator="\n")
             writer.writeheader()
             writer.writerows(rows)
     return 0
