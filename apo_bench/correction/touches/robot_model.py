@@ -8,13 +8,27 @@ how the part moved in the hand, a twist in the frame of the tip. The vector of u
 the first grasp, of the second, ..), [m, rad].
 """
 
+from typing import NamedTuple
+
 import numpy as np
 
-from apo_bench.geometry import Array, exp_and_jacobian, pose
+from apo_bench.geometry import Array, Ints, exp_and_jacobian, pose
 
 HAND_EYE = slice(0, 6)
 TOOL = slice(6, 9)
-_ONE = np.eye(4)
+
+
+class Places(NamedTuple):
+    """t places of what a robot holds, or of its tip."""
+
+    T_world_tip: Array
+    """(t, 4, 4): B, [m]."""
+    jacobian: Array
+    """(t, 6, joints), [m/rad, rad/rad]; zeros: as if the encoders were exact."""
+    T_tip_part: Array
+    """(t, 4, 4), [m]: where the part is believed; the identity for the tip."""
+    grasp: Ints
+    """(t,): which of the grasps that were made, from 0; -1: the hand is empty."""
 
 
 def joints_in(joints: int) -> slice:
@@ -34,42 +48,45 @@ def hand_eye_displacement(unknowns: Array, middle: Array) -> Array:
     return np.asarray(M @ pose.exp(unknowns[HAND_EYE]) @ pose.inverse(M))
 
 
-def tip_displacement(unknowns: Array, J: Array | None) -> Array:
+def tip_displacement(unknowns: Array, J: Array) -> Array:
     """exp(J delta) shift(tau), (4, 4): from where the robot believes its tip to where it is, but for E."""
     tool = pose.rigid(np.eye(3), unknowns[TOOL])
-    return tool if J is None else np.asarray(pose.exp(J @ unknowns[joints_in(J.shape[1])]) @ tool)
+    return np.asarray(pose.exp(J @ unknowns[joints_in(J.shape[1])]) @ tool)
 
 
-def part_pose(
-    unknowns: Array, middle: Array, B: Array, J: Array | None, gamma: slice | None, T_tip_part: Array
-) -> tuple[Array, Array]:
-    """Where what is held is, and how its body twist depends on the unknowns.
+def part_poses(unknowns: Array, middle: Array, places: Places) -> tuple[Array, Array]:
+    """Where the parts really are, and how their body twists depend on the unknowns.
 
     Args:
         unknowns: (u,).
         middle: (3,), [m], world frame.
-        gamma: Where the twist of its grasp stands among the unknowns; None: the hand is empty.
 
     Returns:
-        T_world_part, (4, 4), and D, (6, u): unknowns that are more by d make it T_world_part exp(D d).
+        T_world_part, (t, 4, 4), and D, (t, 6, u): unknowns that are more by d make it T_world_part exp(D d).
     """
+    B, J, T_tip_part, grasp = places
     M = pose.rigid(np.eye(3), middle)
-    turned, J_xi = exp_and_jacobian(unknowns[HAND_EYE])
-    # The factors of the product; behind each that is unknown, the body twist that its unknowns make there.
-    factors: list[tuple[Array, slice | None, Array]] = [(turned, HAND_EYE, J_xi), (pose.inverse(M) @ B, None, _ONE)]
-    if J is not None:
-        columns = joints_in(J.shape[1])
-        moved, J_delta = exp_and_jacobian(J @ unknowns[columns])
-        factors.append((moved, columns, J_delta @ J))
-    factors.append((pose.rigid(np.eye(3), unknowns[TOOL]), TOOL, np.eye(6)[:, :3]))
-    if gamma is not None:
-        slipped, J_gamma = exp_and_jacobian(unknowns[gamma])
-        factors.append((slipped, gamma, J_gamma))
-    D = np.zeros((6, len(unknowns)))
+    joints = joints_in(J.shape[2])
+    holds = np.flatnonzero(grasp >= 0)
+    columns = (joints.stop + 6 * grasp[:, None] + np.arange(6))[holds]
+    gamma = np.zeros((len(grasp), 6))
+    gamma[holds] = unknowns[columns]
+    turned, D_xi = exp_and_jacobian(unknowns[HAND_EYE])
+    moved, D_delta = exp_and_jacobian(J @ unknowns[joints])
+    slipped, D_gamma = exp_and_jacobian(gamma)
+    D = np.zeros((len(grasp), 6, len(unknowns)))
+    # From the last factor of the product to the first: a twist before T is the twist Ad(T^-1) of it behind T.
     T = T_tip_part
-    for factor, columns_of, twist in reversed(factors):
-        if columns_of is not None:
-            # a twist before T is the twist Ad(T^-1) of it behind T
-            D[:, columns_of] = pose.adjoint(pose.inverse(T)) @ twist
-        T = factor @ T
-    return M @ T, D
+    D[holds[:, None], :, columns] = np.swapaxes(_behind(T, D_gamma)[holds], 1, 2)
+    T = slipped @ T
+    D[:, :, TOOL] = _behind(T, np.eye(6)[:, :3])
+    T = pose.rigid(np.eye(3), unknowns[TOOL]) @ T
+    D[:, :, joints] = _behind(T, D_delta @ J)
+    T = pose.inverse(M) @ B @ moved @ T
+    D[:, :, HAND_EYE] = _behind(T, D_xi)
+    return M @ turned @ T, D
+
+
+def _behind(T: Array, twists: Array) -> Array:
+    """The twists behind T, (t, 6, k), that do what twists before it do."""
+    return np.asarray(pose.adjoint(pose.inverse(T)) @ twists)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.correction.touches.robot_model import part_pose
+from apo_bench.correction.touches.robot_model import Places, part_poses
 from apo_bench.correction.touches.touch import Touch
 from apo_bench.geometry import Array, pose
 
@@ -18,14 +18,13 @@ REFUSED_BEYOND = 5.0
 _MOST_STEPS = 30
 _SMALL = 1e-9
 """The last step, in prior standard deviations."""
-_ONE = np.eye(4)
 
 
 class Felt(NamedTuple):
-    """A touch with where the twist of its grasp stands among the unknowns; None: the hand was empty."""
+    """A touch, and which of the grasps that were made it is of, from 0; -1: the hand was empty."""
 
     touch: Touch
-    gamma: slice | None
+    grasp: int
 
 
 class Estimate(NamedTuple):
@@ -36,55 +35,100 @@ class Estimate(NamedTuple):
     taken: NDArray[np.bool_]
 
 
-def robust_estimate(felt: tuple[Felt, ...], sigmas: Array, middle: Array) -> Estimate:
+class Equations(NamedTuple):
+    """t touches: n . (T_world_part v) = d, each with its sigma."""
+
+    places: Places
+    normals: Array
+    """(t, 3)."""
+    points: Array
+    """(t, 3), [m]."""
+    offsets: Array
+    """(t,), [m]."""
+    sigmas: Array
+    """(t,), [m]."""
+
+
+def robust_estimate(felt: tuple[Felt, ...], sigmas: Array, joints: int, middle: Array) -> Estimate:
     """What all touches tell, but for those that contradict the others and the priors.
 
-    As long as the touch that is foretold worst is farther off than `REFUSED_BEYOND` standard deviations of what is
-    foretold, it is left out. All touches are judged anew each time, so their order does not matter, and a touch that
-    was refused is taken as soon as others agree with it.
+    As long as a touch is farther off than `REFUSED_BEYOND` standard deviations of what all others and the priors
+    foretell, the worst one is left out. Then those that fit again, as a worse one is gone, are taken back, the best one
+    first. All touches are judged anew each time, so their order does not matter, and a touch that was refused counts
+    as soon as others agree with it.
 
     Args:
         sigmas: (u,): prior standard deviations of the unknowns, [m, rad].
         middle: (3,): as in `robot_model`.
     """
+
+    def solved(taken: NDArray[np.bool_]) -> tuple[Array, Array, Array]:
+        """z, A, and how far each touch is from what the others foretell."""
+        kept = [one for one, counts in zip(felt, taken, strict=True) if counts]
+        z, A, y = _most_probable(_equations(kept, joints), sigmas, middle)
+        return z, A, _surprises(A, y)
+
     taken = np.ones(len(felt), dtype=np.bool_)
-    while True:
-        kept = [one for one, is_taken in zip(felt, taken, strict=True) if is_taken]
-        z, A, y = _most_probable(kept, sigmas, middle)
-        surprise = _surprises(A, y)
-        if not kept or surprise.max() <= REFUSED_BEYOND:
+    z, A, surprises = solved(taken)
+    while surprises.max(initial=0.0) > REFUSED_BEYOND:
+        taken[np.flatnonzero(taken)[int(np.argmax(surprises))]] = False
+        z, A, surprises = solved(taken)
+    while not taken.all():
+        more = [taken | (np.arange(len(felt)) == i) for i in np.flatnonzero(~taken)]
+        again = [solved(each) for each in more]
+        worst = [one[2].max() for one in again]
+        best = int(np.argmin(worst))
+        if worst[best] > REFUSED_BEYOND:
             break
-        taken[np.flatnonzero(taken)[int(np.argmax(surprise))]] = False
+        taken = more[best]
+        z, A, surprises = again[best]
     spread = sigmas[:, None] * np.linalg.inv(_triangle(A))
     return Estimate(sigmas * z, spread @ spread.T, taken)
 
 
-def _most_probable(felt: list[Felt], sigmas: Array, middle: Array) -> tuple[Array, Array, Array]:
-    """The z that minimises |z|^2 + |residuals|^2, and the residuals there, A z - y."""
+def _equations(felt: list[Felt], joints: int) -> Equations:
+    t = len(felt)
+    exact = np.zeros((6, joints))
+    touches = [touch for touch, _ in felt]
+    places = Places(
+        np.array([touch.T_world_tip for touch in touches]).reshape(t, 4, 4),
+        np.array([exact if touch.jacobian is None else touch.jacobian for touch in touches]).reshape(t, 6, joints),
+        np.array([np.eye(4) if touch.T_tip_part is None else touch.T_tip_part for touch in touches]).reshape(t, 4, 4),
+        np.array([grasp for _, grasp in felt], dtype=np.int64),
+    )
+    return Equations(
+        places,
+        np.array([touch.normal for touch in touches]).reshape(t, 3),
+        np.array([touch.point for touch in touches]).reshape(t, 3),
+        np.array([touch.offset for touch in touches]),
+        np.array([touch.sigma_m for touch in touches]),
+    )
+
+
+def _most_probable(equations: Equations, sigmas: Array, middle: Array) -> tuple[Array, Array, Array]:
+    """The z that minimises |z|^2 + |residuals|^2, and the residuals near it, A z - y."""
     z = np.zeros(len(sigmas))
+    A, y = _linearised(equations, sigmas, middle, z)
     for _ in range(_MOST_STEPS):
-        A, y = _linearised(felt, sigmas, middle, z)
+        before = z
         R = _triangle(A)
-        after = np.linalg.solve(R, np.linalg.solve(R.T, A.T @ y))
-        step = np.abs(after - z).max()
-        z = after
-        if step < _SMALL:
+        z = np.linalg.solve(R, np.linalg.solve(R.T, A.T @ y))
+        A, y = _linearised(equations, sigmas, middle, z)
+        if np.abs(z - before).max() < _SMALL:
             break
-    return z, *_linearised(felt, sigmas, middle, z)
+    return z, A, y
 
 
-def _linearised(felt: list[Felt], sigmas: Array, middle: Array, z: Array) -> tuple[Array, Array]:
+def _linearised(equations: Equations, sigmas: Array, middle: Array, z: Array) -> tuple[Array, Array]:
     """A (t, u) and y (t,): near z the residual of each touch, over its sigma, is A z - y."""
-    A = np.zeros((len(felt), len(sigmas)))
-    off = np.zeros(len(felt))
-    for i, (touch, gamma) in enumerate(felt):
-        held = _ONE if touch.T_tip_part is None else touch.T_tip_part
-        T, D = part_pose(sigmas * z, middle, touch.T_world_tip, touch.jacobian, gamma, held)
-        off[i] = (touch.normal @ pose.apply(T, touch.point[None])[0] - touch.offset) / touch.sigma_m
-        # a body twist (v, w) moves the point by R (v + w x point)
-        moves = D[:3] - pose.hat(touch.point) @ D[3:]
-        A[i] = touch.normal @ T[:3, :3] @ moves * sigmas / touch.sigma_m
-    return A, A @ z - off
+    T, D = part_poses(sigmas * z, middle, equations.places)
+    points = equations.points[:, :, None]
+    R = T[:, :3, :3]
+    off = (equations.normals * (R @ points + T[:, :3, 3:])[..., 0]).sum(axis=1) - equations.offsets
+    # a body twist (v, w) moves a point by R (v + w x point)
+    moves = R @ (D[:, :3] - pose.hat(equations.points) @ D[:, 3:])
+    A = (equations.normals[:, None] @ moves)[:, 0] * sigmas / equations.sigmas[:, None]
+    return A, A @ z - off / equations.sigmas
 
 
 def _triangle(A: Array) -> Array:

@@ -1,0 +1,61 @@
+"""What a touch may be: each thing that is wrong with one gets one sentence."""
+
+from __future__ import annotations
+
+import copy
+from typing import Any
+
+import numpy as np
+import pytest
+
+from apo_bench import InputError
+from apo_bench.correction.touches import Touch
+
+RIGHT: dict[str, Any] = {
+    "T_world_tip": np.eye(4),
+    "normal": (0, 0, 1),
+    "offset": 0.1,
+    "point": (0.0, 0.0, 0.0),
+    "sigma_m": 1e-5,
+    "jacobian": np.zeros((6, 7)),
+    "grasp": 0,
+    "T_tip_part": np.eye(4),
+}
+MIRROR = np.diag([1.0, 1.0, -1.0, 1.0])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "sentence"),
+    [
+        ({"T_world_tip": np.eye(3)}, r"the pose of the tip cannot be used: an array of shape \(4, 4\) is needed"),
+        ({"T_world_tip": MIRROR}, "the pose of the tip was given as a matrix that is no rigid pose"),
+        ({"T_world_tip": np.full((4, 4), np.nan)}, "pose of the tip cannot be used: every number must be finite"),
+        ({"T_world_tip": "here"}, "the pose of the tip cannot be used"),
+        ({"T_tip_part": 2.0 * np.eye(4)}, "the pose of the part in the hand was given as a matrix"),
+        ({"normal": (0.0, 1.0)}, r"the normal cannot be used: an array of shape \(3\) is needed"),
+        ({"normal": (0.0, 0.0, 2.0)}, "with a normal of length 2 was given; divide it by its length"),
+        ({"normal": (0.0, 0.0, 0.0)}, "with a normal of length 0 was given"),
+        ({"point": (0.0, 0.0, np.inf)}, "the point cannot be used: every number must be finite"),
+        ({"point": 0.0}, r"the point cannot be used: an array of shape \(3\) is needed"),
+        ({"offset": np.nan}, "a touch with nan as offset was given; a finite number is needed"),
+        ({"offset": None}, "a touch with None as offset was given; a number is needed"),
+        ({"sigma_m": 0.0}, "a touch with a sigma of 0 m was given"),
+        ({"sigma_m": -1e-5}, r"a touch with a sigma of -1e-05 m was given; sigmas from 1e-09 m on are allowed"),
+        ({"sigma_m": np.inf}, "a touch with inf as sigma was given"),
+        ({"jacobian": np.zeros((3, 6))}, r"the Jacobian cannot be used: an array of shape \(6, \*\) is needed"),
+        ({"jacobian": np.full((6, 6), 1j)}, "the Jacobian cannot be used: real numbers are needed"),
+        ({"grasp": None}, "a touch with a part in the hand was given, but not its grasp"),
+    ],
+)
+def test_what_is_wrong_is_said(wrong: dict[str, Any], sentence: str) -> None:
+    Touch(**RIGHT)
+    with pytest.raises(InputError, match=sentence):
+        Touch(**{**RIGHT, **wrong})
+
+
+def test_a_touch_never_changes() -> None:
+    at = np.eye(4)
+    touch = Touch(**{**RIGHT, "T_world_tip": at})
+    at[0, 3] = 1.0
+    assert touch.T_world_tip[0, 3] == 0.0
+    assert not copy.deepcopy(touch).T_world_tip.flags.writeable
