@@ -246,7 +246,9 @@ def _closed_depth(scene: Scene, part: str, grasp: Grasp, stroke: Stroke, lefts: 
     return gripper_depth(scene, width, tip[:3, :3], at, stroke.around, margin)
 
 
-def gripper_depth(scene: Scene, opening: float, R: Array, at: Array, around: Sequence[Obstacle], margin: float) -> Array:
+def gripper_depth(
+    scene: Scene, opening: float, R: Array, at: Array, around: Sequence[Obstacle], margin: float
+) -> Array:
     """How deep the gripper is in what stands around, (k,), [m]: one orientation of the tip, k places (k, 3), world.
 
     What its way does not come by counts as far away.

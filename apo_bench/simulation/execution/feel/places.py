@@ -161,7 +161,9 @@ def _at_wall(scene: Scene, face: Face, T: Array, ahead: Array) -> TouchPlace:
     reach = _lowest(boxes)[2]
     ends = [box for box in boxes if box.center[2] + box.half[2] > reach - _END_M]
     sides = [float(ahead @ box.center[:2] + np.abs(ahead) @ box.half[:2]) for box in ends]
-    level = np.mean([box.center[:2] for box, side in zip(ends, sides, strict=True) if side > max(sides) - _END_M], axis=0)
+    level = np.mean(
+        [box.center[:2] for box, side in zip(ends, sides, strict=True) if side > max(sides) - _END_M], axis=0
+    )
     level += (max(sides) - ahead @ level) * ahead
     foot = low + min(_OVER_M, (high - low) / 2)
     common = min(high - foot, 2.0 * min(float(box.half[2]) for box in ends))

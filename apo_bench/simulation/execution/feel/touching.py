@@ -13,7 +13,7 @@ from apo_bench.simulation.execution.feel.places import (
 )
 from apo_bench.simulation.robot.feeling import feeling as by_wrist
 from apo_bench.simulation.robot.feeling import press
-from apo_bench.simulation.robot.paths import shifted, smooth, steady, with_height
+from apo_bench.simulation.robot.paths import shifted, smooth, steady, turn_from, with_height
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.world import sleeping
 
@@ -25,6 +25,8 @@ _DOWN = 0.4
 _OVER = 0.8
 _BACK = 0.3
 """Peak speeds of the empty hand, [m/s]."""
+_HALF_TURN = 3.0
+"""A hand that turns by more passes by its rest, [rad]: the shorter way may lead over where the wrist ends."""
 _HIGH_M = 0.1
 """The hand passes from one place to the next so far above them."""
 
@@ -53,6 +55,9 @@ def _touched(robot: Robot, feeling: Feeling, place: TouchPlace) -> list[Touch]:
     T = place.T_world_tip @ feeling.residual.tool
     high = max(robot.T[2, 3], T[2, 3] + _HIGH_M)
     robot.follow(smooth(robot.T, with_height(robot.T, high), _OVER))
+    rest = robot.scene.kinematics.forward(robot.scene.arm.home)
+    if abs(turn_from(rest, T) - turn_from(rest, robot.T)) > _HALF_TURN:
+        robot.go(with_height(rest, high), _OVER)
     robot.go(with_height(T, high), _OVER)
     robot.follow(smooth(robot.T, T, _DOWN))
     robot.stand()
