@@ -70,7 +70,7 @@ def with_stick(grasp: str, name: str, along: float, lift: float = 0.05) -> tuple
     robot.forces.hold("stick")
     robot.stand()
     T_tip_stick = pose.inverse(robot.tip()) @ part_pose(scene.work, robot.data, "stick")
-    wrist.held = part_loads(scene, {"stick": T_tip_stick})
+    wrist.hold(*part_loads(scene, {"stick": T_tip_stick}))
     robot.follow(smooth(robot.T, shifted(robot.T, UP, lift), 0.2))
     robot.stand()
     return robot, wrist, T_tip_stick
@@ -100,7 +100,7 @@ def test_in_free_air_a_held_part_is_not_felt(grasp: str, along: float) -> None:
         assert np.abs(wrench[:3]).max() < 0.04
         assert np.abs(wrench[3:]).max() < 0.003
     # Of a part that nobody spoke of all is felt: its weight, and its lever.
-    wrist.held = ()
+    wrist.hold()
     assert felt(robot, wrist, robot.T[:3, 3])[2] == pytest.approx(-0.492, abs=0.01)
 
 

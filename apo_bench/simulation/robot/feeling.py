@@ -24,8 +24,8 @@ _SETTLE_S = 0.06
 _SHIFT_M = 0.001
 _TURN_RAD = 0.002
 """How far the tip is moved in thought to see how the joints turn."""
-_FAR_M = 0.002
-_FAR_RAD = 0.01
+_FAR_M = 0.0005
+_FAR_RAD = 0.0025
 """Moved farther than this, it is looked at again."""
 
 
