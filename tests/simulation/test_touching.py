@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from functools import cache
 
+import mujoco
 import numpy as np
 import pytest
 
 from apo_bench import Scene, build_scene, load_scenario
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.robot.feeling import feeling, press, wrist_of, zero
+from apo_bench.simulation.robot.feeling import comply, feeling, press, wrist_of, zero
 from apo_bench.simulation.robot.in_hand import weld
 from apo_bench.simulation.robot.paths import shifted, smooth, steady
-from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.robot.wrist import WristSensor, part_loads
+from apo_bench.simulation.robot.robot import Halt, Robot
+from apo_bench.simulation.robot.robot_error import RobotError
+from apo_bench.simulation.robot.wrist import READING_S, WristSensor, part_loads
 from apo_bench.simulation.scene.world import part_pose, place, sleeping
 
 DOWN = np.array([0.0, 0.0, -1.0])
@@ -41,7 +43,7 @@ def empty_hand(scene: Scene, name: str, z: float, seed: int = 1) -> tuple[Robot,
     return robot, wrist
 
 
-def with_stick(grasp: str, name: str, along: float, lift: float = 0.05) -> tuple[Robot, WristSensor, Array]:
+def with_stick(grasp: str, name: str, along: float, lift: float = 0.05, **settings) -> tuple[Robot, WristSensor, Array]:
     """A robot that holds the stick this far from its middle, [m]; its wrist was zeroed before and knows the weight.
 
     Returns:
@@ -52,7 +54,7 @@ def with_stick(grasp: str, name: str, along: float, lift: float = 0.05) -> tuple
     start["stick"] = pose.at((0.1, 0.16, 0.01))
     robot = Robot(scene, start)
     place(scene.work, robot.data, "stick", start["stick"])
-    wrist = wrist_of(robot, name, np.random.default_rng(1))
+    wrist = wrist_of(robot, name, np.random.default_rng(1), **settings)
     T = np.array(robot.T)
     T[:3, 0] = 0.0, -1.0, 0.0
     T[:3, 1] = -1.0, 0.0, 0.0
@@ -70,7 +72,7 @@ def with_stick(grasp: str, name: str, along: float, lift: float = 0.05) -> tuple
     robot.forces.hold("stick")
     robot.stand()
     T_tip_stick = pose.inverse(robot.tip()) @ part_pose(scene.work, robot.data, "stick")
-    wrist.held = part_loads(scene, {"stick": T_tip_stick})
+    wrist.hold(*part_loads(scene, {"stick": T_tip_stick}))
     robot.follow(smooth(robot.T, shifted(robot.T, UP, lift), 0.2))
     robot.stand()
     return robot, wrist, T_tip_stick
@@ -100,7 +102,7 @@ def test_in_free_air_a_held_part_is_not_felt(grasp: str, along: float) -> None:
         assert np.abs(wrench[:3]).max() < 0.04
         assert np.abs(wrench[3:]).max() < 0.003
     # Of a part that nobody spoke of all is felt: its weight, and its lever.
-    wrist.held = ()
+    wrist.hold()
     assert felt(robot, wrist, robot.T[:3, 3])[2] == pytest.approx(-0.492, abs=0.01)
 
 
@@ -126,3 +128,149 @@ def test_a_press_that_meets_nothing_says_so() -> None:
     end = shifted(robot.T, DOWN, 0.01)
     assert press(robot, steady(robot.T, end, 0.01), DOWN, 0.5, wrist) is None
     assert pytest.approx(end) == robot.T
+
+
+class Pushing:
+    """Ahead along the vertical until the table pushes back by so much, and on for the rest of the time."""
+
+    def __init__(self, newton: float, seconds: float) -> None:
+        self.newton = newton
+        self.left = round(seconds / READING_S)
+        self.felt: list[Array] = []
+        self.z = 0.0
+
+    def __call__(self, wrench: Array) -> Array | None:
+        self.felt.append(wrench)
+        self.left -= 1
+        self.z -= READING_S * float(np.clip(0.0005 * (self.newton - wrench[2]), -0.001, 0.001))
+        return None if self.left < 0 else np.array([0.0, 0.0, self.z, 0.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("newton", [2.0, 5.0])
+@pytest.mark.parametrize("arm", ["six_axis", "ur5e_primitive", "panda_primitive"])
+def test_a_push_on_the_table_is_felt_as_the_contacts_exert_it(arm: str, newton: float) -> None:
+    """Force and torque about the tip, against the contact sensor and the sum over all contacts, within 5 mN, 1 mNm."""
+    scene = scene_of(arm)
+    with sleeping(scene.work, False):
+        robot, wrist = empty_hand(scene, "ideal", 0.0102)
+        comply(robot, Pushing(newton, 1.5), robot.T[:3, 3], wrist)
+        tip = robot.T[:3, 3]
+        with feeling(robot, wrist):
+            robot.wait(0.2)
+            wrench = wrist.wrench(tip)
+        assert wrench[2] == pytest.approx(newton, abs=0.02)
+        assert wrench[:3] == pytest.approx(robot.forces._on_arm.sum(axis=0), abs=5e-3)
+        assert wrench == pytest.approx(by_contacts(robot, tip), abs=5e-3)
+        assert wrench[3:] == pytest.approx(by_contacts(robot, tip)[3:], abs=1e-3)
+
+
+def by_contacts(robot: Robot, about: Array) -> Array:
+    """What all contacts of the arm exert on it, (6,), about a point, from the simulation itself."""
+    model, data = robot.model, robot.data
+    total = np.zeros(6)
+    force = np.zeros(6)
+    for i, contact in enumerate(data.contact):
+        arm = [model.geom(int(g)).name.startswith("arm/") for g in contact.geom]
+        if any(arm):
+            mujoco.mj_contactForce(model, data, i, force)
+            # Pads resist turning: a contact of them has a torque, too.
+            f, t = force.reshape(2, 3) @ contact.frame.reshape(3, 3) * (1.0 if arm[1] else -1.0)
+            total += np.concatenate([f, np.cross(contact.pos - about, f) + t])
+    return total
+
+
+@pytest.mark.parametrize("newton", [2.0, 5.0])
+def test_half_the_time_step_changes_what_is_felt_by_little(newton: float) -> None:
+    """In the first tenth of a second of a touch by 0.3 N and 25 mNm, then by 0.1 N; where it rests by 5 mN ahead."""
+    series = []
+    for step_s in (0.001, 0.0005):
+        robot, wrist = empty_hand(scene_of(step_s=step_s), "external", 0.0105)
+        law = Pushing(newton, 2.0)
+        comply(robot, law, robot.T[:3, 3], wrist)
+        series.append(np.array(law.felt))
+    off = np.abs(series[1] - series[0])
+    assert len(series[0]) == len(series[1])
+    touch = int(np.argmax(series[0][:, 2] > 0.3))
+    assert off[:, :3].max() < 0.3
+    assert off[:, 3:].max() < 0.025
+    assert off[touch + 100 :, :3].max() < 0.1
+    assert np.abs(np.mean(series[1][-200:, 2]) - np.mean(series[0][-200:, 2])) < 0.005
+
+
+class Levelling(Pushing):
+    """As that, turning about level axes as the torque asks: what is pressed at its edge comes to lie flat."""
+
+    def __init__(self, newton: float, seconds: float) -> None:
+        super().__init__(newton, seconds)
+        self.turn: Array = np.zeros(2)
+
+    def __call__(self, wrench: Array) -> Array | None:
+        offset = super().__call__(wrench)
+        if offset is None:
+            return None
+        if wrench[2] > self.newton / 4:
+            self.turn = self.turn + READING_S * np.clip(0.06 * wrench[3:5], -0.05, 0.05)
+        offset[3:5] = self.turn
+        return offset
+
+
+@pytest.mark.parametrize("tilt_deg", [1.0, -1.0])
+@pytest.mark.parametrize(("grasp", "along"), [("friction", 0.0), ("friction", 0.04), ("weld", 0.04)])
+def test_a_part_that_is_pressed_at_its_edge_tilts_the_right_way(grasp: str, along: float, tilt_deg: float) -> None:
+    """To within 0.01 degrees along the stick of 220 mm, behind noise of 0.1 N and 5 mNm."""
+    robot, wrist, _ = with_stick(grasp, "external", along, 0.004)
+    at = pose.at(robot.T[:3, 3])
+    robot.go(at @ pose.at((0, 0, 0), (0, tilt_deg, 0)) @ pose.inverse(at) @ robot.T, 0.1)
+    pitch = [np.degrees(np.arcsin(part_pose(robot.scene.work, robot.data, "stick")[2, 0]))]
+    law = Levelling(3.0, 6.0)
+    comply(robot, law, robot.T[:3, 3], wrist)
+    pitch.append(np.degrees(np.arcsin(part_pose(robot.scene.work, robot.data, "stick")[2, 0])))
+    assert pitch[0] == pytest.approx(-tilt_deg, abs=0.01)
+    assert abs(pitch[1]) < 0.01
+    first = next(wrench for wrench in law.felt if wrench[2] > 1.0)
+    # Tilted about y by a positive angle, the end ahead in x is lower and is pushed up: a negative torque about y.
+    assert np.sign(first[4]) == -np.sign(tilt_deg)
+
+
+@pytest.mark.parametrize("arm", ["six_axis", "panda_primitive"])
+def test_an_offset_in_six_directions_is_gone_to(arm: str) -> None:
+    """Shift of a point 60 mm off the tip, and a turn about it, in 1,000 readings: within 0.05 mm and 0.01 degrees."""
+    robot, wrist = empty_hand(scene_of(arm), "ideal", 0.1)
+    start = robot.T
+    about = start[:3, 3] + [0.05, 0.02, -0.03]
+    goal = np.array([0.006, -0.004, -0.008, 0.03, -0.02, 0.05])
+    steps = iter([*(goal * k / 1000 for k in range(1, 1001)), None])
+    comply(robot, lambda _: next(steps), about, wrist)
+    wanted = pose.at(about) @ pose.exp([0, 0, 0, *goal[3:]]) @ pose.inverse(pose.at(about)) @ start
+    wanted = shifted(wanted, goal[:3], 1.0)
+    off = pose.log(pose.inverse(wanted) @ robot.T)
+    assert np.abs(off[:3]).max() < 5e-5
+    assert np.degrees(np.abs(off[3:]).max()) < 0.01
+    robot.stand(0.3)
+    assert np.linalg.norm(robot.tip()[:3, 3] - robot.T[:3, 3]) < 5e-5
+
+
+def test_where_the_arm_does_not_reach_it_gives_up() -> None:
+    robot, wrist = empty_hand(scene_of(), "ideal", 0.1)
+    far = iter(range(1, 10_000))
+    with pytest.raises(Halt, match="unreachable"):
+        comply(robot, lambda _: np.array([0.0004 * next(far), 0, 0, 0, 0, 0]), robot.T[:3, 3], wrist)
+    assert (robot.wrist, robot.fidelity) == (None, "full")
+
+
+def test_joints_that_are_off_turn_the_weight_that_is_taken_off() -> None:
+    """The robot knows its encoders, not its joints, so of 8.83 N of hand some are felt once it is turned."""
+    scene = scene_of()
+    off = np.radians([0.0, -1.0, 0.0, 0.0, 0.0, 0.0])
+    robot = Robot(scene, scene.scenario.start, error=RobotError(np.eye(4), off, np.eye(4), np.eye(4)[None]))
+    wrist = wrist_of(robot, "ideal", np.random.default_rng(1))
+    zero(robot, wrist)
+    assert robot.encoders() == pytest.approx(robot.q, abs=1e-4)
+    assert np.abs(felt(robot, wrist, robot.T[:3, 3])[:3]).max() < 0.01
+    about = pose.at(robot.T[:3, 3])
+    robot.go(about @ pose.at((0, 0, 0), (0, -25, 0)) @ pose.inverse(about) @ robot.T, 0.4)
+    robot.stand(0.3)
+    # Zeroing took 8.83 N turned by a degree, less 8.83 N, for an offset; turned on by 25 degrees it is none.
+    error_n = 8.829 * 2 * np.sin(np.radians(0.5))
+    left = np.linalg.norm(felt(robot, wrist, robot.T[:3, 3])[:3])
+    assert left == pytest.approx(error_n * 2 * np.sin(np.radians(12.5)), rel=0.02)

@@ -102,9 +102,10 @@ class WristSensor:
         self._clock_s = 0.0
         self._felt: Array | None = None
         self._readings: list[Array] | None = None
-        self.hand = hand_load(scene.kinematics, scene.arm, scene.arm.opening_m)
-        self.held: tuple[Load, ...] = ()
-        """What is in the hand, as it is believed; the robot says it."""
+        self._hand = hand_load(scene.kinematics, scene.arm, scene.arm.opening_m)
+        self._held: tuple[Load, ...] = ()
+        self._weights: Array = np.zeros((6, 3))
+        self.hold()
 
     @property
     def sigma(self) -> tuple[float, float]:
@@ -115,9 +116,20 @@ class WristSensor:
         force, torque = (self._sigma[[0, 3]] * math.sqrt(self._part / (2.0 - self._part))).tolist()
         return force, torque
 
+    def hold(self, *parts: Load) -> None:
+        """Say what is in the hand, or nothing, as it is believed (`part_loads`); its weight is not felt then."""
+        self._held = parts
+        T = pose.inverse(self._T_tip_sensor)
+        loads = (self._hand, *parts)
+        mass = sum(load.mass_kg for load in loads)
+        moment = sum((load.mass_kg * (T[:3, :3] @ load.center + T[:3, 3]) for load in loads), np.zeros(3))
+        # The arm carries each weight, m g upwards at its centre c: a force m g up, and a torque m c x g up.
+        self._weights = _GRAVITY * np.vstack([mass * np.eye(3), pose.hat(moment)])
+
     def begin(self, hand: Load) -> None:
         """Feel anew, after time in which nothing was read: the first reading is taken as it is."""
-        self.hand = hand
+        self._hand = hand
+        self.hold(*self._held)
         self._sum = np.zeros(6)
         self._summed_s = self._clock_s = 0.0
         self._felt = None
@@ -145,7 +157,7 @@ class WristSensor:
     def end_zero(self) -> None:
         """What the readings since `start_zero` show on average, but for the weights, is no force of anything."""
         if self._readings:
-            self._zero = np.mean(self._readings, axis=0) - self._of_weights()
+            self._zero = np.mean(self._readings, axis=0) - self._weights @ self._sensor()[2, :3]
         self._readings = None
 
     def wrench(self, about: Array) -> Array:
@@ -154,14 +166,13 @@ class WristSensor:
         Returns:
             (6,): [N] and [Nm], along world axes; zero before the first reading.
         """
-        out = np.zeros(6)
         if self._felt is None:
-            return out
+            return np.zeros(6)
         T = self._sensor()
-        f, t = (self._of_weights() + self._zero - self._felt).reshape(2, 3) @ T[:3, :3].T
-        out[:3] = f
-        out[3:] = t + np.cross(T[:3, 3] - about, f)
-        return out
+        out = (self._weights @ T[2, :3] + self._zero - self._felt).reshape(2, 3) @ T[:3, :3].T
+        f, t = out
+        t += pose.hat(T[:3, 3] - about) @ f
+        return np.asarray(out.ravel())
 
     def stops(self, guard: Guard | None) -> bool:
         """Whether the hand is pushed back along the way of a guard by more than it allows."""
@@ -172,18 +183,6 @@ class WristSensor:
     def _sensor(self) -> Array:
         """Where the sensor is by the encoders, (4, 4), world."""
         return np.asarray(self._kinematics.forward(self._encoders()) @ self._T_tip_sensor)
-
-    def _of_weights(self) -> Array:
-        """What the sensor shows while the known weights hang on it and nothing touches them, (6,), in its frame."""
-        T_sensor_tip = pose.inverse(self._T_tip_sensor)
-        up = self._sensor()[2, :3]
-        out = np.zeros(6)
-        for load in (self.hand, *self.held):
-            # The arm carries each weight: m g upwards at its centre.
-            force = load.mass_kg * _GRAVITY * up
-            out[:3] += force
-            out[3:] += np.cross(T_sensor_tip[:3, :3] @ load.center + T_sensor_tip[:3, 3], force)
-        return out
 
 
 def _sensor_frame(kinematics: Kinematics, arm: Arm) -> Array:

@@ -122,7 +122,7 @@ def wrist_felt(model: Any) -> Iterator[None]:
 
 
 def leave_wrist_unfelt(model: Any) -> None:
-    """From now on the sensors of the wrist are computed in `wrist_felt` only: they cost a tenth of every step."""
+    """From now on the sensors of the wrist are computed in `wrist_felt` only: they make a step a twentieth longer."""
     model.sensor_needstage[[model.sensor(name).id for name in WRIST_SENSORS]] = _NEVER
 
 
