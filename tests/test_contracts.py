@@ -63,7 +63,6 @@ BREACHES = {
     "touches": [
         ("apo_bench.correction.touches.robot_model", "apo_bench.correction.touches.robust_estimate"),
         ("apo_bench.correction.touches.robust_estimate", "apo_bench.correction.touches.belief"),
-        ("apo_bench.correction.touches.touch", "apo_bench.correction.touches.robot_model"),
     ],
     "workshop": [
         ("apo_bench.trial.trial", "apo_bench.recording.importing"),

@@ -53,6 +53,7 @@ from apo_bench.assembly.topology import (
     simplified,
     spelled,
 )
+from apo_bench.assembly.touch import Touch
 from apo_bench.assembly.touching import TouchedContact, corners, mouth, outline_points, touched_contacts
 
 __all__ = (
@@ -69,6 +70,7 @@ __all__ = (
     "Demonstration",
     "Equations",
     "Facing",
+    "Felt",
     "Gap",
     "GapKind",
     "Graph",
@@ -95,6 +97,7 @@ __all__ = (
     "Step",
     "Suspect",
     "Tails",
+    "Touch",
     "TouchedContact",
     "Try",
     "apart_limit_mm",

@@ -4,8 +4,8 @@ A touch is a contact equation on the robot instead of on a goal: a point of the 
 known plane. `believe` begins with what is stated of the robot, `RobotBelief.touch` learns from touches.
 """
 
+from apo_bench.assembly.touch import Touch
 from apo_bench.correction.touches.belief import UNSTATED, RobotBelief, believe, slip_sigmas
 from apo_bench.correction.touches.robust_estimate import REFUSED_BEYOND
-from apo_bench.correction.touches.touch import Touch
 
 __all__ = ("REFUSED_BEYOND", "UNSTATED", "RobotBelief", "Touch", "believe", "slip_sigmas")

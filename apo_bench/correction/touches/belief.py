@@ -6,6 +6,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from apo_bench.assembly.touch import Touch, checked_array, checked_pose
 from apo_bench.correction.touches.robot_model import (
     HAND_EYE,
     TOOL,
@@ -17,7 +18,6 @@ from apo_bench.correction.touches.robot_model import (
     tip_displacement,
 )
 from apo_bench.correction.touches.robust_estimate import Felt, robust_estimate
-from apo_bench.correction.touches.touch import Touch, checked_array, checked_pose
 from apo_bench.errors import require
 from apo_bench.geometry import Array, copyable, freeze, pose
 from apo_bench.records.robot_error import Sigmas

@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.assembly.touch import Touch
 from apo_bench.correction.touches.robot_model import Places, part_poses
-from apo_bench.correction.touches.touch import Touch
 from apo_bench.geometry import Array, pose
 
 REFUSED_BEYOND = 5.0

@@ -1,8 +1,8 @@
 """The robot repeats a plan: open loop in the poses, closed loop only in force. The same controller for every method."""
 
 import math
-from functools import partial
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np

@@ -108,8 +108,8 @@ class Transfer:
     squaring: tuple[Grip, ...] = ()
     """Before it is taken, the fingers close and open again here, at its start; none where nothing is felt."""
     flush: Any = None
-    """A `Flush`: the part laid flat on what is fixed, below where a level insertion begins, or where it stood before one
-    from above; None where it cannot or need not."""
+    """A `Flush`: the part laid flat, below where a level insertion begins, or where it stood before one from above;
+    None where it cannot or need not."""
     front: Array | None = None
     """Where the part, with what it carries, ends ahead on its way: the middle of it, in its own frame, (3,), [m]; None
     where a hole is not searched for."""
@@ -154,8 +154,8 @@ class Transfer:
         if np.array_equal(T, np.eye(4)):
             return self
         grips = tuple(grip.with_tip_at(T) for grip in self.grips)
-        other = {name: tuple(g.with_tip_at(T) for g in getattr(self, name)) for name in ("centring", "squaring")}
-        return replace(self, grips=grips, **other)
+        centring, squaring = (tuple(g.with_tip_at(T) for g in these) for these in (self.centring, self.squaring))
+        return replace(self, grips=grips, centring=centring, squaring=squaring)
 
 
 def after_transfer(operation: Operation, target: Array, poses: Poses) -> Poses:

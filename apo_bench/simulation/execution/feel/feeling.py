@@ -7,14 +7,13 @@ it to be, and `believed_tip` takes them off again, since what it tells is what t
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import final
+from typing import Protocol, final
 
 import numpy as np
 
-from apo_bench.assembly import Felt, Plan
-from apo_bench.correction.touches import UNSTATED, RobotBelief, Touch, believe, slip_sigmas
+from apo_bench.assembly import Felt, Plan, Touch
 from apo_bench.geometry import Array, pose
-from apo_bench.records import NO_ROBOT_ERROR, USUAL_WRENCH, robot_sigmas
+from apo_bench.records import USUAL_WRENCH
 from apo_bench.simulation.execution.flush import Flush
 from apo_bench.simulation.robot.feeling import wrist_of, zero
 from apo_bench.simulation.robot.robot import Robot
@@ -35,36 +34,70 @@ _SIGMAS = 8.0
 """A touch ends by this force, or by so many standard deviations of what the wrist feels."""
 
 
+class Belief(Protocol):
+    """What a robot believes of itself, and how it learns: `apo_bench.correction.touches` has one."""
+
+    hand_eye: Array
+    tool: Array
+    encoders: Array
+    touches: tuple[Touch, ...]
+    refused: tuple[Touch, ...]
+    felt_mm: float
+    felt_deg: float
+    deviation_mm: float
+    deviation_deg: float
+
+    def grasp(self, number: int, sigmas: Array) -> "Belief":
+        """A part was grasped, which may have moved in the hand by so much, (6,), [m, rad]."""
+        ...
+
+    def touch(self, *touches: Touch) -> "Belief":
+        """Learn from touches."""
+        ...
+
+    def real(self, T_world_tip: Array, jacobian: Array) -> Array:
+        """Where the tip really is, (4, 4)."""
+        ...
+
+    def command(self, T_world_tip: Array, jacobian: Array) -> Array:
+        """The inverse of `real`."""
+        ...
+
+    def held(self, grasp: int, T_tip_part: Array) -> Array:
+        """Where a part lies in the frame of the tip, (4, 4)."""
+        ...
+
+
 @final
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Feels:
     """How a robot feels."""
 
-    stated: str | None = NO_ROBOT_ERROR
-    """How wrong the robot is said to be, as in a row; None: nobody says, and what is usual is assumed."""
+    belief: Belief
+    """Before anything is touched."""
+    slip: Array
+    """(6,): how far a part may slip in the hand, standard deviations of a twist in the frame of the tip, [m, rad]."""
+    seed: tuple[int, ...]
+    """Of the noise of its sensor."""
     wrench: str = USUAL_WRENCH
     """The sensor at its wrist, as in `wrench_noise`."""
     acts: tuple[str, ...] = ACTS
     """What it does besides."""
-    seed: tuple[int, ...] = (0,)
-    """Of the noise of its sensor."""
 
 
 class Feeling:
     """The state of a robot that feels, during one replay."""
 
     def __init__(self, feels: Feels, plan: Plan, scene: Scene, error: RobotError | None) -> None:
-        sigmas = UNSTATED if feels.stated is None else robot_sigmas(feels.stated)
-        joints = len(scene.arm.joints)
-        none = RobotError(np.eye(4), np.zeros(joints), np.eye(4), np.tile(np.eye(4), (len(plan.assembly), 1, 1)))
+        none = np.eye(4)
+        joints = np.zeros(len(scene.arm.joints))
         self.acts = feels.acts
+        self.plan = plan
+        self.belief = feels.belief
         self._feels = feels
         self._wrist: WristSensor | None = None
-        self.plan = plan
-        self.sigmas = sigmas
-        self.belief = believe(sigmas, joints, plan.goals[:, :3, 3].mean(axis=0))
-        self._scene = scene
-        self._error = error or none
+        self._kinematics = scene.kinematics
+        self._error = error or RobotError(none, joints, none, np.tile(none, (len(plan.assembly), 1, 1)))
         self.residual = self._error
         """What is still wrong once commands make up for what is believed."""
 
@@ -98,13 +131,13 @@ class Feeling:
     def believed_tip(self, robot: Robot) -> Array:
         """Where the robot would believe its tip if it made up for nothing, (4, 4), world, and the Jacobian there."""
         left = self.residual
-        measured = self._scene.kinematics.forward(robot.encoders())
+        measured = self._kinematics.forward(robot.encoders())
         corrected = pose.inverse(left.hand_eye) @ measured @ pose.inverse(left.tool)
         return self.belief.command(corrected, self.jacobian(robot))
 
     def jacobian(self, robot: Robot) -> Array:
         """The body Jacobian of the tip, (6, joints)."""
-        return self._scene.kinematics.jacobian(robot.q)
+        return self._kinematics.jacobian(robot.q)
 
     def without_common(self, touches: Sequence[Touch]) -> list[Touch]:
         """Touches of one wall less what they have in common beyond what is believed: their differences stay."""
@@ -128,7 +161,7 @@ class Feeling:
 
     def taken(self, operation: int) -> None:
         """A part was taken between pads that closed twice; it may have slipped since."""
-        self.belief = self.belief.grasp(operation, np.hypot(slip_sigmas(self.sigmas), _SQUARED))
+        self.belief = self.belief.grasp(operation, np.hypot(self._feels.slip, _SQUARED))
 
     def lain(self, robot: Robot, operation: int, flush: Flush, T_tip_part: Array) -> Array:
         """Believe that a held part lies flat; returns where it is believed in the frame of the tip now, (4, 4).

@@ -58,14 +58,14 @@ def lay_flat(robot: Robot, feeling: Feeling, operation: int, t: Transfer, grip: 
     robot.stand()
     law = _Laying(flush)
     with sleeping(robot.scene.work, False), by_wrist(robot, feeling.wrist):
-        feeling.wrist.held = part_loads(robot.scene, {t.part: held})
+        feeling.wrist.hold(*part_loads(robot.scene, {t.part: held}))
         # About the middle of the feet: there, what rubs has no lever.
         feet = pose.apply(robot.T @ pose.inverse(grip.T_part_tip), flush.feet)
         comply(robot, law, feet.mean(axis=0), feeling.wrist)
         if law.lies:
             grip = Grip(pose.inverse(feeling.lain(robot, operation, flush, held)) @ tool, grip.half_width)
         robot.follow(smooth(robot.T, shifted(robot.T, UP, _OFF_M), _OFF))
-        feeling.wrist.held = ()
+        feeling.wrist.hold()
     above = before_insertion(t) @ grip.T_part_tip if t.into.level else with_height(robot.T, float(T_before[2, 3]))
     robot.follow(smooth(robot.T, above, _UP))
     robot.stand()

@@ -1,7 +1,6 @@
 """Touching what is fixed with the closed, empty hand: down on the floor around the goals, and against walls."""
 
-from apo_bench.correction.touches import Touch
-from apo_bench.insertion.macros import UP
+from apo_bench.assembly import Touch
 from apo_bench.simulation.execution.feel.feeling import Feeling
 from apo_bench.simulation.execution.feel.places import (
     OPENING_M,
