@@ -96,10 +96,10 @@ def zero(robot: Robot, wrist: WristSensor, seconds: float = ZERO_S) -> None:
 def press(robot: Robot, line: Trajectory, way: Array, newton: float, wrist: WristSensor) -> float | None:
     """Follow a line until the filtered force against `way` passes `newton`, and stop there at once.
 
-    The arm goes on while the sensor lags behind by its time constant. At 2 mm/s the blow of a first touch stays below the
-    limit of 20 N of a collision, with half the time step too, and the tip stops within 0.01 mm of where it touched; at
-    4 mm/s with the usual step only, at 10 mm/s not. `newton` should be 5 times `wrist.sigma` at least, or noise stops
-    it.
+    The arm goes on while the sensor lags behind by its time constant. At 2 mm/s the blow of a first touch stays below
+    the limit of 20 N of a collision, with half the time step too, and the tip stops within 0.03 mm of where it touched;
+    at 4 mm/s with the usual step only, at 10 mm/s not. `newton` should be 5 times `wrist.sigma` at least, or noise
+    stops it.
 
     Args:
         way: The direction of pressing, a unit vector, (3,), world.

@@ -18,7 +18,7 @@ from apo_bench.parts import read_part
 from apo_bench.records import WrenchNoise
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.kinematics import Kinematics
-from apo_bench.simulation.frames import body_frame
+from apo_bench.simulation.frames import body_frame, frame
 from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import WRIST_SENSORS
@@ -191,7 +191,5 @@ def _sensor_frame(kinematics: Kinematics, arm: Arm) -> Array:
     data = mujoco.MjData(model)
     mujoco.mj_kinematics(model, data)
     tip = model.site(arm.tip).id
-    T_tip = np.eye(4)
-    T_tip[:3, :3] = data.site_xmat[tip].reshape(3, 3)
-    T_tip[:3, 3] = data.site_xpos[tip]
+    T_tip = frame(data.site_xmat[tip], data.site_xpos[tip])
     return np.asarray(pose.inverse(T_tip) @ body_frame(data, model.body(arm.mount).id))
