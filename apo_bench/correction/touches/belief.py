@@ -6,6 +6,7 @@ from typing import final
 import numpy as np
 from numpy.typing import ArrayLike
 
+from apo_bench.assembly import Felt
 from apo_bench.assembly.touch import Touch, checked_array, checked_pose
 from apo_bench.correction.touches.robot_model import (
     HAND_EYE,
@@ -17,7 +18,7 @@ from apo_bench.correction.touches.robot_model import (
     part_poses,
     tip_displacement,
 )
-from apo_bench.correction.touches.robust_estimate import Felt, robust_estimate
+from apo_bench.correction.touches.robust_estimate import NumberedTouch, robust_estimate
 from apo_bench.errors import require
 from apo_bench.geometry import Array, copyable, freeze, pose
 from apo_bench.records.robot_error import Sigmas
@@ -45,7 +46,7 @@ class RobotBelief:
     covariance: Array
     """(u, u), to first order: with `UNSTATED` regions of 95 % cover 95 % with touches of 20 um, and 92 % with those of
     5 um, where what the robot's errors make to second order is no longer small (`benchmarks/touches.py`)."""
-    felt: tuple[Felt, ...] = ()
+    felt: tuple[NumberedTouch, ...] = ()
     """All touches so far, with the grasps that they are of."""
     taken: tuple[bool, ...] = ()
     """Which of them count."""
@@ -78,6 +79,12 @@ class RobotBelief:
     def refused(self) -> tuple[Touch, ...]:
         """Touches that contradict the others and the priors; they may count again after later ones."""
         return tuple(touch for (touch, _), counts in zip(self.felt, self.taken, strict=True) if not counts)
+
+    @property
+    def found(self) -> Felt:
+        """What has been found out, in short."""
+        sure = self.deviation_mm, self.deviation_deg
+        return Felt(len(self.touches), len(self.refused), self.felt_mm, self.felt_deg, *sure)
 
     @property
     def felt_mm(self) -> float:
@@ -127,7 +134,7 @@ class RobotBelief:
         """
         for touch in touches:
             self._jacobian(touch.jacobian)
-        felt = (*self.felt, *(Felt(touch, self._grasp(touch.grasp)) for touch in touches))
+        felt = (*self.felt, *(NumberedTouch(touch, self._grasp(touch.grasp)) for touch in touches))
         mean, covariance, taken = robust_estimate(felt, self.sigmas, self.joints, self.middle)
         return replace(self, mean=mean, covariance=covariance, felt=felt, taken=tuple(taken.tolist()))
 

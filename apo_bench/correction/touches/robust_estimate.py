@@ -20,7 +20,7 @@ _SMALL = 1e-9
 """The last step, in prior standard deviations."""
 
 
-class Felt(NamedTuple):
+class NumberedTouch(NamedTuple):
     """A touch, and which of the grasps that were made it is of, from 0; -1: the hand was empty."""
 
     touch: Touch
@@ -49,7 +49,7 @@ class Equations(NamedTuple):
     """(t,), [m]."""
 
 
-def robust_estimate(felt: tuple[Felt, ...], sigmas: Array, joints: int, middle: Array) -> Estimate:
+def robust_estimate(felt: tuple[NumberedTouch, ...], sigmas: Array, joints: int, middle: Array) -> Estimate:
     """What all touches tell, but for those that contradict the others and the priors.
 
     As long as a touch is farther off than `REFUSED_BEYOND` standard deviations of what all others and the priors
@@ -86,7 +86,7 @@ def robust_estimate(felt: tuple[Felt, ...], sigmas: Array, joints: int, middle: 
     return Estimate(sigmas * z, spread @ spread.T, taken)
 
 
-def _equations(felt: list[Felt], joints: int) -> Equations:
+def _equations(felt: list[NumberedTouch], joints: int) -> Equations:
     t = len(felt)
     exact = np.zeros((6, joints))
     touches = [touch for touch, _ in felt]

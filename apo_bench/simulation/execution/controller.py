@@ -96,7 +96,7 @@ def replay(
         sim_seconds=float(robot.data.time),
         timeline=tuple(progress.timeline),
         in_hand=robot.hold_watch.finished,
-        felt=None if feeling is None else feeling.felt,
+        felt=None if feeling is None else feeling.belief.found,
     )
     if keys and not refused and outcome.code != "time_limit":
         cache.end(keys[-1], result)

@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 
 from apo_bench.correction.touches import REFUSED_BEYOND, Touch
 from apo_bench.correction.touches.robot_model import HAND_EYE, Places, part_poses
-from apo_bench.correction.touches.robust_estimate import Felt, robust_estimate
+from apo_bench.correction.touches.robust_estimate import NumberedTouch, robust_estimate
 from apo_bench.geometry import Array, pose
 
 pytestmark = pytest.mark.numeric
@@ -24,7 +24,7 @@ SIGMAS = np.concatenate([np.repeat([1e-3, 3e-3], 3), [5e-4] * 3, [1e-3] * 6, [0.
 SIGMA_M = 5e-5
 
 
-def felt(rng: np.random.Generator, truth: Array, n: int) -> tuple[Felt, ...]:
+def felt(rng: np.random.Generator, truth: Array, n: int) -> tuple[NumberedTouch, ...]:
     """Touches of planes of any normal, half of them with a part in the hand."""
     touches = []
     for i in range(n):
@@ -36,12 +36,12 @@ def felt(rng: np.random.Generator, truth: Array, n: int) -> tuple[Felt, ...]:
         grasp = (0, held) if i % 2 else (None, None)
         v = rng.uniform(-0.05, 0.05, 3)
         touch = Touch(B, normal, 0.0, v, SIGMA_M, J, *grasp)
-        one = Felt(touch, 0 if i % 2 else -1)
+        one = NumberedTouch(touch, 0 if i % 2 else -1)
         touches.append(moved(one, heights([one], truth)[0] + SIGMA_M * rng.standard_normal()))
     return tuple(touches)
 
 
-def heights(felt: Sequence[Felt], unknowns: Array) -> Array:
+def heights(felt: Sequence[NumberedTouch], unknowns: Array) -> Array:
     """How far above its plane the point of each touch is, (t,)."""
     held = [np.eye(4) if t.T_tip_part is None else t.T_tip_part for t, _ in felt]
     jacobians = [t.jacobian for t, _ in felt]
@@ -53,9 +53,9 @@ def heights(felt: Sequence[Felt], unknowns: Array) -> Array:
     )
 
 
-def moved(one: Felt, by_m: float) -> Felt:
+def moved(one: NumberedTouch, by_m: float) -> NumberedTouch:
     t = one.touch
-    return Felt(
+    return NumberedTouch(
         Touch(t.T_world_tip, t.normal, t.offset + by_m, t.point, t.sigma_m, t.jacobian, t.grasp, t.T_tip_part),
         one.grasp,
     )
@@ -100,9 +100,9 @@ def test_a_touch_of_something_else_bends_nothing(seed: int, by_mm: float, wrong:
     assert_allclose(covariance, rest.covariance, atol=1e-15)
 
 
-def above(at: tuple[float, float], height_m: float) -> Felt:
+def above(at: tuple[float, float], height_m: float) -> NumberedTouch:
     """The hand touched a table at z = 0 when the robot believed its tip at this height."""
-    return Felt(Touch(pose.at((*at, height_m)), (0.0, 0.0, 1.0), 0.0, (0.0, 0.0, 0.0), SIGMA_M), -1)
+    return NumberedTouch(Touch(pose.at((*at, height_m)), (0.0, 0.0, 1.0), 0.0, (0.0, 0.0, 0.0), SIGMA_M), -1)
 
 
 def test_one_touch_alone_is_judged_by_the_priors() -> None:

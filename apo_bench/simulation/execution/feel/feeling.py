@@ -30,22 +30,32 @@ _SQUARED = np.array([5e-5, 2e-4, 1e-3, 5e-3, 3e-3, 3e-3])
 """How exactly a part lies between pads that closed twice, [m, rad], a twist in the frame of the tip: closing tips a
 round part by 0.3 degrees, and pressed on a floor it slides up between the pads."""
 _TOUCH_N = 2.0
-_SIGMAS = 8.0
+_SIGMAS = 6.0
 """A touch ends by this force, or by so many standard deviations of what the wrist feels."""
 
 
 class Belief(Protocol):
     """What a robot believes of itself, and how it learns: `apo_bench.correction.touches` has one."""
 
-    hand_eye: Array
-    tool: Array
-    encoders: Array
-    touches: tuple[Touch, ...]
-    refused: tuple[Touch, ...]
-    felt_mm: float
-    felt_deg: float
-    deviation_mm: float
-    deviation_deg: float
+    @property
+    def hand_eye(self) -> Array:
+        """Where the robot goes, (4, 4), for what it takes to be the frame of the world."""
+        ...
+
+    @property
+    def tool(self) -> Array:
+        """How far the tip is off on the hand, (3,), in its own frame, [m]."""
+        ...
+
+    @property
+    def encoders(self) -> Array:
+        """How far each joint is off what its encoder says, (joints,), [rad]."""
+        ...
+
+    @property
+    def found(self) -> Felt:
+        """What has been found out."""
+        ...
 
     def grasp(self, number: int, sigmas: Array) -> "Belief":
         """A part was grasped, which may have moved in the hand by so much, (6,), [m, rad]."""
@@ -55,11 +65,11 @@ class Belief(Protocol):
         """Learn from touches."""
         ...
 
-    def real(self, T_world_tip: Array, jacobian: Array) -> Array:
+    def real(self, T_world_tip: Array, jacobian: Array | None) -> Array:
         """Where the tip really is, (4, 4)."""
         ...
 
-    def command(self, T_world_tip: Array, jacobian: Array) -> Array:
+    def command(self, T_world_tip: Array, jacobian: Array | None) -> Array:
         """The inverse of `real`."""
         ...
 
@@ -110,12 +120,6 @@ class Feeling:
     def wrist(self) -> WristSensor:
         assert self._wrist is not None, "begin first"
         return self._wrist
-
-    @property
-    def felt(self) -> Felt:
-        """What was found out so far."""
-        b = self.belief
-        return Felt(len(b.touches), len(b.refused), b.felt_mm, b.felt_deg, b.deviation_mm, b.deviation_deg)
 
     @property
     def touch_n(self) -> float:

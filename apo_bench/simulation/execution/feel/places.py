@@ -21,9 +21,9 @@ from apo_bench.simulation.scene.scene import Scene
 
 OPENING_M = 0.004
 """Of each finger while the hand touches: as good as closed, and the pads do not push on each other."""
-STAND_OFF_M = 0.006
+STAND_OFF_M = 0.004
 """A touch begins so far before it is expected."""
-_ROOM_M = 0.004
+_ROOM_M = 0.003
 """Everything else stays so far away."""
 _RADII_M = (0.08, 0.1, 0.06, 0.12, 0.14, 0.16, 0.18)
 _ANGLES = 24

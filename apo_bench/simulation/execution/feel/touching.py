@@ -16,8 +16,8 @@ from apo_bench.simulation.robot.paths import shifted, smooth, steady, turn_from,
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.world import sleeping
 
-_SPEED = 0.004
-"""Steady speed of a touch, [m/s]: a stiff hand twice as fast strikes harder than an arm may."""
+_SPEED = 0.0025
+"""Steady speed of a touch, [m/s]: a stiff hand four times as fast strikes harder than an arm may."""
 _BEYOND_M = 0.005
 """So far beyond where it is expected the floor or a wall is felt for."""
 _DOWN = 0.4
