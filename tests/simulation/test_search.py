@@ -15,7 +15,7 @@ from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.execution.search import press_in
 from apo_bench.simulation.execution.spiral import PITCH_M, RADIUS_M, Easing, Spiral
 from apo_bench.simulation.execution.transfer import Grip
-from apo_bench.simulation.robot.feeling import servo
+from apo_bench.simulation.robot.by_wrist import servo
 from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.robot.paths import shifted, steady
 from apo_bench.simulation.robot.robot import Robot

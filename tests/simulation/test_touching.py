@@ -10,7 +10,7 @@ import pytest
 
 from apo_bench import Scene, build_scene, load_scenario
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.robot.feeling import comply, feeling, press, wrist_of, zero
+from apo_bench.simulation.robot.by_wrist import comply, press, reading, wrist_of, zero
 from apo_bench.simulation.robot.in_hand import weld
 from apo_bench.simulation.robot.paths import shifted, smooth, steady
 from apo_bench.simulation.robot.robot import Halt, Robot
@@ -80,7 +80,7 @@ def with_stick(grasp: str, name: str, along: float, lift: float = 0.05, **settin
 
 def felt(robot: Robot, wrist: WristSensor, about: Array, seconds: float = 0.1) -> Array:
     """The mean of what is felt while the robot stands, (6,)."""
-    with feeling(robot, wrist):
+    with reading(robot, wrist):
         out = []
         for _ in range(round(seconds / 0.004)):
             robot.wait(0.004)
@@ -155,7 +155,7 @@ def test_a_push_on_the_table_is_felt_as_the_contacts_exert_it(arm: str, newton: 
         robot, wrist = empty_hand(scene, "ideal", 0.0102)
         comply(robot, Pushing(newton, 1.5), robot.T[:3, 3], wrist)
         tip = robot.T[:3, 3]
-        with feeling(robot, wrist):
+        with reading(robot, wrist):
             robot.wait(0.2)
             wrench = wrist.wrench(tip)
         assert wrench[2] == pytest.approx(newton, abs=0.02)

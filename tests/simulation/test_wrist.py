@@ -11,7 +11,7 @@ import pytest
 from apo_bench import Scene, build_scene, load_scenario
 from apo_bench.geometry import pose
 from apo_bench.records import WrenchNoise
-from apo_bench.simulation.robot.feeling import feeling, wrist_of, zero
+from apo_bench.simulation.robot.by_wrist import reading, wrist_of, zero
 from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, OFFSETS, Load, WristSensor, hand_load
@@ -150,7 +150,7 @@ def test_in_free_air_nothing_is_felt_at_any_pose(arm: str) -> None:
     for at, turn in POSES:
         T = pose.at(at, turn) @ pose.inverse(pose.at(home[:3, 3])) @ home
         robot.go(T, 0.8)
-        with feeling(robot, sensor):
+        with reading(robot, sensor):
             robot.wait(0.1)
             felt = []
             for _ in range(100):
@@ -187,7 +187,7 @@ def test_a_motion_is_the_same_to_the_byte_while_the_wrist_feels(tower: Scene) ->
         if feels:
             robot = Robot(tower, tower.scenario.start)
             sensor = wrist_of(robot, "external", np.random.default_rng(3))
-            with feeling(robot, sensor):
+            with reading(robot, sensor):
                 robot.go(pose.at((0.02, 0.0, -0.02)) @ robot.T, 0.3)
         else:
             robot.go(pose.at((0.02, 0.0, -0.02)) @ robot.T, 0.3)

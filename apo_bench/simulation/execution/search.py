@@ -9,7 +9,7 @@ from apo_bench.geometry import Array, pose
 from apo_bench.simulation.execution.spiral import RADIUS_M, Easing, Spiral
 from apo_bench.simulation.execution.transfer import Grip, Transfer
 from apo_bench.simulation.frames import frame
-from apo_bench.simulation.robot.feeling import servo
+from apo_bench.simulation.robot.by_wrist import servo
 from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth
 from apo_bench.simulation.robot.robot import Robot

@@ -66,7 +66,7 @@ class Robot:
         self.left_out_s = 0.0
         """How much of the time passed without being simulated."""
         self.wrist: WristSensor | None = None
-        """Reads every step and stops guarded motions, while it is on (`feeling`)."""
+        """Reads every step and stops guarded motions, while it is on (`by_wrist`)."""
         self._error = error
         self._off: Array = np.zeros(len(scene.arm.joints)) if error is None else error.joints
         # What is near is looked for where the tip is believed, so with joints that are off nothing is left out.

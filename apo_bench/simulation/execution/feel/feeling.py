@@ -15,7 +15,7 @@ from apo_bench.assembly import Felt, Plan, Touch
 from apo_bench.geometry import Array, pose
 from apo_bench.records import USUAL_WRENCH
 from apo_bench.simulation.execution.flush import Flush
-from apo_bench.simulation.robot.feeling import wrist_of, zero
+from apo_bench.simulation.robot.by_wrist import wrist_of, zero
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.robot.wrist import WristSensor

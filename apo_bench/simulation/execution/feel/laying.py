@@ -11,8 +11,7 @@ from apo_bench.insertion.macros import UP
 from apo_bench.simulation.execution.feel.feeling import Feeling
 from apo_bench.simulation.execution.flush import Flush, before_insertion
 from apo_bench.simulation.execution.transfer import Grip, Transfer
-from apo_bench.simulation.robot.feeling import comply
-from apo_bench.simulation.robot.feeling import feeling as by_wrist
+from apo_bench.simulation.robot.by_wrist import comply, reading
 from apo_bench.simulation.robot.paths import shifted, smooth, with_height
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.wrist import READING_S, part_loads
@@ -57,7 +56,7 @@ def lay_flat(robot: Robot, feeling: Feeling, operation: int, t: Transfer, grip: 
     robot.follow(smooth(robot.T, shifted(flush.T @ grip.T_part_tip, UP, _NEAR_M), _DOWN))
     robot.stand()
     law = _Laying(flush)
-    with sleeping(robot.scene.work, False), by_wrist(robot, feeling.wrist):
+    with sleeping(robot.scene.work, False), reading(robot, feeling.wrist):
         feeling.wrist.hold(*part_loads(robot.scene, {t.part: held}))
         # About the middle of the feet: there, what rubs has no lever.
         feet = pose.apply(robot.T @ pose.inverse(grip.T_part_tip), flush.feet)

@@ -10,8 +10,7 @@ from apo_bench.simulation.execution.feel.places import (
     opposite_places,
     wall_places,
 )
-from apo_bench.simulation.robot.feeling import feeling as by_wrist
-from apo_bench.simulation.robot.feeling import press
+from apo_bench.simulation.robot.by_wrist import press, reading
 from apo_bench.simulation.robot.paths import shifted, smooth, steady, turn_from, with_height
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.world import sleeping
@@ -42,8 +41,7 @@ def find_out(robot: Robot, feeling: Feeling) -> None:
         return
     robot.fingers(OPENING_M)
     for places in (floor_places, wall_places, opposite_places):
-        found = places(feeling.residual.plan(feeling.plan), robot.scene)
-        felt = [touch for place in found for touch in _touched(robot, feeling, place)]
+        felt = [touch for place in places(feeling.plan, robot.scene) for touch in _touched(robot, feeling, place)]
         if places is opposite_places:
             felt = feeling.without_common(felt)
         feeling.learn(robot, felt)
@@ -51,7 +49,9 @@ def find_out(robot: Robot, feeling: Feeling) -> None:
 
 def _touched(robot: Robot, feeling: Feeling, place: TouchPlace) -> list[Touch]:
     """Go there, press, come back; what it tells, if anything was felt."""
-    T = place.T_world_tip @ feeling.residual.tool
+    E = feeling.residual.hand_eye
+    T = E @ place.T_world_tip @ feeling.residual.tool
+    way = E[:3, :3] @ place.way
     high = max(robot.T[2, 3], T[2, 3] + _HIGH_M)
     robot.follow(smooth(robot.T, with_height(robot.T, high), _OVER))
     rest = robot.scene.kinematics.forward(robot.scene.arm.home)
@@ -61,11 +61,10 @@ def _touched(robot: Robot, feeling: Feeling, place: TouchPlace) -> list[Touch]:
     robot.follow(smooth(robot.T, T, _DOWN))
     robot.stand()
     # While what is fixed is let sleep, no collision of the arm with it is noticed.
-    with sleeping(robot.scene.work, False), by_wrist(robot, feeling.wrist):
-        end = shifted(robot.T, place.way, STAND_OFF_M + _BEYOND_M)
-        left = press(robot, steady(robot.T, end, _SPEED), place.way, feeling.touch_n, feeling.wrist)
-        plane = feeling.as_seen(place.normal, place.offset * place.normal)
-        felt = [] if left is None else [feeling.touch(robot, *plane, place.point)]
+    with sleeping(robot.scene.work, False), reading(robot, feeling.wrist):
+        end = shifted(robot.T, way, STAND_OFF_M + _BEYOND_M)
+        left = press(robot, steady(robot.T, end, _SPEED), way, feeling.touch_n, feeling.wrist)
+        felt = [] if left is None else [feeling.touch(robot, place.normal, place.offset, place.point)]
         robot.follow(smooth(robot.T, T, _BACK))
     robot.follow(smooth(robot.T, with_height(T, T[2, 3] + _HIGH_M), _BACK))
     return felt

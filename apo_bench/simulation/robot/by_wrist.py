@@ -64,7 +64,7 @@ def wrist_of(robot: Robot, name: str, rng: np.random.Generator, bandwidth_hz: fl
 
 
 @contextmanager
-def feeling(robot: Robot, wrist: WristSensor) -> Iterator[None]:
+def reading(robot: Robot, wrist: WristSensor) -> Iterator[None]:
     """The wrist reads at every step, and guards of motions are its; what the robot does here stands still at first."""
     if robot.wrist is wrist:
         yield
@@ -86,7 +86,7 @@ def zero(robot: Robot, wrist: WristSensor, seconds: float = ZERO_S) -> None:
     Raises:
         Halt: Something went wrong meanwhile.
     """
-    with feeling(robot, wrist):
+    with reading(robot, wrist):
         robot.stand()
         wrist.start_zero()
         robot.wait(seconds)
@@ -111,7 +111,7 @@ def press(robot: Robot, line: Trajectory, way: Array, newton: float, wrist: Wris
     Raises:
         Halt: The line leaves the arm's reach, or something went wrong on the way.
     """
-    with feeling(robot, wrist):
+    with reading(robot, wrist):
         return robot.follow(line, Guard(way, newton)) or None
 
 
@@ -127,7 +127,7 @@ def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wri
     Raises:
         Halt: The arm does not reach around there, or something went wrong on the way.
     """
-    with feeling(robot, wrist):
+    with reading(robot, wrist):
         q = robot.q
         offset = np.zeros(6)
         looked = offset

@@ -1,0 +1,156 @@
+"""A robot that feels: where it touches, what lying flat tells, and that it knows nothing but what it touched."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from apo_bench import Plan, build_scene, load_scenario
+from apo_bench.geometry import extent, pose
+from apo_bench.simulation.execution.feel.feeling import Feeling
+from apo_bench.simulation.execution.feel.laying import _Laying
+from apo_bench.simulation.execution.feel.places import floor_places, opposite_places, wall_places
+from apo_bench.simulation.execution.feel.touching import find_out
+from apo_bench.simulation.execution.flush import Flush
+from apo_bench.simulation.execution.prepare import moves
+from apo_bench.simulation.robot.robot import Robot
+from apo_bench.simulation.robot.robot_error import RobotError
+from apo_bench.trial.feeling import feels_of
+from apo_bench.trial.stages import replay_and_judge, robot_error_of, simulate_demonstration
+
+STATED = "hand_eye:0.5/0.1+tool:0.5"
+
+
+@cache
+def scene(name):
+    return build_scene(load_scenario(name))
+
+
+@cache
+def plan(name):
+    truth = simulate_demonstration(scene(name), 0.0, 1).layout
+    return Plan(scene(name).scenario.assembly, truth.start, truth.goals)
+
+
+def drawn(name, kinds, seed=3):
+    return robot_error_of(kinds, scene(name), lambda which: np.random.default_rng([seed, which]))
+
+
+def found_out(name, error, parts_at=None, stated=STATED):
+    """What a robot believes once it has touched what is fixed."""
+    start = plan(name).start if parts_at is None else parts_at
+    robot = Robot(scene(name), start, None, "contact", error)
+    feeling = Feeling(feels_of(plan(name), scene(name), stated, (5,), "ideal"), plan(name), scene(name), error)
+    robot.wait(0.05)
+    find_out(robot, feeling)
+    return feeling.belief
+
+
+@pytest.mark.parametrize("name", ["stick_in_tower", "peg_in_hole", "pocket_table"])
+def test_the_floor_is_touched_at_three_places_around_the_goals(name):
+    places = floor_places(plan(name), scene(name))
+    middle = plan(name).goals[:, :2, 3].mean(axis=0)
+    angles = [np.arctan2(*(place.T_world_tip[:2, 3] - middle)[::-1]) for place in places]
+    assert len(places) == 3
+    # every third of a turn, so the middle is inside
+    assert np.diff(sorted([*angles, min(angles) + 2 * np.pi])).max() < np.pi
+    for place in places:
+        touched = pose.apply(place.T_world_tip, place.point[None])[0]
+        assert place.normal @ touched - place.offset == pytest.approx(0.004, abs=1e-9)
+
+
+def test_walls_that_recede_are_expected_where_they_are():
+    """A pocket of 50 mm with 0.25 mm of room on each side: its walls are 50.5 mm apart, and looked at from inside."""
+    places = wall_places(plan("pocket_table"), scene("pocket_table"))
+    assert len(places) == 8
+    across = [
+        a.offset + b.offset
+        for i, a in enumerate(places)
+        for b in places[i + 1 :]
+        if a.normal @ b.normal < -0.99
+        and abs((a.T_world_tip - b.T_world_tip)[:3, 3] @ np.cross(a.normal, [0, 0, 1])) < 0.02
+    ]
+    widths = [-gap for gap in across if abs(gap) < 0.06]
+    assert widths == pytest.approx([0.0505] * 4, abs=1e-9)
+
+
+def test_opposite_sides_of_the_fingers_touch_the_same_wall():
+    first, second = opposite_places(plan("peg_in_hole"), scene("peg_in_hole"))
+    assert first.normal == pytest.approx(second.normal)
+    assert first.T_world_tip[:3, 0] == pytest.approx(-second.T_world_tip[:3, 0])
+    assert not opposite_places(plan("stick_in_tower"), scene("stick_in_tower"))
+
+
+def test_what_is_inserted_level_lies_flat_first():
+    felt = moves(plan("stick_in_tower"), scene("stick_in_tower"), True, ("lay", "square"))
+    assert [move.transfer.flush is not None for move in felt] == [False, False, True]
+    flush = felt[-1].transfer.flush
+    pieces = scene("stick_in_tower").pieces["stick"]
+    assert flush.T[2, 3] + extent(pieces, flush.T[2, :3])[0] == pytest.approx(0.0, abs=1e-12)
+    assert pose.apply(flush.T, flush.feet)[:, 2] == pytest.approx(0.0, abs=1e-12)
+    assert len(flush.feet) == 4
+    assert np.ptp(flush.feet, axis=0).max() > 0.1
+
+
+def test_a_robot_that_does_not_feel_does_nothing_besides():
+    for move in moves(plan("peg_in_hole"), scene("peg_in_hole"), True):
+        assert not move.transfer.squaring
+        assert move.transfer.flush is None
+        assert not move.transfer.in_last
+
+
+@pytest.mark.parametrize("half", [0.08, 0.005])
+def test_a_part_that_is_pressed_on_comes_to_lie(half):
+    """Two feet on springs: tilted by 1 degree, it turns until both carry."""
+    feet = np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0], [0.0, -half, 0.0], [0.0, half, 0.0]])
+    law = _Laying(Flush(np.eye(4), np.array([0.0, 0.0, 1.0]), feet))
+    tilt, wrench, offset = np.radians(1.0), np.zeros(6), np.zeros(6)
+    while (wanted := law(wrench)) is not None:
+        offset = wanted
+        turned = tilt + offset[4]
+        heights = 0.002 + offset[2] - turned * feet[:, 0] + offset[3] * feet[:, 1]
+        pushes = 20_000.0 * np.maximum(0.0, -heights)
+        wrench = np.array([0.0, 0.0, pushes.sum(), feet[:, 1] @ pushes, -feet[:, 0] @ pushes, 0.0])
+    assert law.lies
+    assert abs(tilt + offset[4]) < np.radians(0.1)
+
+
+def test_touches_tell_where_the_base_and_the_tool_are():
+    """Walls on all sides: what is left of hand, eye and tool at the goals is a tenth of what was drawn."""
+    error = drawn("peg_in_hole", STATED)
+    belief = found_out("peg_in_hole", error)
+    assert not belief.refused
+    tip = pose.at((0.0, 0.0, 0.0), (180.0, 0.0, 0.0))
+    tip[:3, 3] = belief.middle
+    real = error.hand_eye @ tip @ error.tool
+    off = pose.log(pose.inverse(real) @ belief.real(tip))[:3]
+    assert np.linalg.norm(off) < 0.1 * np.linalg.norm((real - tip)[:3, 3])
+    deviations = np.sqrt(np.diag(belief.covariance_of(tip)))[:3]
+    assert (np.abs(off) < 4.0 * deviations).all()
+
+
+def test_the_robot_knows_nothing_but_what_it_touches():
+    """A base that is off, and a world that stands off the other way: the robot does and believes the same."""
+    E = pose.at((0.0008, -0.0006, 0.0), (0.0, 0.0, 0.15))
+    n = len(plan("peg_in_hole").assembly)
+    error = RobotError(E, np.zeros(6), np.eye(4), np.tile(np.eye(4), (n, 1, 1)))
+    moved = {part: pose.inverse(E) @ T for part, T in plan("peg_in_hole").start.items()}
+    one = found_out("peg_in_hole", error)
+    other = found_out("peg_in_hole", None, moved)
+    assert len(one.touches) == len(other.touches) == 9
+    for a, b in zip(one.touches, other.touches, strict=True):
+        assert np.abs(a.T_world_tip - b.T_world_tip).max() < 2e-5
+    assert one.mean == pytest.approx(other.mean, abs=3e-5)
+
+
+def test_a_robot_that_feels_does_what_one_that_does_not_fails_at():
+    name = "stick_in_tower"
+    error = drawn(name, "hand_eye:0.5/0.1+in_hand:0.3/1", 4)
+    goals = plan(name).goals
+    blind = replay_and_judge(plan(name), scene(name), goals, fidelity="contact", error=error)
+    feels = feels_of(plan(name), scene(name), "hand_eye:0.5/0.1+in_hand:0.3/1", (6,))
+    felt = replay_and_judge(plan(name), scene(name), goals, fidelity="contact", error=error, feels=feels)
+    assert not blind.verdict.success
+    assert felt.verdict.success
+    assert felt.result.felt.touches == 7
+    assert felt.result.felt.refused == 0
