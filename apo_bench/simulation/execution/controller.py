@@ -12,7 +12,7 @@ from apo_bench.prediction.stability import first_unstable
 from apo_bench.records import sentence
 from apo_bench.simulation.execution.carry_out import bring, take
 from apo_bench.simulation.execution.feel.feeling import Feeling, Feels
-from apo_bench.simulation.execution.feel.laying import lay_flat
+from apo_bench.simulation.execution.feel.laying import lay as lay_down
 from apo_bench.simulation.execution.feel.touching import find_out
 from apo_bench.simulation.execution.prepare import Move, key_angles, moves
 from apo_bench.simulation.execution.replay_cache import Progress, ReplayCache, cache_keys
@@ -160,7 +160,7 @@ def _run_schedule(
             if feeling is not None:
                 feeling.taken(step.operation)
                 if transfer.flush is not None:
-                    lay = partial(lay_flat, robot, feeling, step.operation)
+                    lay = partial(lay_down, robot, feeling, step.operation)
             bring(robot, transfer, grip, lay)
             _note_hold(robot, step)
             _until_rest(robot)

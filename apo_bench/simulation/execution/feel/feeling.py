@@ -167,14 +167,21 @@ class Feeling:
         """A part was taken between pads that closed twice; it may have slipped since."""
         self.belief = self.belief.grasp(operation, np.hypot(self._feels.slip, _SQUARED))
 
-    def lain(self, robot: Robot, operation: int, flush: Flush, T_tip_part: Array) -> Array:
-        """Believe that a held part lies flat; returns where it is believed in the frame of the tip now, (4, 4).
+    def T_tip_held(self, T_tip_part: Array) -> Array:
+        """Where the arm takes a part to be in the frame of its tip, (4, 4), that is believed at a pose in that of the
+        real one."""
+        return np.asarray(pose.inverse(self.residual.tool) @ T_tip_part)
+
+    def foot(self, robot: Robot, operation: int, flush: Flush, T_tip_part: Array, foot: Array) -> Touch:
+        """What a foot of the held part tells that stands on the floor."""
+        n, d = self.as_seen(flush.normal, pose.apply(flush.T, flush.feet[:1])[0])
+        return self.touch(robot, n, d, foot, (operation, T_tip_part))
+
+    def holds(self, operation: int, touches: Sequence[Touch], T_tip_part: Array) -> Array:
+        """Where a held part is believed in the frame of the tip after what its feet told, (4, 4).
 
         What hand and eye are off is not believed anew: what has been put down stands where it was put.
         """
-        on_floor = pose.apply(flush.T, flush.feet[:1])[0]
-        plane = self.as_seen(flush.normal, on_floor)
-        touches = [self.touch(robot, *plane, foot, (operation, T_tip_part)) for foot in flush.feet]
         self.belief = self.belief.touch(*touches)
         return self.belief.held(operation, T_tip_part)
 

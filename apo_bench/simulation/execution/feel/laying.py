@@ -1,4 +1,4 @@
-"""Laying a part that is held flat on what is fixed, before it is inserted level.
+"""Laying a part that is held on what is fixed, before it is inserted.
 
 Pressed on lightly and giving way to torque, it comes to lie flush: a plane on a plane. Then its height and its tilts in
 the hand are known, as well as the floor is.
@@ -6,6 +6,7 @@ the hand are known, as well as the floor is.
 
 import numpy as np
 
+from apo_bench.assembly import Touch
 from apo_bench.geometry import Array, pose
 from apo_bench.insertion.macros import UP
 from apo_bench.simulation.execution.feel.feeling import Feeling
@@ -42,33 +43,36 @@ _MOST_S = 15.0
 _DEEPEST_M = 0.012
 
 
-def lay_flat(robot: Robot, feeling: Feeling, operation: int, t: Transfer, grip: Grip) -> Grip:
+def lay(robot: Robot, feeling: Feeling, operation: int, t: Transfer, grip: Grip) -> Grip:
     """Lay the held part down and lift it again; returns how it is known to be held now.
 
     Raises:
         Halt: It fell out of the hand, or something was struck.
     """
-    flush = t.flush
     T_before = robot.T
-    tool = feeling.residual.tool
-    held = pose.inverse(grip.T_part_tip @ pose.inverse(tool))
+    held = pose.inverse(grip.T_part_tip @ pose.inverse(feeling.residual.tool))
     robot.macro = "lay-flat"
-    robot.follow(smooth(robot.T, shifted(flush.T @ grip.T_part_tip, UP, _NEAR_M), _DOWN))
+    robot.follow(smooth(robot.T, shifted(t.flush.T @ grip.T_part_tip, UP, _NEAR_M), _DOWN))
     robot.stand()
-    law = _Laying(flush)
     with sleeping(robot.scene.work, False), reading(robot, feeling.wrist):
         feeling.wrist.hold(*part_loads(robot.scene, {t.part: held}))
-        # About the middle of the feet: there, what rubs has no lever.
-        feet = pose.apply(robot.T @ pose.inverse(grip.T_part_tip), flush.feet)
-        comply(robot, law, feet.mean(axis=0), feeling.wrist)
-        if law.lies:
-            grip = Grip(pose.inverse(feeling.lain(robot, operation, flush, held)) @ tool, grip.half_width)
-        robot.follow(smooth(robot.T, shifted(robot.T, UP, _OFF_M), _OFF))
+        touches = _laid(robot, feeling, operation, t.flush, held)
         feeling.wrist.hold()
+        robot.follow(smooth(robot.T, shifted(robot.T, UP, _OFF_M), _OFF))
+    grip = Grip(pose.inverse(feeling.holds(operation, touches, held)) @ feeling.residual.tool, grip.half_width)
     above = before_insertion(t) @ grip.T_part_tip if t.into.level else with_height(robot.T, float(T_before[2, 3]))
     robot.follow(smooth(robot.T, above, _UP))
     robot.stand()
     return grip
+
+
+def _laid(robot: Robot, feeling: Feeling, operation: int, flush: Flush, held: Array) -> list[Touch]:
+    """Press the part on the floor until it lies; all its feet touch then."""
+    law = _Laying(flush)
+    # About the middle of the feet: there, what rubs has no lever.
+    feet = pose.apply(robot.T @ feeling.T_tip_held(held), flush.feet)
+    comply(robot, law, feet.mean(axis=0), feeling.wrist)
+    return [feeling.foot(robot, operation, flush, held, foot) for foot in flush.feet] if law.lies else []
 
 
 class _Laying:
