@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from apo_bench.records import TrialSettings
+from apo_bench.records import SETTINGS, TrialSettings
 from apo_bench.statistics import Cell, Paired
 from apo_bench.sweeps.grid import described, load_all
 from apo_bench.sweeps.sweep_file import read_sweep
@@ -112,8 +112,9 @@ def up_to_date(ran: Mapping[str, Any]) -> bool:
     """Whether rows are those of the sweep file as it is now."""
     first = ran["grids"][0]
     grids = read_sweep(GRID, {"trials": first["trials"], "fidelity": first["fidelity"]})
-    # in rows that are older than the setting `abstain` nothing abstained
-    kept = [{"abstains": [TrialSettings.abstain], **grid} for grid in ran["grids"]]
+    # in sweeps that are older than these settings nothing abstained or felt
+    usual = {SETTINGS[name].axis: [SETTINGS[name].default] for name in ("wrench", "stated_error", "abstain")}
+    kept = [{**usual, **grid} for grid in ran["grids"]]
     return described(grids, load_all(grids)) == kept
 
 

@@ -19,6 +19,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 OPTIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "Task and robot": ("--careless", "--clearance", "--arm", "--grasp", "--robot-error"),
+        "A robot that feels": ("--wrench", "--stated-error"),
         "What is seen": ("--level", "--levels", "--level-mm", "--level-deg", "--noise", "--eye", "--observation"),
         "What a method makes of it": (
             *("--method", "--methods", "--relations", "--looks", "--abstain"),

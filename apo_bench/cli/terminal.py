@@ -9,7 +9,7 @@ from rich.table import Table
 
 from apo_bench.cli.printing import console
 from apo_bench.io.plain_text import clean
-from apo_bench.records import RANGE, FreedSet, MovedInHand, Predicted, Row
+from apo_bench.records import RANGE, SETTINGS, FreedSet, MovedInHand, Predicted, Row, feels, look_up
 from apo_bench.report.tables.cells import cell_table
 from apo_bench.report.tables.forecasts import prediction_summary
 from apo_bench.report.tables.table import Column
@@ -111,6 +111,9 @@ def _lines(row: Row) -> list[tuple[str, str]]:
         trial += f", relations {row['relations']}" * (row["relations"] != "given")
         trial += f", {row['looks']} looks allowed" * bool(row["looks"])
         trial += f", robot error {row['robot_error']}" * (row["robot_error"] != "none")
+        for name in ("wrench", "stated_error") if feels(row["method"]) else ():
+            said = look_up(row, name) or SETTINGS[name].default
+            trial += f", {name.replace('_', ' ')} {said}" * (said != SETTINGS[name].default)
         abstain = row.get("abstain", 0.0)
         trial += f", abstaining below {abstain:g}" * bool(abstain)
     lines = [
@@ -149,6 +152,8 @@ def _lines(row: Row) -> list[tuple[str, str]]:
         lines.append(("test", _test(row)))
     if row["sim_seconds"] is not None:
         lines.append(("peak force", f"{row['peak_force_n']:.1f} N in {row['sim_seconds']:.1f} simulated seconds"))
+    if (touches := row.get("touches")) is not None:
+        lines.append(("felt", _felt(row, touches)))
     if row["moved_in_hand"]:
         lines.append(("in the hand", _in_hand(row["moved_in_hand"], row["failure_operation"])))
     return lines
@@ -156,6 +161,14 @@ def _lines(row: Row) -> list[tuple[str, str]]:
 
 def _errors(fixed_mm: float | None, free_mm: float | None) -> str:
     return f"{fixed_mm:.3f} mm fixed by contacts, {free_mm:.3f} mm free"
+
+
+def _felt(row: Row, touches: int) -> str:
+    """`its base is off by 0.62 mm and 0.08 degrees (deviations 0.05 and 0.01): 9 touches, 1 more refused`."""
+    off = f"its base is off by {row['felt_mm']:.2f} mm and {row['felt_deg']:.2f} degrees"
+    sure = f"deviations {row['felt_sure_mm']:.2f} and {row['felt_sure_deg']:.2f}"
+    refused = f", {row['touches_refused']} more refused" * bool(row["touches_refused"])
+    return f"{off} ({sure}): {touches} touch{'es' * (touches != 1)}{refused}"
 
 
 def _in_hand(moved: Sequence[MovedInHand], failed: int | None) -> str:

@@ -23,6 +23,8 @@ from apo_bench.records import (
     TrialSettings,
     check,
     checked_robot_error,
+    checked_stated_error,
+    checked_wrench,
     level_pair,
     refuse_noise,
 )
@@ -40,6 +42,7 @@ from apo_bench.trial.stages import (
     predicted_outcome,
     range_sensor,
     replay_and_judge,
+    robot_feels,
     trial_outcome,
 )
 
@@ -106,6 +109,11 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     - `arm`: by name, or an `Arm`.
     - `timestep_s`: of the physics.
     - `robot_error`: what is wrong with the robot itself, as standard deviations: `none`, or `hand_eye:1/0.2+tool:0.5`.
+    - `feels`: whether the robot finds out by touching how wrong it is itself, as with the methods `METHOD+feel`.
+    - `wrench`: the force and torque sensor at its wrist, `external` or another name or noise; nothing reads it unless
+      the robot feels.
+    - `stated_error`: how wrong the robot is said to be, `drawn`, `unstated`, or standard deviations; nobody asks unless
+      it feels.
     - `looks`: how often `env.unwrapped.look(operations)`, or a corrector that can ask, may look at operations again.
     - `abstain`: a plan that promises to succeed with less than this probability is not carried out: reward 0, stage
       `promise`, code `abstained`. 0 carries out everything.
@@ -135,6 +143,9 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         eye: str = TrialSettings.eye,
         looks: int = TrialSettings.looks,
         robot_error: str = TrialSettings.robot_error,
+        feels: bool = False,
+        wrench: str = TrialSettings.wrench,
+        stated_error: str = TrialSettings.stated_error,
         abstain: float = TrialSettings.abstain,
         render_mode: str | None = None,
     ) -> None:
@@ -145,6 +156,9 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         check("abstain", abstain)
         self._abstain = abstain
         self._robot_error = checked_robot_error(robot_error)
+        self._feels = feels
+        self._wrench = checked_wrench(wrench)
+        self._stated_error = checked_stated_error(stated_error)
         self.render_mode = render_mode
         if eye == RANGE and noise is not None:
             refuse_noise(noise)
@@ -316,17 +330,20 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             return failed, demonstration_failure(simulated.demonstration), None, None
         if self._refused is not None:
             return failed, self._refused, None, None
-        predicted = predicted_outcome(plan, self._scene)
-        promised = promised_success(plan, self.seen, self._correction, self._scene, self._robot_error)
+        predicted = predicted_outcome(plan, self._scene, self._feels)
+        promised = promised_success(plan, self.seen, self._correction, self._scene, self._robot_error, self._feels)
         if promised < self._abstain:
             return failed, abstained(promised, self._abstain), predicted, promised
+        how = (self._robot_error, self._stated_error, self._wrench)
         attempt = replay_and_judge(
             plan,
             self._scene,
             simulated.layout.goals,
             self._watch(),
+            searches=self._feels,
             most_s=LONGEST_REPLAY_S,
             error=draw_robot_error(self._robot_error, self._scene, episode.trial),
+            feels=robot_feels(*how, episode.trial) if self._feels else None,
         )
         if attempt.result.reached.final is not None:
             self._poses = attempt.result.reached.final.poses

@@ -4,10 +4,25 @@ Other rooms import from here; the folder of a sweep is in `run`.
 """
 
 from apo_bench.records.limits import CORRECTOR_LIMIT_S, USUAL_LIMITS, Limits
-from apo_bench.records.method import as_seen, is_own, knows_relations, knows_truth, may_look, parsed, with_simulated
+from apo_bench.records.method import (
+    as_seen,
+    feels,
+    is_own,
+    knows_relations,
+    knows_truth,
+    may_look,
+    parsed,
+    with_simulated,
+)
 from apo_bench.records.outcomes import CODES, STAGES, sentence
 from apo_bench.records.relations import GIVEN, RECOGNISED, SHIFT_MM, WRONG, relations_name
-from apo_bench.records.robot_error import NO_ROBOT_ERROR, checked_robot_error, robot_sigmas
+from apo_bench.records.robot_error import (
+    NO_ROBOT_ERROR,
+    checked_robot_error,
+    checked_stated_error,
+    robot_sigmas,
+    told_error,
+)
 from apo_bench.records.row import (
     LARGEST_NUMBER,
     LONGEST_SENTENCE,
@@ -26,7 +41,7 @@ from apo_bench.records.setting_info import SettingInfo
 from apo_bench.records.settings import (
     ENV_ID,
     LEVEL,
-    OLDER_ROW,
+    OLDER_ROWS,
     RANGE,
     ROW,
     SETTINGS,
@@ -66,7 +81,7 @@ __all__ = (
     "MEANINGS",
     "METHODS",
     "NO_ROBOT_ERROR",
-    "OLDER_ROW",
+    "OLDER_ROWS",
     "RANGE",
     "RECOGNISED",
     "REQUIRED",
@@ -102,7 +117,9 @@ __all__ = (
     "check_same_salt",
     "check_together",
     "checked_robot_error",
+    "checked_stated_error",
     "checked_wrench",
+    "feels",
     "finite",
     "in_python",
     "is_own",
@@ -122,6 +139,7 @@ __all__ = (
     "sentence",
     "setting_columns",
     "settings_of",
+    "told_error",
     "trial_key",
     "with_salt",
     "with_simulated",

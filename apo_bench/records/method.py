@@ -1,4 +1,4 @@
-"""What a method is called: what the robot is told to do, and whether it feels for holes while it does that."""
+"""What a method is called: what the robot is told to do, and whether it searches for holes and feels while it does that."""
 
 from typing import Any, NamedTuple
 
@@ -9,21 +9,27 @@ from apo_bench.records.short_names import LOOKING, METHODS, SIMULATED, UNCORRECT
 _SEARCH = "search"
 """What was seen, carried out by a robot that feels for holes; after a `+` the same for any other method."""
 _SEARCH_SUFFIX = f"+{_SEARCH}"
+_FEEL_SUFFIX = "+feel"
+"""After any method: a robot that finds out by touching how wrong it is itself."""
 
 
 class Method(NamedTuple):
-    """A method in its two parts."""
+    """A method in its parts."""
 
     plan: str
     """Where the plan comes from: `oracle`, `none`, `by-heart`, or a corrector."""
     searches: bool
+    """Whether the robot feels for holes; one that feels does so as its last resort."""
+    feels: bool
 
 
 def parsed(method: str) -> Method:
     """The parts of a method's name."""
     if method == _SEARCH:
-        return Method("none", True)
-    return Method(method.removesuffix(_SEARCH_SUFFIX), method.endswith(_SEARCH_SUFFIX))
+        return Method("none", True, False)
+    if method.endswith(_FEEL_SUFFIX):
+        return Method(method.removesuffix(_FEEL_SUFFIX), True, True)
+    return Method(method.removesuffix(_SEARCH_SUFFIX), method.endswith(_SEARCH_SUFFIX), False)
 
 
 def checked_method(method: str) -> str:
@@ -31,17 +37,21 @@ def checked_method(method: str) -> str:
 
     Raises:
         InputError: It is not `oracle`, `none`, `by-heart`, `search`,
-            a corrector by name, or `module:name`, nor one with `+search`.
+            a corrector by name, or `module:name`, nor one with `+search`
+            or `+feel`.
     """
-    plan, searches = parsed(method)
+    plan, searches, by_touch = parsed(method)
     if searches and parsed(plan).searches:
-        raise InputError(f"the method '{method}' was given; +{_SEARCH} is said once, as in contact+{_SEARCH}.")
+        raise InputError(
+            f"the method '{method}' was given; one of +search and +feel, which searches too, is said once, as in "
+            "contact+feel."
+        )
     if ":" not in plan and plan not in METHODS:
         raise InputError(
             unknown("method", plan or method, (*METHODS, _SEARCH))
-            + f" Or give your own corrector as 'package.module:name'; any of them may be followed by +{_SEARCH}."
+            + " Or give your own corrector as 'package.module:name'; any of them may be followed by +search or +feel."
         )
-    return _SEARCH if searches and plan == "none" else method
+    return _SEARCH if searches and not by_touch and plan == "none" else method
 
 
 def knows_truth(method: str) -> bool:
@@ -62,6 +72,11 @@ def knows_relations(method: str) -> bool:
 def may_look(method: str) -> bool:
     """Whether a method can ask to see operations again."""
     return parsed(method).plan in LOOKING
+
+
+def feels(method: str) -> bool:
+    """Whether a robot carries out the plan of a method that feels, so that it has a sensor at its wrist."""
+    return parsed(method).feels
 
 
 def with_simulated(corrector: Any) -> Any:

@@ -6,7 +6,11 @@
 `tool:0.5`          where the tip is on the hand: mm per axis
 `in_hand:0.5/1`     how a part slips in the hand when it was taken: mm along the pads, degrees about their normal
 
-Several are joined by `+`.
+Several are joined by `+`. A robot that feels is told how wrong it is (its stated error):
+
+`drawn`             the standard deviations that its error is drawn with
+`unstated`          nothing; it assumes what is usual
+`none`, `tool:0.5`  as above, whatever is drawn
 """
 
 import math
@@ -15,6 +19,8 @@ from typing import NamedTuple
 from apo_bench.errors import InputError, unknown
 
 NO_ROBOT_ERROR = "none"
+DRAWN = "drawn"
+_UNSTATED = "unstated"
 _LARGEST = 20.0
 """Standard deviation, [mm] or [deg]."""
 _UNITS = {"hand_eye": ("mm", "degrees"), "joints": ("degrees",), "tool": ("mm",), "in_hand": ("mm", "degrees")}
@@ -57,6 +63,32 @@ def checked_robot_error(name: str) -> str:
     hand_eye, joints_deg, tool_mm, in_hand = robot_sigmas(name)
     sizes = {"hand_eye": hand_eye, "joints": (joints_deg,), "tool": (tool_mm,), "in_hand": in_hand}
     return "+".join(f"{kind}:{_spelled(size)}" for kind, size in sizes.items() if any(size)) or NO_ROBOT_ERROR
+
+
+def checked_stated_error(name: str) -> str:
+    """A stated error as rows spell it.
+
+    Raises:
+        InputError: It is neither `drawn` nor `unstated`, nor what `robot_sigmas` takes.
+    """
+    if name in (DRAWN, _UNSTATED):
+        return name
+    kinds = {entry.partition(":")[0] for entry in name.split("+")}
+    if name != NO_ROBOT_ERROR and not kinds <= {*_UNITS}:
+        wrong = min(kinds - {*_UNITS})
+        raise InputError(unknown("stated error", wrong, (DRAWN, _UNSTATED, NO_ROBOT_ERROR, *_UNITS)))
+    return checked_robot_error(name)
+
+
+def told_error(stated_error: str, robot_error: str) -> str | None:
+    """How wrong a robot is said to be, as in `robot_sigmas`; None if nobody says.
+
+    Args:
+        stated_error, robot_error: As in rows.
+    """
+    if stated_error == _UNSTATED:
+        return None
+    return robot_error if stated_error == DRAWN else stated_error
 
 
 def _numbers(name: str, kind: str, sizes: str) -> tuple[float, float]:

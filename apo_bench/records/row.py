@@ -118,9 +118,14 @@ class Row(TypedDict, total=False):
     relations: Name
     """What the corrector was told of the contacts: `given`, `recognised`, or wrong ones."""
     method: Name
-    """Who planned: `oracle`, `none`, `by-heart`, `search` or a corrector."""
+    """Who planned: `oracle`, `none`, `by-heart`, `search` or a corrector; with `+search` or `+feel` by what robot."""
     looks: LooksAllowed
     """How often a corrector that can ask was allowed to look at operations again."""
+    wrench: Name
+    """The force and torque sensor at the wrist; without `+feel` nothing read it."""
+    stated_error: Name
+    """How wrong the robot was said to be: `drawn`, by the standard deviations of `robot_error`; `unstated`; or by
+    others. Without `+feel` nobody asked."""
     abstain: Promise
     """A plan that promised less was not carried out."""
     seed: Seed
@@ -223,6 +228,19 @@ class Row(TypedDict, total=False):
     """Largest contact force on what was held, without the gripper's, behind a low-pass filter of 20 ms [N]."""
     moved_in_hand: list[MovedInHand] | None
     """How far each part moved in the hand, slid, rolled or turned, until its last motion began and until its end."""
+    touches: _Count | None
+    """Touches that told the robot something about itself. This and what follows is null of a robot that does not feel.
+    """
+    touches_refused: _Count | None
+    """Touches that contradicted the others and what was stated, so that they were not believed."""
+    felt_mm: _Size | None
+    """How far the robot's base was believed to be off in the end, at the middle of the goals [mm]."""
+    felt_deg: _Size | None
+    """The same as an angle [deg]."""
+    felt_sure_mm: _Size | None
+    """Standard deviation of that, root mean square of three axes [mm]."""
+    felt_sure_deg: _Size | None
+    """The same of the angle [deg]."""
     sim_seconds: _Size | None
     """Simulated time [s]."""
 
@@ -233,7 +251,9 @@ _CLOSED = dict.fromkeys(("demonstration", "failure_code", "as_demonstrated_code"
 _CLOSED["failure_stage"] = _ENDS[STAGES] | None
 ROW_FIELDS: Mapping[str, Any] = MappingProxyType(get_type_hints(Row, include_extras=True) | _CLOSED)
 """Column -> its type, with the range that it may have."""
-_SETTING_COLUMNS = (info.column for info in SETTINGS.values() if info.name not in ("salt", "abstain"))
+LATER = ("wrench", "stated_error", "abstain")
+"""Settings that older rows do not have."""
+_SETTING_COLUMNS = (info.column for info in SETTINGS.values() if info.name not in ("salt", *LATER))
 REQUIRED = (
     *("schema", "env_id", "spec_hash", *_SETTING_COLUMNS),
     *("demonstration", "success", "loose_success", "failure_stage", "failure_code"),

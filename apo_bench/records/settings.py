@@ -16,15 +16,17 @@ from msgspec import Meta
 from apo_bench.errors import InputError
 from apo_bench.records.method import checked_method, is_own, parsed
 from apo_bench.records.relations import checked_relations
-from apo_bench.records.robot_error import NO_ROBOT_ERROR, checked_robot_error
+from apo_bench.records.robot_error import DRAWN, NO_ROBOT_ERROR, checked_robot_error, checked_stated_error
 from apo_bench.records.salt import Salt
 from apo_bench.records.setting_info import SettingInfo, about, check_value
 from apo_bench.records.short_names import CORRECTOR
+from apo_bench.records.wrench_sensor import USUAL_WRENCH, checked_wrench
 
 ENV_ID = "APOReplay-v0"
-ROW = "apo-bench/row/8"
-OLDER_ROW = "apo-bench/row/7"
-"""The same without `abstain`, which is 0 there, and `promised`."""
+ROW = "apo-bench/row/9"
+OLDER_ROWS = ("apo-bench/row/7", "apo-bench/row/8")
+"""The same without what a robot felt and its settings; 7 is also without `abstain`, which is 0 there, and `promised`.
+"""
 Eye = Literal["noise", "range"]
 """Poses with noise that is drawn, or a simulated range finder that measures them."""
 RANGE = "range"
@@ -179,7 +181,7 @@ class TrialSettings:
     method: Name = field(
         default=CORRECTOR,
         metadata=about(
-            "oracle, none, by-heart, search, a corrector or package.module:name; any of them with +search",
+            "oracle, none, by-heart, search, a corrector or package.module:name; any of them with +search or +feel",
             spelled=checked_method,
             key=True,
             axis="methods",
@@ -188,7 +190,7 @@ class TrialSettings:
         ),
     )
     """Who plans: `oracle`, `none`, `by-heart`, `search`, a corrector by name, or `module:name`; with `+search` the
-    robot feels for holes besides."""
+    robot feels for holes besides, with `+feel` it also finds out by touching how wrong it is itself."""
     looks: LooksAllowed = field(
         default=0,
         metadata=about(
@@ -199,6 +201,30 @@ class TrialSettings:
         ),
     )
     """How often a corrector that can ask may look at operations again; each look has the errors of the first."""
+    wrench: Name = field(
+        default=USUAL_WRENCH,
+        metadata=about(
+            "The force and torque sensor at the wrist, with +feel only: ideal, external, external-coarse, cobot, or its "
+            "noise in N and Nm, 0.1/0.005",
+            spelled=checked_wrench,
+            key=True,
+            axis="wrenches",
+        ),
+    )
+    """The force and torque sensor at the wrist: `ideal`, `external`, `external-coarse`, `cobot`, or standard deviations
+    of a reading in N and Nm, `0.1/0.005`. Without `+feel` nothing reads it."""
+    stated_error: Name = field(
+        default=DRAWN,
+        metadata=about(
+            "How wrong the robot is said to be, with +feel only: drawn (the standard deviations of the robot error), "
+            "unstated, or standard deviations as those of a robot error",
+            spelled=checked_stated_error,
+            key=True,
+            axis="stated_errors",
+        ),
+    )
+    """How wrong the robot is said to be: `drawn`, by the standard deviations of `robot_error`; `unstated`; or by others,
+    `hand_eye:1/0.2`. Without `+feel` nobody asks."""
     abstain: Promise = field(
         default=0.0,
         metadata=about(

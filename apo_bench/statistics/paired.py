@@ -9,7 +9,7 @@ from typing import Any, TypeVar, final
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.records import Row, knows_relations, knows_truth, may_look
+from apo_bench.records import Row, TrialSettings, feels, knows_relations, knows_truth, may_look
 from apo_bench.statistics.rates import CONFIDENCE, Interval, Place, Rate, by_place, order
 
 K = TypeVar("K", bound=Hashable)
@@ -112,8 +112,10 @@ def holm(p: Mapping[K, float]) -> dict[K, float]:
 
 
 def place_of_reference(place: _Where, reference: str) -> _Where:
-    """What a cell, or a curve, is compared with: `none` asks for no relations, and few methods for looks."""
+    """What a cell, or a curve, is compared with: `none` asks for no relations, few methods for looks, few robots feel."""
     other = place._replace(method=reference, looks=place.looks if may_look(reference) else 0)
+    if not feels(reference):
+        other = other._replace(wrench=TrialSettings.wrench, stated_error=TrialSettings.stated_error)
     return other if knows_relations(reference) else other._replace(relations="given")
 
 

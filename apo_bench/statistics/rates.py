@@ -1,5 +1,5 @@
 """Success rates with intervals: one cell per scenario, clearance, noise, relations, carelessness, level, method, grasp,
-fidelity, number of looks and robot error."""
+fidelity, number of looks, robot error, and what a robot that feels is given."""
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -37,6 +37,8 @@ class Place:
     fidelity: str = TrialSettings.fidelity
     looks: int = TrialSettings.looks
     robot_error: str = TrialSettings.robot_error
+    wrench: str = TrialSettings.wrench
+    stated_error: str = TrialSettings.stated_error
     abstain: float = TrialSettings.abstain
     _replace = replace
     """The place with other values of some fields, as of a named tuple."""
@@ -141,7 +143,7 @@ def wilson(successes: int, trials: int) -> Interval:
 def rank(method: str) -> int:
     """The ceiling first, then what has no correction, then `contact`, the paper's two ways, and all others.
 
-    A method with `+search` ranks like the method.
+    A method with `+search` or `+feel` ranks like the method.
     """
     first = ("oracle", "none", "search", "by-heart", "contact", "paper", "paper-track")
     plain = method if method in first else parsed(method).plan
@@ -160,7 +162,8 @@ def place_of(row: Row) -> Place | None:
 
 PLACE_FIELDS = Place.__match_args__
 _PLACE = itemgetter(*PLACE_FIELDS)
-_USUAL = {name: getattr(TrialSettings, name) for name in ("fidelity", "looks", "robot_error", "abstain")}
+_LATER = ("fidelity", "looks", "robot_error", "wrench", "stated_error", "abstain")
+_USUAL = {name: getattr(TrialSettings, name) for name in _LATER}
 
 
 def by_place(rows: Iterable[Row]) -> dict[Place, dict[int, Row]]:
@@ -239,5 +242,6 @@ def order(k: Place) -> tuple[Any, ...]:
     return (
         *(k.scenario, k.clearance_mm, k.noise, rank_relations(k.relations), k.careless),
         *(k.grasp, k.robot_error != TrialSettings.robot_error, k.robot_error, k.fidelity != "full"),
-        *(k.looks, k.abstain, rank(k.method), k.method, k.level, k.level_deg),
+        *(k.looks, k.wrench != TrialSettings.wrench, k.wrench, k.stated_error != TrialSettings.stated_error),
+        *(k.stated_error, k.abstain, rank(k.method), k.method, k.level, k.level_deg),
     )

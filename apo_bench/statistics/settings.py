@@ -4,7 +4,7 @@ from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 from apo_bench.io.grouping import grouped
-from apo_bench.records import NO_ROBOT_ERROR, RANGE, USUAL, knows_relations, knows_truth, may_look
+from apo_bench.records import NO_ROBOT_ERROR, RANGE, USUAL, TrialSettings, feels, knows_relations, knows_truth, may_look
 from apo_bench.statistics.rate_text import level_label
 from apo_bench.statistics.rates import PLACE_FIELDS, Place, rank_relations
 
@@ -23,19 +23,22 @@ class Setting(NamedTuple):
     fidelity: str
     looks: int = 0
     robot_error: str = NO_ROBOT_ERROR
+    wrench: str = TrialSettings.wrench
+    stated_error: str = TrialSettings.stated_error
     abstain: float = 0.0
 
     def holds(self, cell: Place) -> bool:
         """Whether a cell belongs here.
 
-        The oracle meets neither noise nor carelessness, plans without a corrector are not told any relations, and few
-        methods can ask to look again.
+        The oracle meets neither noise nor carelessness, plans without a corrector are not told any relations, few methods
+        can ask to look again, and few robots feel.
         """
         return (
             _site(cell) == _site(self)
             and (knows_truth(cell.method) or (cell.noise, cell.careless) == (self.noise, self.careless))
             and (not knows_relations(cell.method) or cell.relations == self.relations)
             and (not may_look(cell.method) or cell.looks == self.looks)
+            and (not feels(cell.method) or (cell.wrench, cell.stated_error) == (self.wrench, self.stated_error))
         )
 
     def title(self) -> str:
@@ -52,6 +55,8 @@ class Setting(NamedTuple):
             f"robot error {self.robot_error}": self.robot_error != NO_ROBOT_ERROR,
             f"fidelity {self.fidelity}": self.fidelity != "full",
             f"{self.looks} more look{'s' * (self.looks > 1)}": self.looks > 0,
+            f"wrench {self.wrench}": self.wrench != TrialSettings.wrench,
+            f"stated error {self.stated_error}": self.stated_error != TrialSettings.stated_error,
             f"abstaining below {self.abstain:g}": self.abstain > 0,
         }
         place = [human, *[f"{self.clearance_mm:g} mm clearance"] * clearance]
@@ -68,13 +73,16 @@ def settings(cells: Iterable[Any]) -> list[Setting]:
     places = [cell_place(cell) for cell in cells]
     chosen = set[Setting]()
     # who meets most of what a setting says goes first, so that others find the setting that they belong to
-    for meets_it in (may_look, knows_relations, lambda method: not knows_truth(method), knows_truth):
+    for _, alike in sorted(grouped((_meets(p.method), p) for p in places).items(), reverse=True):
         chosen |= {
-            s
-            for s, p in {setting_of(p): p for p in places if meets_it(p.method)}.items()
-            if not any(other.holds(p) for other in chosen)
+            s for s, p in {setting_of(p): p for p in alike}.items() if not any(other.holds(p) for other in chosen)
         }
     return sorted(chosen, key=lambda s: (s[:2], s.noise != USUAL, s.noise, rank_relations(s.relations), s[4:]))
+
+
+def _meets(method: str) -> tuple[bool, ...]:
+    """What of a setting a method meets: noise, relations, what a robot that feels is given, looks."""
+    return not knows_truth(method), knows_relations(method), feels(method), may_look(method)
 
 
 def members(settings: Sequence[Setting], items: Iterable[_Item]) -> dict[Setting, list[_Item]]:

@@ -18,6 +18,7 @@ from apo_bench.records import (
     TrialSettings,
     check,
     check_together,
+    feels,
     knows_relations,
     knows_truth,
     level_pair,
@@ -35,7 +36,10 @@ AXES = tuple(info for info in (*SETTINGS.values(), LEVEL) if info.axis)
 _MAY_BE_EMPTY = ("clearance_mm", "noise")
 SHARED = tuple(info.name for info in SETTINGS.values() if info.shared)
 """What all grids of a sweep have in common, so that no key tells trials apart by it."""
-_BY_RULE = ("scenario", "careless", "clearance_mm", "eye", "noise", "relations", "looks", "method")
+_BY_RULE = (
+    *("scenario", "careless", "clearance_mm", "eye", "noise"),
+    *("relations", "looks", "wrench", "stated_error", "method"),
+)
 _PLAIN = tuple(info for info in SETTINGS.values() if info.axis and info.name not in _BY_RULE)
 """Settings that every trial has, the oracle too."""
 
@@ -68,6 +72,9 @@ class SweepSettings:
     """The oracle meets them too."""
     looks: tuple[int, ...] = (TrialSettings.looks,)
     """Methods that cannot ask run once, with none."""
+    wrenches: tuple[str, ...] = (TrialSettings.wrench,)
+    stated_errors: tuple[str, ...] = (TrialSettings.stated_error,)
+    """Methods without `+feel` run once, with the usual of both."""
     abstains: tuple[float, ...] = (TrialSettings.abstain,)
     """The oracle abstains too."""
     arm: str = TrialSettings.arm
@@ -148,7 +155,8 @@ def units(grids: Sequence[SweepSettings], loaded: Mapping[str, Scenario], salt: 
 
     The oracle meets neither noise nor carelessness: it runs once per seed, grasp and robot error, recorded at level 0,
     carelessness 0 and the first noise model or eye. Plans without a corrector ask for no contacts: they are
-    recorded with relations as given. Methods that cannot ask to see operations again are recorded with no looks.
+    recorded with relations as given. Methods that cannot ask to see operations again are recorded with no looks, those
+    without `+feel` with the usual sensor and stated error.
     """
     for seed in sorted({seed for grid in grids for seed in range(grid.seed, grid.seed + grid.trials)}):
         those = [grid for grid in grids if grid.seed <= seed < grid.seed + grid.trials]
@@ -170,12 +178,15 @@ def described(grids: Sequence[SweepSettings], loaded: Mapping[str, Scenario]) ->
 def _per_seed(grid: SweepSettings) -> int:
     """How many trials a grid has for one seed, if none is the same as another."""
     ways = len(_ways(grid))
-    inputs = sum(len(_corrector_inputs(grid, method)) for method in grid.methods if not knows_truth(method))
+    of_oracle, of_others = (
+        sum(len(_met_by(grid, method)) for method in grid.methods if knows_truth(method) == known)
+        for known in (True, False)
+    )
     return (
         len(grid.scenarios)
         * max(1, len(grid.clearances_mm))
         * math.prod(len(getattr(grid, info.axis)) for info in _PLAIN)
-        * (len(grid.careless) * len(grid.levels) * ways * inputs + sum(map(knows_truth, grid.methods)))
+        * (len(grid.careless) * len(grid.levels) * ways * of_others + of_oracle)
     )
 
 
@@ -205,26 +216,24 @@ def _trials(
     ways = _ways(grid)
     truth: dict[str, Any] = {"level_mm": 0.0, "level_deg": 0.0, "careless": 0.0}
     for method, others in product(filter(knows_truth, grid.methods), plain):
-        yield TrialSettings(**same, **others, **truth, **ways[0], method=method)
+        for met in _met_by(grid, method):
+            yield TrialSettings(**same, **others, **truth, **ways[0], **met, method=method)
     for others, careless, level, way, method in product(plain, grid.careless, grid.levels, ways, grid.methods):
         if not knows_truth(method):
             mm, deg = level_pair(level, way["eye"])
             seen: dict[str, Any] = {"level_mm": mm, "level_deg": deg, "careless": careless}
-            for relations, looks in _corrector_inputs(grid, method):
-                yield TrialSettings(**same, **others, **seen, **way, relations=relations, looks=looks, method=method)
+            for met in _met_by(grid, method):
+                yield TrialSettings(**same, **others, **seen, **way, **met, method=method)
 
 
-def _corrector_inputs(grid: SweepSettings, method: str) -> list[tuple[str, int]]:
-    """What a method is told of the contacts, and how often it may look again.
-
-    Once the right contacts if it asks for none; never again if it cannot ask.
-    """
-    return list(
-        product(
-            grid.relations if knows_relations(method) else (TrialSettings.relations,),
-            grid.looks if may_look(method) else (TrialSettings.looks,),
-        )
-    )
+def _met_by(grid: SweepSettings, method: str) -> list[dict[str, Any]]:
+    """What not every method meets: contacts, looks, and what a robot that feels is given; once what is usual if not."""
+    meets = {"relations": knows_relations, "looks": may_look, "wrench": feels, "stated_error": feels}
+    axes = [
+        getattr(grid, SETTINGS[name].axis) if asks(method) else (SETTINGS[name].default,)
+        for name, asks in meets.items()
+    ]
+    return [dict(zip(meets, each, strict=True)) for each in product(*axes)]
 
 
 def _ways(grid: SweepSettings) -> list[dict[str, Any]]:

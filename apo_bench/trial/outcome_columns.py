@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable
 
-from apo_bench.assembly import Correction, InHand, Observation, Plan, Snapshot
+from apo_bench.assembly import Correction, Felt, InHand, Observation, Plan, Snapshot
 from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import Array, pose
 from apo_bench.observation.relations import culprit
@@ -100,6 +100,19 @@ def replay_columns(attempt: Attempt, plan: Plan, truth: Array | None) -> Row:
         "peak_force_n": finite(result.peak_force_n),
         "moved_in_hand": [_moved(each) for each in result.in_hand],
         "sim_seconds": result.sim_seconds,
+    } | _felt(result.felt)
+
+
+def _felt(felt: Felt | None) -> Row:
+    if felt is None:
+        return {}
+    return {
+        "touches": felt.touches,
+        "touches_refused": felt.refused,
+        "felt_mm": felt.mm,
+        "felt_deg": felt.deg,
+        "felt_sure_mm": felt.sure_mm,
+        "felt_sure_deg": felt.sure_deg,
     }
 
 

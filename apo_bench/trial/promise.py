@@ -106,7 +106,8 @@ def promised_success(
         correction: What the corrector made of it; None where none was asked, or a plan is nobody's correction.
         where: What the plan is to be carried out in. Of a scenario, everything counts as in reach.
         robot_error: The errors that are stated of the robot, as in rows; of a scenario they are not asked for.
-        searches: The robot feels for a hole where a motion into it is stopped.
+        searches: The robot feels for a hole where a motion into it is stopped, as one with `+feel` does too; what that
+            one makes up for by touching is not known here yet.
     """
     explained = explanations(correction, believed, plan.goals)
     score = plan_score(plan, believed.assembly, explained, where, robot_error, searches)

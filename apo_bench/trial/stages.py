@@ -19,10 +19,21 @@ from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Noise
 from apo_bench.observation.observing import observe
 from apo_bench.prediction.failure import ARM_CODES, predict
-from apo_bench.records import NO_ROBOT_ERROR, RANGE, SETTINGS, Predicted, Salt, TrialSettings, robot_sigmas, sentence
+from apo_bench.records import (
+    NO_ROBOT_ERROR,
+    RANGE,
+    SETTINGS,
+    Predicted,
+    Salt,
+    TrialSettings,
+    robot_sigmas,
+    sentence,
+    told_error,
+)
 from apo_bench.scenario import Scenario, draw_layout, load_scenario
 from apo_bench.simulation.arm_checks.plan_check import arm_moves
 from apo_bench.simulation.execution.controller import replay
+from apo_bench.simulation.execution.feel.feeling import Feels
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.human.demonstration import demonstrate
 from apo_bench.simulation.robot.robot_error import RobotError
@@ -32,9 +43,9 @@ if TYPE_CHECKING:
     from apo_bench.depth_camera.follow import RangeSensor
     from apo_bench.simulation.sensor.watch import DemonstrationImages
 
-LAYOUT, DEMONSTRATION, OBSERVATION, ARM, RELATIONS, TV, LOOKS, HAND_EYE, JOINTS, TOOL, IN_HAND = range(11)
-"""Streams of chance of a trial. The arm's is reserved: the arm that comes with the benchmark draws nothing; the last
-four are of what is wrong with the robot."""
+LAYOUT, DEMONSTRATION, OBSERVATION, ARM, RELATIONS, TV, LOOKS, HAND_EYE, JOINTS, TOOL, IN_HAND, WRENCH = range(12)
+"""Streams of chance of a trial. The arm's is reserved: the arm that comes with the benchmark draws nothing; four are of
+what is wrong with the robot, the last one is the noise of the sensor at its wrist."""
 
 
 @final
@@ -59,7 +70,11 @@ class Attempt:
 
 def stream(seed: int, which: int, salt: Salt | None = None) -> np.random.Generator:
     """The random numbers of one stage of one trial; nothing but seed, stage and salt is in the key."""
-    return np.random.default_rng([seed, which, *(salt.words(seed, which) if salt else ())])
+    return np.random.default_rng(_key(seed, which, salt))
+
+
+def _key(seed: int, which: int, salt: Salt | None) -> tuple[int, ...]:
+    return (seed, which, *(salt.words(seed, which) if salt else ()))
 
 
 def simulate_demonstration(
@@ -189,6 +204,15 @@ def robot_error_of(name: str, scene: Scene, stream_of: Callable[[int], np.random
     return RobotError(hand_eye, joints, tool, in_hand)
 
 
+def robot_feels(robot_error: str, stated_error: str, wrench: str, seed: int, salt: Salt | None = None) -> Feels:
+    """How a robot feels in a trial: what it is told of its error, and its sensor with the noise of this trial.
+
+    Args:
+        robot_error, stated_error, wrench: As in a row.
+    """
+    return Feels(told_error(stated_error, robot_error), wrench, seed=_key(seed, WRENCH, salt))
+
+
 def replay_and_judge(
     plan: Plan,
     scene: Scene,
@@ -199,6 +223,7 @@ def replay_and_judge(
     searches: bool = False,
     most_s: float = math.inf,
     error: RobotError | None = None,
+    feels: Feels | None = None,
 ) -> Attempt:
     """Replay a plan and judge what was reached.
 
@@ -209,8 +234,19 @@ def replay_and_judge(
         searches: The robot feels for a hole where a motion into it is stopped by force.
         most_s: Simulated time that the replay may take.
         error: What is wrong with the robot; the judge does not care whose error it was.
+        feels: How the robot finds out by touching what is wrong with it; None: it does not.
     """
-    result = replay(plan, scene, watch, fidelity=fidelity, cache=cache, searches=searches, most_s=most_s, error=error)
+    result = replay(
+        plan,
+        scene,
+        watch,
+        fidelity=fidelity,
+        cache=cache,
+        searches=searches,
+        most_s=most_s,
+        error=error,
+        feels=feels,
+    )
     return Attempt(result, judge(scene.scenario.assembly, result.reached, reference, scene.criteria))
 
 

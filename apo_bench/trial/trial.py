@@ -31,6 +31,7 @@ from apo_bench.trial.stages import (
     predicted_outcome,
     range_sensor,
     replay_and_judge,
+    robot_feels,
     scene_of,
     simulate_demonstration,
     stream,
@@ -201,13 +202,17 @@ def _outcome(
     if planned.plan is None:
         assert planned.failure is not None
         return result(planned.failure, success=False) | method_columns(planned)
-    searches = parsed(settings.method).searches
+    _, searches, by_touch = parsed(settings.method)
     promised = promised_success(planned.plan, believed, planned.correction, scene, settings.robot_error, searches)
     said: Row = {"predicted": predicted_outcome(planned.plan, scene, searches), "promised": promised}
     if promised < settings.abstain:
         return result(abstained(promised, settings.abstain), success=False) | method_columns(planned) | said
     error = draw_robot_error(settings.robot_error, scene, settings.seed, settings.salt)
-    attempt = replay_and_judge(planned.plan, scene, reference, watch, settings.fidelity, cache, searches, error=error)
+    how = (settings.robot_error, settings.stated_error, settings.wrench)
+    feels = robot_feels(*how, settings.seed, settings.salt) if by_touch else None
+    attempt = replay_and_judge(
+        planned.plan, scene, reference, watch, settings.fidelity, cache, searches, error=error, feels=feels
+    )
     end = result(trial_outcome(attempt), success=attempt.verdict.success)
     driven: Row = {"joint_control": scene.arm.control}
     return end | method_columns(planned) | said | driven | replay_columns(attempt, planned.plan, truth)

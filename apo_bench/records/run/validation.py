@@ -14,9 +14,9 @@ from msgspec import Meta
 from apo_bench.errors import InputError
 from apo_bench.io.lossless_json import HALF_BUT_OF_FILES, HALF_LETTER, WHOLE_LETTERS, half_letter, is_whole, read_whole
 from apo_bench.io.plain_text import CONTROL, clean
-from apo_bench.records.row import REQUIRED, ROW_FIELDS, Row
+from apo_bench.records.row import LATER, REQUIRED, ROW_FIELDS, Row
 from apo_bench.records.setting_columns import KEY
-from apo_bench.records.settings import OLDER_ROW, ROW, Name, TrialSettings
+from apo_bench.records.settings import OLDER_ROWS, ROW, Name, TrialSettings
 
 _Text = Annotated[str, Meta(max_length=100_000)]
 _Plain = None | bool | int | float | _Text
@@ -51,7 +51,10 @@ TIMING_FIELDS: Mapping[str, Any] = MappingProxyType(
     }
 )
 """Of a line of `timing.jsonl`."""
-_NAMES = ("scenario", "noise", "relations", "grasp", "arm", "method", "spec_hash", "eye", "robot_error")
+_NAMES = (
+    *("scenario", "noise", "relations", "grasp", "arm", "method", "spec_hash", "eye"),
+    *("robot_error", "wrench", "stated_error"),
+)
 """Texts of a row that stand in commands, so that nothing in them may be obeyed by a terminal."""
 _TOGETHER = (
     ("level", "level_deg", "careless"),
@@ -61,6 +64,7 @@ _TOGETHER = (
     ("planned_error_fixed_mm", "planned_error_free_mm"),
     ("pose_error_fixed_mm", "pose_error_free_mm"),
     ("test_passes", "suspects"),
+    ("touches", "touches_refused", "felt_mm", "felt_deg", "felt_sure_mm", "felt_sure_deg"),
 )
 """Fields that are null together."""
 _LONGEST_QUOTE = 60
@@ -98,12 +102,14 @@ def row_of(line: bytes, where: str) -> Row:
         InputError: A line that is no row.
     """
     row = _decoded(_ROW, line, where, "this is not a row of a sweep")
-    if row["schema"] not in (ROW, OLDER_ROW):
+    if row["schema"] not in (ROW, *OLDER_ROWS):
         raise InputError(
-            f"{where}: a row of schema '{_short(row['schema'])}' was given; {OLDER_ROW} and {ROW} can be read."
+            f"{where}: a row of schema '{_short(row['schema'])}' was given; {', '.join(OLDER_ROWS)} and {ROW} can be "
+            "read."
         )
-    if row["abstain"] is None:
-        row["abstain"] = TrialSettings.abstain
+    for name in LATER:
+        if row[name] is None:
+            row[name] = getattr(TrialSettings, name)
     fault = _fault(row)
     if fault is not None:
         raise _wrong(where, *fault)

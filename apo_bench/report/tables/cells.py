@@ -3,7 +3,7 @@ contacts as seen and as planned."""
 
 from collections.abc import Callable, Sequence
 
-from apo_bench.records import knows_relations, knows_truth, may_look
+from apo_bench.records import TrialSettings, feels, knows_relations, knows_truth, may_look
 from apo_bench.report.tables.table import (
     Column,
     Table,
@@ -23,6 +23,8 @@ def cell_table(cells: Sequence[Cell]) -> Table:
         "relations": lambda c: knows_relations(c.method),
         "looks": lambda c: may_look(c.method),
         "robot_error": lambda c: True,
+        "wrench": lambda c: feels(c.method),
+        "stated_error": lambda c: feels(c.method),
         "abstain": lambda c: True,
     }
 
@@ -49,6 +51,8 @@ def cell_table(cells: Sequence[Cell]) -> Table:
             Column("fidelity"),
             axis("looks", 0),
             axis("robot_error", "none"),
+            axis("wrench", TrialSettings.wrench),
+            axis("stated_error", TrialSettings.stated_error),
             axis("abstain", 0.0),
             Column("", "success", text=lambda c: percent(c.rate)),
             Column("", "95 % interval", text=lambda c: percents(c.interval)),

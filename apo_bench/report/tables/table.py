@@ -110,7 +110,10 @@ def place_columns(of: Callable[[Any], Any] = cell_place, levels: bool = True) ->
         *(axis(name, of) for name in ("clearance_mm", "noise", "relations", "careless")),
         *((axis("level", of, name="level_mm"), axis("level_deg", of)) if levels else ()),
         axis("method", of, head="method", words=True),
-        *(axis(name, of) for name in ("grasp", "fidelity", "looks", "robot_error", "abstain")),
+        *(
+            axis(name, of)
+            for name in ("grasp", "fidelity", "looks", "robot_error", "wrench", "stated_error", "abstain")
+        ),
     )
 
 

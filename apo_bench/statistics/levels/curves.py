@@ -14,7 +14,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.records import RANGE, Row, knows_truth
+from apo_bench.records import RANGE, Row, TrialSettings, knows_truth
 from apo_bench.statistics.over_seeds import mean_interval
 from apo_bench.statistics.paired import REFERENCES, place_of_reference
 from apo_bench.statistics.rates import Interval, by_place, order
@@ -33,6 +33,8 @@ class CurveSetting(NamedTuple):
     fidelity: str = "full"
     looks: int = 0
     robot_error: str = "none"
+    wrench: str = TrialSettings.wrench
+    stated_error: str = TrialSettings.stated_error
     abstain: float = 0.0
 
 
