@@ -27,13 +27,16 @@ from apo_bench.records import (
     checked_wrench,
     level_pair,
     refuse_noise,
+    told_error,
 )
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.scene.scene import build_scene
+from apo_bench.trial.feeling import feels_of
 from apo_bench.trial.fitting import fitting_plan
 from apo_bench.trial.promise import abstained, promised_success
 from apo_bench.trial.stages import (
+    WRENCH,
     demonstration_failure,
     draw_robot_error,
     looks_at,
@@ -42,7 +45,7 @@ from apo_bench.trial.stages import (
     predicted_outcome,
     range_sensor,
     replay_and_judge,
-    robot_feels,
+    stream_key,
     trial_outcome,
 )
 
@@ -334,7 +337,8 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         promised = promised_success(plan, self.seen, self._correction, self._scene, self._robot_error, self._feels)
         if promised < self._abstain:
             return failed, abstained(promised, self._abstain), predicted, promised
-        how = (self._robot_error, self._stated_error, self._wrench)
+        told = told_error(self._stated_error, self._robot_error)
+        noise = stream_key(episode.trial, WRENCH)
         attempt = replay_and_judge(
             plan,
             self._scene,
@@ -343,7 +347,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             searches=self._feels,
             most_s=LONGEST_REPLAY_S,
             error=draw_robot_error(self._robot_error, self._scene, episode.trial),
-            feels=robot_feels(*how, episode.trial) if self._feels else None,
+            feels=feels_of(plan, self._scene, told, noise, self._wrench) if self._feels else None,
         )
         if attempt.result.reached.final is not None:
             self._poses = attempt.result.reached.final.poses

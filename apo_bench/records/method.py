@@ -1,4 +1,4 @@
-"""What a method is called: what the robot is told to do, and whether it searches for holes and feels while it does that."""
+"""What a method is called: what the robot is told to do, and whether it searches for holes or feels meanwhile."""
 
 from typing import Any, NamedTuple
 

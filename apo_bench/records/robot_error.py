@@ -36,8 +36,11 @@ class Sigmas(NamedTuple):
     in_hand: tuple[float, float] = (0.0, 0.0)
 
 
-def robot_sigmas(name: str) -> Sigmas:
+def robot_sigmas(name: str, called: str = "robot error") -> Sigmas:
     """The standard deviations that a name stands for.
+
+    Args:
+        called: What it is, for complaints.
 
     Raises:
         InputError: An unknown kind, one that is there twice, or a number that is not allowed.
@@ -46,10 +49,10 @@ def robot_sigmas(name: str) -> Sigmas:
     for entry in name.split("+") if name != NO_ROBOT_ERROR else ():
         kind, _, sizes = entry.partition(":")
         if kind not in _UNITS:
-            raise InputError(unknown("kind of robot error", kind, (NO_ROBOT_ERROR, *_UNITS)))
+            raise InputError(unknown(f"kind of {called}", kind, (NO_ROBOT_ERROR, *_UNITS)))
         if kind in sigmas:
-            raise InputError(f"the robot error '{name}' was given, which has {kind} twice; say it once.")
-        sigmas[kind] = _numbers(name, kind, sizes)
+            raise InputError(f"the {called} '{name}' was given, which has {kind} twice; say it once.")
+        sigmas[kind] = _numbers(f"{called} '{name}'", kind, sizes)
     hand_eye, joints, tool, in_hand = (sigmas.get(kind, (0.0, 0.0)) for kind in _UNITS)
     return Sigmas(hand_eye, joints[0], tool[0], in_hand)
 
@@ -60,9 +63,7 @@ def checked_robot_error(name: str) -> str:
     Raises:
         InputError: As in `robot_sigmas`.
     """
-    hand_eye, joints_deg, tool_mm, in_hand = robot_sigmas(name)
-    sizes = {"hand_eye": hand_eye, "joints": (joints_deg,), "tool": (tool_mm,), "in_hand": in_hand}
-    return "+".join(f"{kind}:{_spelled(size)}" for kind, size in sizes.items() if any(size)) or NO_ROBOT_ERROR
+    return _spelled_error(robot_sigmas(name))
 
 
 def checked_stated_error(name: str) -> str:
@@ -73,11 +74,15 @@ def checked_stated_error(name: str) -> str:
     """
     if name in (DRAWN, _UNSTATED):
         return name
-    kinds = {entry.partition(":")[0] for entry in name.split("+")}
-    if name != NO_ROBOT_ERROR and not kinds <= {*_UNITS}:
-        wrong = min(kinds - {*_UNITS})
-        raise InputError(unknown("stated error", wrong, (DRAWN, _UNSTATED, NO_ROBOT_ERROR, *_UNITS)))
-    return checked_robot_error(name)
+    if name != NO_ROBOT_ERROR and any(entry.partition(":")[0] not in _UNITS for entry in name.split("+")):
+        raise InputError(unknown("stated error", name, (DRAWN, _UNSTATED, NO_ROBOT_ERROR, *_UNITS)))
+    return _spelled_error(robot_sigmas(name, "stated error"))
+
+
+def _spelled_error(sigmas: Sigmas) -> str:
+    hand_eye, joints_deg, tool_mm, in_hand = sigmas
+    sizes = {"hand_eye": hand_eye, "joints": (joints_deg,), "tool": (tool_mm,), "in_hand": in_hand}
+    return "+".join(f"{kind}:{_spelled(size)}" for kind, size in sizes.items() if any(size)) or NO_ROBOT_ERROR
 
 
 def told_error(stated_error: str, robot_error: str) -> str | None:
@@ -91,7 +96,7 @@ def told_error(stated_error: str, robot_error: str) -> str | None:
     return robot_error if stated_error == DRAWN else stated_error
 
 
-def _numbers(name: str, kind: str, sizes: str) -> tuple[float, float]:
+def _numbers(said: str, kind: str, sizes: str) -> tuple[float, float]:
     """The one or two numbers of a kind; the second is 0 if it is left out."""
     units = _UNITS[kind]
     try:
@@ -101,7 +106,7 @@ def _numbers(name: str, kind: str, sizes: str) -> tuple[float, float]:
     if len(numbers) > len(units) or not all(0.0 <= size <= _LARGEST for size in numbers):
         example = f"{kind}:{'/'.join(('0.5', '0.1')[: len(units)])}"
         raise InputError(
-            f"the robot error '{name}' was given; standard deviations in {' and '.join(units)} from 0 to {_LARGEST:g} "
+            f"the {said} was given; standard deviations in {' and '.join(units)} from 0 to {_LARGEST:g} "
             f"are allowed: {example}."
         )
     first, second = (*numbers, 0.0)[:2]

@@ -204,8 +204,8 @@ class TrialSettings:
     wrench: Name = field(
         default=USUAL_WRENCH,
         metadata=about(
-            "The force and torque sensor at the wrist, with +feel only: ideal, external, external-coarse, cobot, or its "
-            "noise in N and Nm, 0.1/0.005",
+            "The force and torque sensor at the wrist, with +feel only: ideal, external, external-coarse, cobot, or "
+            "its noise in N and Nm, 0.1/0.005",
             spelled=checked_wrench,
             key=True,
             axis="wrenches",
@@ -223,8 +223,8 @@ class TrialSettings:
             axis="stated_errors",
         ),
     )
-    """How wrong the robot is said to be: `drawn`, by the standard deviations of `robot_error`; `unstated`; or by others,
-    `hand_eye:1/0.2`. Without `+feel` nobody asks."""
+    """How wrong the robot is said to be: `drawn`, by the standard deviations of `robot_error`; `unstated`; or by
+    others, `hand_eye:1/0.2`. Without `+feel` nobody asks."""
     abstain: Promise = field(
         default=0.0,
         metadata=about(

@@ -17,7 +17,7 @@ from apo_bench.report.figures.every import figures
 from apo_bench.report.page.report_page import report_page
 from apo_bench.report.run.facts import scenario_files
 from apo_bench.report.run.trials import Draw, draw_failures
-from apo_bench.report.tables.cells import cell_table, gap_table, pair_table
+from apo_bench.report.tables.cells import cell_table, felt_table, gap_table, pair_table
 from apo_bench.report.tables.forecasts import calibration_table, confusion_table, recognition_table
 from apo_bench.report.tables.methods import area_table, effort_table, half_table, time_table, work_table
 from apo_bench.statistics import (
@@ -26,6 +26,7 @@ from apo_bench.statistics import (
     calibrations,
     confusions,
     efforts,
+    felt,
     gaps,
     members,
     read_timing,
@@ -40,8 +41,9 @@ MOST_PANELS = 16
 """Of a PNG; drawing more takes minutes."""
 PNG = ("success_over_level", "success_over_tightness", "success_over_looks", "recognised")
 """Figures that are also kept as PNG."""
-FILES = ("cells", "pairs", "half_levels", "areas", "recognised", "gaps", "confusion", "times")
-"""Tables that are also kept as files; those of the last two kinds, and what was recognised, if there is any."""
+FILES = ("cells", "pairs", "half_levels", "areas", "recognised", "gaps", "confusion", "felt", "times")
+"""Tables that are also kept as files; those of `_IF_ANY` if there is any line."""
+_IF_ANY = ("recognised", "felt", "times")
 OURS = (*FILES, *PNG, "failure_stages", "gap_before_and_after", "prediction", "timing")
 """Names of our tables and figures, without endings; `difference_to_..` is ours too."""
 PAGE = "report.html"
@@ -134,11 +136,12 @@ def _written(folder: Path, rows: Sequence[Row], numbers: Summary, draw_own: Draw
         "confusion": confusion_table(confused),
         "recognised": recognition_table(recognised),
         "calibration": calibration_table(calibrations(rows)),
+        "felt": felt_table(felt(rows)),
         "effort": effort_table(efforts(rows)),
         "times": time_table(times),
         "work": work_table(workers),
     }
-    wanted = [name for name in FILES if tables[name].items or name not in ("recognised", "times")]
+    wanted = [name for name in FILES if tables[name].items or name not in _IF_ANY]
     kept = {name: tables[name].write(folder / TABLES / f"{name}.csv") for name in wanted}
     for name in wanted:
         tables[name].write(folder / TABLES / f"{name}.parquet")

@@ -2,6 +2,7 @@
 
 from apo_bench.statistics.contacts import GapSummary, Quantiles, Recognition, gaps, recognitions
 from apo_bench.statistics.effort import Effort, TrialTimes, Work, efforts, read_timing, trial_times, work
+from apo_bench.statistics.felt import FeltSummary, felt
 from apo_bench.statistics.forecasts import ALL, Calibration, Confusion, calibrations, confusions
 from apo_bench.statistics.over_seeds import (
     FEWEST_SEEDS,
@@ -60,6 +61,7 @@ __all__ = (
     "Confusion",
     "Contrast",
     "Effort",
+    "FeltSummary",
     "GapSummary",
     "Interval",
     "Paired",
@@ -79,6 +81,7 @@ __all__ = (
     "efforts",
     "evidence",
     "failures",
+    "felt",
     "gaps",
     "least_discordant",
     "level_label",

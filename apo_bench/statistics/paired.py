@@ -112,7 +112,7 @@ def holm(p: Mapping[K, float]) -> dict[K, float]:
 
 
 def place_of_reference(place: _Where, reference: str) -> _Where:
-    """What a cell, or a curve, is compared with: `none` asks for no relations, few methods for looks, few robots feel."""
+    """What a cell, or a curve, is compared with: `none` asks for no relations, few for looks, few robots feel."""
     other = place._replace(method=reference, looks=place.looks if may_look(reference) else 0)
     if not feels(reference):
         other = other._replace(wrench=TrialSettings.wrench, stated_error=TrialSettings.stated_error)

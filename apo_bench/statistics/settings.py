@@ -30,8 +30,8 @@ class Setting(NamedTuple):
     def holds(self, cell: Place) -> bool:
         """Whether a cell belongs here.
 
-        The oracle meets neither noise nor carelessness, plans without a corrector are not told any relations, few methods
-        can ask to look again, and few robots feel.
+        The oracle meets neither noise nor carelessness, plans without a corrector are not told any relations, few
+        methods can ask to look again, and few robots feel.
         """
         return (
             _site(cell) == _site(self)

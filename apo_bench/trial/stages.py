@@ -19,17 +19,7 @@ from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Noise
 from apo_bench.observation.observing import observe
 from apo_bench.prediction.failure import ARM_CODES, predict
-from apo_bench.records import (
-    NO_ROBOT_ERROR,
-    RANGE,
-    SETTINGS,
-    Predicted,
-    Salt,
-    TrialSettings,
-    robot_sigmas,
-    sentence,
-    told_error,
-)
+from apo_bench.records import NO_ROBOT_ERROR, RANGE, SETTINGS, Predicted, Salt, TrialSettings, robot_sigmas, sentence
 from apo_bench.scenario import Scenario, draw_layout, load_scenario
 from apo_bench.simulation.arm_checks.plan_check import arm_moves
 from apo_bench.simulation.execution.controller import replay
@@ -70,10 +60,11 @@ class Attempt:
 
 def stream(seed: int, which: int, salt: Salt | None = None) -> np.random.Generator:
     """The random numbers of one stage of one trial; nothing but seed, stage and salt is in the key."""
-    return np.random.default_rng(_key(seed, which, salt))
+    return np.random.default_rng(stream_key(seed, which, salt))
 
 
-def _key(seed: int, which: int, salt: Salt | None) -> tuple[int, ...]:
+def stream_key(seed: int, which: int, salt: Salt | None = None) -> tuple[int, ...]:
+    """What `numpy.random.default_rng` makes the random numbers of a stage of."""
     return (seed, which, *(salt.words(seed, which) if salt else ()))
 
 
@@ -202,15 +193,6 @@ def robot_error_of(name: str, scene: Scene, stream_of: Callable[[int], np.random
     slips = stream_of(IN_HAND).standard_normal((len(scene.scenario.assembly), 3))
     in_hand = np.array([pose.at((0.0, m * y, m * z), (deg * turn, 0.0, 0.0)) for y, z, turn in slips])
     return RobotError(hand_eye, joints, tool, in_hand)
-
-
-def robot_feels(robot_error: str, stated_error: str, wrench: str, seed: int, salt: Salt | None = None) -> Feels:
-    """How a robot feels in a trial: what it is told of its error, and its sensor with the noise of this trial.
-
-    Args:
-        robot_error, stated_error, wrench: As in a row.
-    """
-    return Feels(told_error(stated_error, robot_error), wrench, seed=_key(seed, WRENCH, salt))
 
 
 def replay_and_judge(

@@ -2,7 +2,7 @@
 
 from typing import Any, cast
 
-from apo_bench.assembly import Observation
+from apo_bench.assembly import Observation, Plan
 from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.correction.own_code.own import CorrectorLost
 from apo_bench.errors import InputError
@@ -10,11 +10,13 @@ from apo_bench.geometry import Array
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.observation.relations import make_relations, with_relations
-from apo_bench.records import RANGE, RECOGNISED, Row, TrialSettings, knows_relations, knows_truth, parsed
+from apo_bench.records import RANGE, RECOGNISED, Row, TrialSettings, knows_relations, knows_truth, parsed, told_error
 from apo_bench.records.run.validation import unwritable
+from apo_bench.simulation.execution.feel.feeling import Feels
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.by_heart import nominal_where_seen
+from apo_bench.trial.feeling import feels_of
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.outcome_columns import confidence_columns, method_columns, replay_columns
 from apo_bench.trial.planning import MethodResult, apply_method
@@ -23,6 +25,7 @@ from apo_bench.trial.recognised_contacts import count_contacts, with_recognised_
 from apo_bench.trial.row import head, lost, misbehaved, result
 from apo_bench.trial.stages import (
     RELATIONS,
+    WRENCH,
     SimulatedDemonstration,
     demonstration_failure,
     draw_robot_error,
@@ -31,10 +34,10 @@ from apo_bench.trial.stages import (
     predicted_outcome,
     range_sensor,
     replay_and_judge,
-    robot_feels,
     scene_of,
     simulate_demonstration,
     stream,
+    stream_key,
     trial_outcome,
 )
 
@@ -208,11 +211,16 @@ def _outcome(
     if promised < settings.abstain:
         return result(abstained(promised, settings.abstain), success=False) | method_columns(planned) | said
     error = draw_robot_error(settings.robot_error, scene, settings.seed, settings.salt)
-    how = (settings.robot_error, settings.stated_error, settings.wrench)
-    feels = robot_feels(*how, settings.seed, settings.salt) if by_touch else None
+    feels = _feels(settings, planned.plan, scene) if by_touch else None
     attempt = replay_and_judge(
         planned.plan, scene, reference, watch, settings.fidelity, cache, searches, error=error, feels=feels
     )
     end = result(trial_outcome(attempt), success=attempt.verdict.success)
     driven: Row = {"joint_control": scene.arm.control}
     return end | method_columns(planned) | said | driven | replay_columns(attempt, planned.plan, truth)
+
+
+def _feels(settings: TrialSettings, plan: Plan, scene: Scene) -> Feels:
+    """How the robot feels: it is told standard deviations, never what was drawn."""
+    told = told_error(settings.stated_error, settings.robot_error)
+    return feels_of(plan, scene, told, stream_key(settings.seed, WRENCH, settings.salt), settings.wrench)

@@ -46,3 +46,15 @@ def test_a_test_says_whether_it_passes(p: float, passes: bool, words: str, capsy
 def test_demonstrations_that_failed_are_counted(count: int, words: str, capsys: pytest.CaptureFixture[str]) -> None:
     print_cells(tally([row("contact", 9), *(row("contact", i, None) for i in range(count))]))
     assert words in capsys.readouterr().out
+
+
+def test_what_a_robot_felt_is_a_line_and_what_it_was_given_stands_with_the_trial(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    sizes = {"touches": 9, "touches_refused": 1, "felt_mm": 0.62, "felt_deg": 0.08}
+    sizes |= {"felt_sure_mm": 0.05, "felt_sure_deg": 0.01, "wrench": "cobot", "stated_error": "drawn"}
+    said = " ".join(told(capsys, True, **{**sizes, "method": "contact+feel"}).split())
+    assert "its base is off by 0.62 mm and 0.08 degrees (deviations 0.05 and 0.01): 9 touches, 1 more refused" in said
+    assert ", wrench cobot" in said
+    assert "stated error" not in said
+    assert "wrench" not in told(capsys, True, wrench="cobot", touches=None)

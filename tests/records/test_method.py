@@ -5,26 +5,30 @@ import pytest
 from apo_bench import InputError, SweepSettings, TrialSettings, load_scenario
 from apo_bench.assembly import LookingCorrector
 from apo_bench.names import resolve
-from apo_bench.records import CORRECTORS, knows_relations, knows_truth, may_look, parsed
+from apo_bench.records import CORRECTORS, feels, knows_relations, knows_truth, may_look, parsed
 from apo_bench.records.method import checked_method
 from apo_bench.statistics import rank
 from apo_bench.sweeps.grid import units
 
 
 @pytest.mark.parametrize(
-    ("name", "plan", "searches"),
+    ("name", "plan", "searches", "by_touch"),
     [
-        ("search", "none", True),
-        ("none+search", "none", True),
-        ("none", "none", False),
-        ("contact+search", "contact", True),
-        ("oracle+search", "oracle", True),
-        ("mine:correct+search", "mine:correct", True),
-        ("mine:search", "mine:search", False),
+        ("search", "none", True, False),
+        ("none+search", "none", True, False),
+        ("none", "none", False, False),
+        ("none+feel", "none", True, True),
+        ("contact+search", "contact", True, False),
+        ("contact+feel", "contact", True, True),
+        ("oracle+search", "oracle", True, False),
+        ("mine:correct+search", "mine:correct", True, False),
+        ("mine:correct+feel", "mine:correct", True, True),
+        ("mine:search", "mine:search", False, False),
+        ("mine:feel", "mine:feel", False, False),
     ],
 )
-def test_a_name_has_two_parts(name, plan, searches):
-    assert parsed(checked_method(name)) == (plan, searches)
+def test_a_name_has_a_plan_and_what_the_robot_does_besides(name, plan, searches, by_touch):
+    assert parsed(checked_method(name)) == (plan, searches, by_touch)
 
 
 @pytest.mark.parametrize(
@@ -33,6 +37,16 @@ def test_a_name_has_two_parts(name, plan, searches):
         ("search+search", "said once"),
         ("contact+search+search", "said once"),
         ("mine:correct+search+search", "said once"),
+        ("contact+feel+feel", "said once"),
+        (
+            "contact+search+feel",
+            "'contact.search.feel' was given; one of .search and .feel, which searches too, is said",
+        ),
+        ("contact+feel+search", "said once"),
+        ("search+feel", "said once"),
+        ("feel", "unknown method 'feel'"),
+        ("+feel", r"unknown method '\+feel'"),
+        ("foo+feel", "unknown method 'foo'"),
         ("foo+search", "unknown method 'foo'"),
         ("none+", r"unknown method 'none\+'; did you mean 'none'\?"),
         ("+search", r"unknown method '\+search'; did you mean 'search'\?"),
@@ -49,12 +63,29 @@ def test_a_wrong_name_is_refused(name, said):
 def test_one_method_has_one_name():
     assert TrialSettings("stick_in_tower", method="none+search").method == "search"
     assert SweepSettings(("stick_in_tower",), methods=("search", "none+search", "none")).methods == ("search", "none")
+    assert TrialSettings("stick_in_tower", method="none+feel").method == "none+feel"
 
 
 def test_what_a_method_meets_is_that_of_its_plan():
-    assert [knows_truth(m) for m in ("oracle+search", "search", "paper+search")] == [True, False, False]
-    assert [knows_relations(m) for m in ("oracle+search", "search", "paper+search")] == [False, False, True]
-    ranked = ["oracle", "none", "search", "contact", "contact+search", "paper", "paper-track", "snap", "snap+search"]
+    for robot in ("search", "feel"):
+        methods = (f"oracle+{robot}", f"none+{robot}", f"paper+{robot}")
+        assert [knows_truth(m) for m in methods] == [True, False, False]
+        assert [knows_relations(m) for m in methods] == [False, False, True]
+    assert [feels(m) for m in ("paper+feel", "paper+search", "paper")] == [True, False, False]
+    ranked = [
+        "oracle",
+        "oracle+feel",
+        "none",
+        "none+feel",
+        "search",
+        "contact",
+        "contact+feel",
+        "contact+search",
+        "paper",
+        "paper-track",
+        "snap",
+        "snap+search",
+    ]
     assert sorted(ranked, key=lambda m: (rank(m), m)) == ranked
 
 
@@ -67,6 +98,25 @@ def test_an_oracle_that_searches_runs_once_per_seed():
     assert asked.count(("oracle+search", 0.0, 0.0, "given")) == 1
     assert sorted(set(asked)) == sorted(asked)
     assert len(asked) == 5
+
+
+def test_what_a_robot_that_feels_is_given_is_nothing_to_others():
+    grid = SweepSettings(
+        ("stick_in_tower",),
+        (1.0,),
+        (1.0,),
+        methods=("oracle+feel", "oracle", "contact+feel", "contact"),
+        trials=1,
+        wrenches=("cobot", "external"),
+        stated_errors=("unstated", "tool:1.0"),
+    )
+    trials = [t for unit in units([grid], {"stick_in_tower": load_scenario("stick_in_tower")}) for t in unit.trials]
+    given = {(t.method, t.wrench, t.stated_error) for t in trials}
+    both = {(wrench, stated) for wrench in ("cobot", "external") for stated in ("unstated", "tool:1")}
+    assert len(trials) == len(given) == 10
+    for plan in ("oracle", "contact"):
+        assert {(wrench, stated) for method, wrench, stated in given if method == f"{plan}+feel"} == both
+        assert (plan, "external", "drawn") in given
 
 
 def test_methods_that_may_look_are_those_that_can_ask():

@@ -43,7 +43,8 @@ def run(**changed: Any) -> dict[str, Any]:
 
 
 def row(seed: int) -> dict[str, Any]:
-    key = ("block_on_block", 1.0, 1.0, 1.0, 0.25, "isotropic", "friction", "none", "given", "none", 0, 0.0, seed)
+    key = ("block_on_block", 1.0, 1.0, 1.0, 0.25, "isotropic", "friction", "none", "given", "none", 0)
+    key = (*key, "external", "drawn", 0.0, seed)
     ended = {"demonstration": "ok", **result(Outcome("done", "ok", None, "all was done"), success=True)}
     ended |= {"sim_seconds": 20.0, "extra_operations": 0}
     reached = {f"part {i}": [0.1 * seed] * 7 for i in range(7)}
@@ -296,8 +297,8 @@ def test_what_changed_is_said(changed: dict[str, Any], words: str, tmp_path: Pat
         ("run.json", '{"schema": "apo-bench/run/3"}', "it had 0 grids, now 1"),
         (
             "trials.jsonl",
-            json.dumps(row(1) | {"schema": "apo-bench/row/9"}) + "\n",
-            "a row of schema 'apo-bench/row/9' was given; apo-bench/row/7 and apo-bench/row/8 can be read",
+            json.dumps(row(1) | {"schema": "apo-bench/row/10"}) + "\n",
+            "'apo-bench/row/10' was given; apo-bench/row/7, apo-bench/row/8 and apo-bench/row/9 can be read",
         ),
         ("trials.jsonl", "{}\n", "line 1, field schema: it is missing"),
         ("trials.jsonl", "[1, 2]\n", "line 1: an object is needed, a list was given"),

@@ -19,6 +19,7 @@ from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.records import KEY, LEVEL, REQUIRED, ROW_FIELDS, SETTINGS, look_up, setting_columns, settings_of
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.report.comparison.compare import compare
+from apo_bench.statistics import tally
 from apo_bench.sweeps.sweep_file import SWEEP_KEYS
 
 ROOT = Path(__file__).parents[2]
@@ -33,7 +34,7 @@ def test_columns_of_a_row_are_the_settings_in_their_order_with_their_ranges() ->
         column = ROW_FIELDS[SETTINGS[name].column]
         if not SETTINGS[name].choices and name != "salt":
             assert column in (kind, kind | None)
-    assert {*KEY, *columns} - {*REQUIRED} == {"salt", "abstain"}
+    assert {*KEY, *columns} - {*REQUIRED} == {"salt", "wrench", "stated_error", "abstain"}
 
 
 def test_sweeps_have_an_axis_or_one_value_of_every_setting() -> None:
@@ -55,7 +56,8 @@ def test_every_setting_is_an_option_of_replay_and_sweep() -> None:
 def test_the_environment_has_the_same_defaults() -> None:
     defaults = {name: parameter.default for name, parameter in signature(APOReplay).parameters.items()}
     here = [name for name in SETTINGS if defaults.get(name) is not None and name != "scenario"]
-    assert here == ["careless", "eye", "grasp", "arm", "robot_error", "looks", "abstain", "timestep_s"]
+    robot = ["robot_error", "looks", "wrench", "stated_error", "abstain"]
+    assert here == ["careless", "eye", "grasp", "arm", *robot, "timestep_s"]
     assert [defaults[name] for name in here] == [SETTINGS[name].default for name in here]
     assert defaults["level"] == TrialSettings.level_mm == TrialSettings.level_deg
 
@@ -74,6 +76,8 @@ def test_settings_of_a_row_are_those_that_it_was_made_with() -> None:
             {"looks": 1, "method": "m:f"},
             "a number of looks of 1 was given with the method 'm:f', which runs in a process",
         ),
+        ({"wrench": "externall"}, "unknown wrench sensor 'externall'; did you mean 'external'?"),
+        ({"stated_error": "drawnn"}, "unknown stated error 'drawnn'; did you mean 'drawn'?"),
         ({"seed": 1.5}, "a seed of 1.5 was given; whole numbers from 0 to"),
         ({"careless": "much"}, "a carelessness of 'much' was given; a number from 0 to 10 is allowed"),
         (
@@ -109,6 +113,24 @@ def test_a_folder_that_was_kept_is_reported_and_compared(tmp_path: Path) -> None
     assert cli.main(["report", str(folder), "--pictures", "0"]) == 0
     found = compare(KEPT, folder)
     assert (found.shared, len(found.changed), found.identical) == (24, 0, 24)
+
+
+def test_rows_of_the_schema_before_are_read_as_those_of_robots_that_do_not_feel() -> None:
+    """`tests/kept/row8`: 2 methods, 2 seeds, a robot error, `abstain`."""
+    folder = KEPT.with_name("row8")
+    rows = read_rows(folder)
+    lines = (folder / "trials.jsonl").read_text(encoding="utf-8").splitlines()
+    assert (len(rows), {row["schema"] for row in rows}) == (4, {"apo-bench/row/8"})
+    felt = ("touches", "touches_refused", "felt_mm", "felt_deg", "felt_sure_mm", "felt_sure_deg")
+    for row, line in zip(rows, lines, strict=True):
+        before = json.loads(line)
+        assert json.dumps({column: value for column, value in row.items() if column in before}) == line
+        assert {column: value for column, value in row.items() if column not in before} == {
+            "wrench": "external",
+            "stated_error": "drawn",
+            **dict.fromkeys(felt),
+        }
+    assert {cell.abstain for cell in tally(rows)} == {0.5}
 
 
 def test_every_setting_and_column_has_a_sentence_on_a_page(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -24,6 +24,7 @@ _SECTIONS = {
     "pictures": "Some failures",
     "gaps": "Gap before and after correction",
     "prediction": "Prediction and physics",
+    "felt": "What robots felt about themselves",
     "effort": "What it takes",
     "calibration": "Calibration",
     "recognised": "Recognised contacts",

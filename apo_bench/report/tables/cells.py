@@ -1,5 +1,5 @@
 """Tables with one line per cell: success rates with their intervals, pairs of methods over the same seeds, gaps of the
-contacts as seen and as planned."""
+contacts as seen and as planned, what robots felt about themselves."""
 
 from collections.abc import Callable, Sequence
 
@@ -13,7 +13,18 @@ from apo_bench.report.tables.table import (
     place_columns,
     rate_columns,
 )
-from apo_bench.statistics import Cell, GapSummary, Paired, failures, percent, percents, points, share, signed
+from apo_bench.statistics import (
+    Cell,
+    FeltSummary,
+    GapSummary,
+    Paired,
+    failures,
+    percent,
+    percents,
+    points,
+    share,
+    signed,
+)
 
 
 def cell_table(cells: Sequence[Cell]) -> Table:
@@ -167,5 +178,38 @@ def gap_table(gaps: Sequence[GapSummary]) -> Table:
             "The largest distance of any face from the one it should touch, as it was seen and as the method planned "
             "it: medians, and in the drawing bands from the 5th to the 95th percentile of the trials. What is below "
             "0.001 mm is drawn there. `none` plans what was seen."
+        ),
+    )
+
+
+def felt_table(summaries: Sequence[FeltSummary]) -> Table:
+    """One line per cell of a robot that feels."""
+
+    def size(name: str, head: str, of: Callable[[FeltSummary], float | None]) -> Column:
+        return Column(name, head, of, lambda s: None if (x := of(s)) is None else f"{x:.2f}")
+
+    return Table(
+        summaries,
+        (
+            *place_columns(),
+            Column("", "level", text=level_text),
+            Column("trials", "n"),
+            Column("touches", "touches", text=lambda s: f"{s.touches:.1f}"),
+            Column("refused", "refused"),
+            size("drawn_mm", "drawn with [mm]", lambda s: s.drawn[0]),
+            size("stated_mm", "stated [mm]", lambda s: s.told and s.told[0]),
+            size("felt_mm", "felt [mm]", lambda s: s.felt_mm),
+            size("sure_mm", "sure to [mm]", lambda s: s.sure_mm),
+            size("drawn_deg", "drawn with [deg]", lambda s: s.drawn[1]),
+            size("stated_deg", "stated [deg]", lambda s: s.told and s.told[1]),
+            size("felt_deg", "felt [deg]", lambda s: s.felt_deg),
+            size("sure_deg", "sure to [deg]", lambda s: s.sure_deg),
+        ),
+        "No robot felt.",
+        (
+            "How far the base of a robot that feels (`+feel`) is off at the middle of the goals: by what its error was "
+            "drawn with, by what it was told, as it felt in the end, and how far that may be wrong, as it says itself. "
+            "All are root mean squares of vectors: the square root of three times a standard deviation per axis. "
+            "*Refused* are touches that contradicted the others, of all trials together."
         ),
     )

@@ -1,0 +1,64 @@
+"""An environment whose robot feels is the trial of a method with `+feel`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from apo_bench import TrialSettings
+from apo_bench.envs import apo_replay
+from apo_bench.envs.apo_replay import APOReplay
+from apo_bench.envs.corrected import Corrected
+from apo_bench.errors import InputError
+from apo_bench.trial import trial
+
+SCENARIO = "block_on_block"
+
+
+def test_a_robot_that_feels_is_given_what_the_trial_gives(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = []
+
+    def noted(*plain, feels=None, searches=False, **named):  # type: ignore[no-untyped-def]
+        given.append((feels, searches or plain[-1] is True))
+        raise InterruptedError
+
+    for where in (apo_replay, trial):
+        monkeypatch.setattr(where, "replay_and_judge", noted)
+    settings = {"robot_error": "hand_eye:0.5/0.1", "wrench": "0.5", "stated_error": "hand_eye:1/0.2+tool:0.3"}
+    env = Corrected(APOReplay(SCENARIO, feels=True, **settings))
+    env.reset(seed=4)
+    with pytest.raises(InterruptedError):
+        env.step(np.zeros(env.action_space.shape))
+    with pytest.raises(InterruptedError):
+        trial.run_trial(TrialSettings(SCENARIO, seed=4, method="contact-robust+feel", **settings))
+    (ours, searches), (theirs, also_searches) = given
+    assert searches
+    assert also_searches
+    assert (ours.wrench, ours.seed, ours.acts) == (theirs.wrench, theirs.seed, theirs.acts)
+    assert ours.wrench == "0.5/0.025"
+    np.testing.assert_array_equal(ours.slip, theirs.slip)
+    for name in ("mean", "sigmas", "middle"):
+        np.testing.assert_array_equal(getattr(ours.belief, name), getattr(theirs.belief, name))
+
+
+def test_by_default_no_robot_feels(monkeypatch: pytest.MonkeyPatch) -> None:
+    given = []
+
+    def noted(*plain, **named):  # type: ignore[no-untyped-def]
+        given.append((named["feels"], named["searches"]))
+        raise InterruptedError
+
+    monkeypatch.setattr(apo_replay, "replay_and_judge", noted)
+    env = APOReplay(SCENARIO, wrench="cobot", stated_error="unstated")
+    env.reset(seed=4)
+    with pytest.raises(InterruptedError):
+        env.step(np.zeros(env.action_space.shape, dtype=np.float32))
+    assert given == [(None, False)]
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"), [("wrench", "unknown wrench sensor"), ("stated_error", "unknown stated error")]
+)
+def test_a_wrong_name_is_one_sentence(wrong: str, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        APOReplay(SCENARIO, **{wrong: "glue"})  # type: ignore[arg-type]
