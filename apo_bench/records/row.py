@@ -238,7 +238,7 @@ class Row(TypedDict, total=False):
     felt_deg: _Size | None
     """The same as an angle [deg]."""
     felt_sure_mm: _Size | None
-    """Standard deviation of that, root mean square of three axes [mm]."""
+    """How far that may be wrong, as the robot says itself: root mean square, as a vector [mm]."""
     felt_sure_deg: _Size | None
     """The same of the angle [deg]."""
     sim_seconds: _Size | None
