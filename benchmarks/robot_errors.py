@@ -10,6 +10,7 @@ import argparse
 import sys
 from collections.abc import Iterable, Sequence
 from pathlib import Path
+from statistics import median
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
@@ -22,14 +23,25 @@ PAGE = Path(__file__).parents[1] / "docs" / "results" / "robot-errors.md"
 SAID = """\
 # Errors of the robot
 
-Written by `python benchmarks/robot_errors.py` from a sweep of `benchmarks/robot_errors.toml`. Success: the finished
-assembly is right; the same seeds in every cell, a careful human, clearance of 0.25 mm per side, and for `contact` a
-noise of 1 mm and 1 degree. A [robot error](../guide/arm.md#what-is-wrong-with-the-robot-itself) is drawn anew for every
-trial; the numbers are standard deviations in mm and degrees. The last column has a 95 % interval (Wilson).
+Written by `python benchmarks/robot_errors.py` from sweeps of `benchmarks/robot_errors.toml` and of parts of it. Success:
+the finished assembly is right; the same seeds in every cell, a careful human, clearance of 0.25 mm per side, and for
+`contact` and `none` a noise of 1 mm and 1 degree. A [robot
+error](../guide/arm.md#what-is-wrong-with-the-robot-itself) is drawn anew for every trial; the numbers are standard
+deviations in mm and degrees. Percentages are over all scenarios, with a 95 % interval (Wilson).
+
+## Over all scenarios
+"""
+EACH = """
+## Each scenario
+"""
+COST = """
+## What feeling costs
+
+Simulated seconds of a trial, at the median, over all errors.
 """
 TAUGHT = """
-Contacts repair the eye's error: without a robot error `contact` does at 1 mm and 1 degree what `oracle` does with the
-truth. They do not repair the robot's own: with one, `oracle`, which knows the truth, fails as often as `contact`.
+Contacts repair the eye's error, not the robot's own: with one, `oracle`, which knows the truth, fails. A robot that
+[feels](../how/feel.md) makes contacts by itself and corrects itself by them.
 """
 
 
@@ -43,31 +55,55 @@ def main() -> None:
 
 
 def page(rows: Iterable[Row]) -> str:
+    rows = list(rows)
     cells = [cell for cell in tally(rows) if cell.trials]
     scenarios = sorted({cell.scenario for cell in cells})
     methods = list(dict.fromkeys(cell.method for cell in cells))
-    errors = list(dict.fromkeys(cell.robot_error for cell in cells))
-    errors.sort(key=_by_size)
+    errors = sorted(dict.fromkeys(cell.robot_error for cell in cells), key=_by_size)
+    pooled = [[_pooled(c for c in cells if (c.robot_error, c.method) == (e, m)) for m in methods] for e in errors]
     columns = [(method, scenario) for method in methods for scenario in scenarios]
+    of = {(c.robot_error, c.method, c.scenario): f"{c.successes} of {c.trials}" for c in cells}
+    each = [[of.get((error, *at), "") for at in columns] for error in errors]
     heads = [f"`{method}`, {scenario}" for method, scenario in columns]
-    lines = [f"| robot error | {' | '.join(heads)} | both, `{methods[0]}` |", f"|---|{'---|' * (len(heads) + 1)}"]
-    lines += [_line(error, columns, methods[0], [c for c in cells if c.robot_error == error]) for error in errors]
-    return SAID + "\n" + "\n".join(lines) + "\n" + TAUGHT
+    cost = [
+        [_median(r["sim_seconds"] for r in rows if (r["method"], r["scenario"]) == (m, s)) for s in scenarios]
+        for m in methods
+    ]
+    return (
+        SAID
+        + _table("robot error", [f"`{m}`" for m in methods], errors, pooled)
+        + EACH
+        + _table("robot error", heads, errors, each)
+        + COST
+        + _table("method", scenarios, methods, cost)
+        + TAUGHT
+    )
 
 
-def _by_size(error: str) -> tuple[bool, str, float]:
-    kind, _, size = error.partition(":")
-    return kind != "none", kind, float(size.split("/")[0] or 0.0) if size else 0.0
+def _table(first: str, heads: Sequence[str], names: Sequence[str], cells: Sequence[Sequence[str]]) -> str:
+    lines = [f"| {first} | {' | '.join(heads)} |", f"|---|{'---|' * len(heads)}"]
+    lines += [f"| `{name}` | {' | '.join(said)} |" for name, said in zip(names, cells, strict=True)]
+    return "\n" + "\n".join(lines) + "\n"
 
 
-def _line(error: str, columns: Sequence[tuple[str, str]], first: str, cells: Sequence[Cell]) -> str:
-    of = {(cell.method, cell.scenario): cell for cell in cells}
-    said = [f"{of[at].successes} of {of[at].trials}" if at in of else "" for at in columns]
-    own = [cell for cell in cells if cell.method == first]
-    trials = sum(cell.trials for cell in own)
-    won = sum(cell.successes for cell in own)
+def _pooled(cells: Iterable[Cell]) -> str:
+    those = list(cells)
+    trials = sum(cell.trials for cell in those)
+    if not trials:
+        return ""
+    won = sum(cell.successes for cell in those)
     low, high = wilson(won, trials)
-    return f"| `{error}` | {' | '.join(said)} | {100 * won / trials:.0f} % ({100 * low:.0f} to {100 * high:.0f}) |"
+    return f"{won} of {trials}, {100 * won / trials:.0f} % ({100 * low:.0f} to {100 * high:.0f})"
+
+
+def _median(seconds: Iterable[float | None]) -> str:
+    known = [s for s in seconds if s is not None]
+    return f"{median(known):.0f}" if known else ""
+
+
+def _by_size(error: str) -> tuple[bool, bool, str, float]:
+    kind, _, size = error.partition("+")[0].partition(":")
+    return kind != "none", "+" in error, kind, float(size.split("/")[0] or 0.0) if size else 0.0
 
 
 if __name__ == "__main__":
