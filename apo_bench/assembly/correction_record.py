@@ -85,7 +85,7 @@ class Hypothesis:
     """One explanation of what was seen: what of it is believed, how likely that is, and the goals that follow."""
 
     weight: float
-    """Probability beside the other hypotheses of the same correction; all of them add up to 1."""
+    """Probability; what all those of a correction leave to 1 is that of none of them."""
     goals: Array
     """(n, 4, 4), world frame, [m]."""
     covariance: Array | None

@@ -25,7 +25,14 @@ from apo_bench.correction.robust.hypotheses import (
     believed_observation,
     hypothesis,
 )
-from apo_bench.correction.robust.nearby import changed, continued, displaced_together, likely_beliefs, swaps
+from apo_bench.correction.robust.nearby import (
+    changed,
+    continued,
+    displaced_together,
+    false_together,
+    likely_beliefs,
+    swaps,
+)
 from apo_bench.correction.robust.views import beliefs
 from apo_bench.geometry import Array
 
@@ -183,6 +190,8 @@ class Search:
             dearer = (size + 1) * gross > self._case.model.relation_surprise
             if held and (dearer or not all(solved.dropped for solved in held)):
                 return min(held, key=_badness)
+        if all(solved.p_value < self._level for solved in tried):
+            self._solve((states, ()) for states in false_together(self._case, start))
         return min(self._known(), key=_badness, default=None)
 
     def _sets(self, start: States) -> Iterator[list[States]]:
