@@ -85,7 +85,7 @@ class Hypothesis:
     """One explanation of what was seen: what of it is believed, how likely that is, and the goals that follow."""
 
     weight: float
-    """Probability beside the other hypotheses of the same correction; all of them add up to 1."""
+    """Probability; what all those of a correction leave to 1 is that of none of them."""
     goals: Array
     """(n, 4, 4), world frame, [m]."""
     covariance: Array | None
@@ -136,7 +136,8 @@ class Correction:
     """The test without the contacts that were left out; None if none was."""
     covariance: Array | None = None
     """(n, 6, 6), of the body twist by which each corrected goal may still be wrong, [m, rad]; None if unknown.
-    Contacts that are walls are not counted, so with walls it is an upper bound."""
+    Contacts that are walls are not counted, so with walls it is an upper bound. Where there are hypotheses, that of the
+    first and of those whose goals are nearly the same; the others lead elsewhere."""
     dropped: tuple[str, ...] = ()
     """Relations that were left out, since the test named them, or single contacts: `R3: stick.py on castle1.spy`."""
     left_out: tuple[int, ...] = ()

@@ -15,21 +15,42 @@ from apo_bench.geometry import Array, pose, right_jacobian
 def contains_truth(observation: Observation, correction: Correction, truth: Array, level: float = 0.95) -> bool | None:
     """Whether the truth, (n, 4, 4), lies in the `level` region of the posterior, of a correction that has one.
 
-    The region is taken in the tangent space of the contact manifold at the corrected goals: the squared length of the
-    deviation there, in standard deviations, is chi-square distributed with as many degrees of freedom as are left.
+    Of a correction with hypotheses it is the union of regions of the likeliest of them: of so many that one of them is
+    right with the root of `level`, and with the root of `level` each contains the truth if it is right. Elsewhere it is
+    the one region of the correction.
 
     Returns:
         None if the correction states no posterior, did not converge, or nothing is free.
     """
-    from scipy.special import chdtri
-
     if correction.covariance is None or not correction.ok:
         return None
-    observation = lowered_observation(correction.believed or observation)
+    if not correction.hypotheses:
+        return _contains(correction.believed or observation, correction.goals, correction.dropped, truth, level)
+    each = np.sqrt(level)
+    known = list[bool]()
+    weight = 0.0
+    for one in correction.hypotheses:
+        inside = _contains(one.believed, one.goals, one.dropped, truth, each)
+        known += [] if inside is None else [inside]
+        weight += one.weight
+        if weight >= each:
+            break
+    return any(known) if known else None
+
+
+def _contains(believed: Observation, goals: Array, dropped: tuple[str, ...], truth: Array, level: float) -> bool | None:
+    """The same of the goals that what is believed leads to.
+
+    The region is taken in the tangent space of the contact manifold at the corrected goals: the squared length of the
+    deviation there, in standard deviations, is chi-square distributed with as many degrees of freedom as are left.
+    """
+    from scipy.special import chdtri
+
+    observation = lowered_observation(believed)
     L = noise_factor(observation)
-    xi = pose.log(pose.inverse(observation.goals) @ correction.goals)
-    system = seen_system(observation).among(_equal(observation, correction.dropped))
-    known = freedom_of(linearised_by(system, correction.goals, right_jacobian(xi) @ L)[1])
+    xi = pose.log(pose.inverse(observation.goals) @ goals)
+    system = seen_system(observation).among(_equal(observation, dropped))
+    known = freedom_of(linearised_by(system, goals, right_jacobian(xi) @ L)[1])
     if known is None or not known.free.shape[1]:
         return None
     free = known.free

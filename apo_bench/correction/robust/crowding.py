@@ -39,23 +39,33 @@ class Crowding(NamedTuple):
     """How much of the smaller face contacts leave bare, all together."""
 
 
-def crowding(observation: Observation, goals: Array) -> Crowding:
-    """How much parts are in each other's way, or beside each other, if the goals, (n, 4, 4), are reached exactly."""
+def crowding(observation: Observation, goals: Array, best: Crowding | None = None) -> Crowding | None:
+    """How much parts are in each other's way, or beside each other, if the goals, (n, 4, 4), are reached exactly.
+
+    Returns:
+        None if that is worse than `best`, as soon as that is known.
+    """
     assembly = observation.assembly
-    depth = 0.0
-    bare = 0.0
+    at = placements(assembly, observation.start, goals)
     missed = 0
-    for operation, at in zip(assembly.operations, placements(assembly, observation.start, goals), strict=True):
+    bare = 0.0
+    for operation, poses in zip(assembly.operations, at, strict=True):
+        for m, e in dict.fromkeys(map(assembly.given, operation.contacts)):
+            covered = _covered(assembly.face_of(m), poses[m.part], assembly.face_of(e), poses[e.part])
+            bare = bare + 1.0 - covered
+            missed = missed + (covered < _COVERED)
+            if best is not None and missed > best.missed:
+                return None
+    depth = 0.0
+    for operation, poses in zip(assembly.operations, at, strict=True):
         touching = {frozenset((m.part, e.part)) for m, e in operation.contacts}
         for part in operation.moves:
             for other in assembly.solids:
                 if other not in operation.moves and frozenset((part, other)) not in touching:
-                    deep = intrusion(assembly.solids[part], at[part], assembly.solids[other], at[other])
+                    deep = intrusion(assembly.solids[part], poses[part], assembly.solids[other], poses[other])
                     depth += deep if deep > _DEEP_M else 0.0
-        for m, e in dict.fromkeys(map(assembly.given, operation.contacts)):
-            covered = _covered(assembly.face_of(m), at[m.part], assembly.face_of(e), at[e.part])
-            bare = bare + 1.0 - covered
-            missed = missed + (covered < _COVERED)
+        if best is not None and (missed, depth) > best[:2]:
+            return None
     return Crowding(missed, depth, bare)
 
 
@@ -108,6 +118,7 @@ def least_crowded(
         None if the given goals are as good as any that were tried, or nothing is wrong with them.
     """
     best = crowding(observation, goals)
+    assert best is not None
     roomiest = None
     for k in doubted:
         if best.missed == 0 and best.depth == 0.0:
@@ -117,7 +128,8 @@ def least_crowded(
             moved = np.array(base)
             moved[k] = T
             consistent = solve(moved)
-            if consistent is not None and (now := crowding(observation, consistent)) < best:
+            now = None if consistent is None else crowding(observation, consistent, best)
+            if now is not None and now < best:
                 best = now
                 roomiest = consistent
     return roomiest

@@ -8,11 +8,12 @@ relation may be wrong in place of an observation: its faces are then anywhere.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from apo_bench.assembly import Consistency, Correction, Observation, OutlierModel, SharedError, looking_away
 from apo_bench.assembly.pattern import pattern
@@ -26,6 +27,7 @@ from apo_bench.correction.robust.beliefs import (
     INLIER,
     ROOM,
     VIEW,
+    State,
     States,
     says_nothing,
     together,
@@ -38,7 +40,7 @@ from apo_bench.correction.robust.noise_scale import (
     scale_surprise,
     scaled_test,
 )
-from apo_bench.correction.robust.views import Sightings, exchanged_view, merged
+from apo_bench.correction.robust.views import Merged, Sightings, exchanged_with, merged
 from apo_bench.correction.solvers.compact import linearised_by
 from apo_bench.correction.solvers.posterior import jacobian_rank
 from apo_bench.correction.solvers.whitened import noise_factor
@@ -63,6 +65,15 @@ class Case:
     """The first look: assembly, start poses and play are those of all."""
     views: Sightings
     model: OutlierModel
+    _merged: dict[tuple[int, State, int | None], Merged] = field(default_factory=dict, init=False, repr=False)
+
+    def merged(self, k: int, state: State, exchanged: int | None = None) -> Merged:
+        """`views.merged` of operation k, each asked once; `exchanged` is the operation whose view belongs to it."""
+        key = k, state, exchanged
+        if key not in self._merged:
+            other = None if exchanged is None else self.views[exchanged][0]
+            self._merged[key] = merged(self.views[k], state, self.model, other)
+        return self._merged[key]
 
 
 @final
@@ -115,22 +126,14 @@ class SolvedHypothesis:
         xi = pose.log(pose.inverse(observation.goals) @ correction.goals)
         L = noise_factor(replace(observation, covariance=wide))
         _, Jt = linearised_by(system, correction.goals, right_jacobian(xi) @ L)
-        soft = soft_deviation(observation)
-        false = np.zeros(Jt.shape[1])
-        if self.dropped:
-            # Faces of a wrong relation are anywhere: its equations deviate by their distance, not by what play leaves.
-            wrong = np.repeat(~observation.assembly.without(self.dropped), 3)
-            each = np.repeat(np.sqrt(np.diff(pattern(observation.assembly).begin)), 3) * _WRONG_M
-            soft = np.where(wrong, each, soft)
-            false = np.where(wrong, system.residual(correction.goals) / each, 0.0)
+        wrong, soft = softened(observation, self.dropped)
+        false = np.where(wrong, system.residual(correction.goals) / soft, 0.0) if self.dropped else np.zeros(len(soft))
         S = Jt.T @ Jt + np.diag(soft * soft)
         unlikely = correction.test.chi_square / self.scale**2 + false @ false + np.linalg.slogdet(S)[1]
-        model = self.case.model
-        states = zip(self.case.views, self.states, strict=True)
-        surprise = sum(merged(views, state, model).surprise for views, state in states) + together(self.states, model)
+        surprise = prior_surprise(self.case, self.states, self.dropped)
         if self.scale > 1.0:
             surprise += scale_surprise(self.scale, correction.test.freedom)
-        return float(unlikely + surprise + len(self.dropped) * model.relation_surprise)
+        return float(unlikely + surprise)
 
     def noisier(self) -> SolvedHypothesis:
         """The same if all noise is larger than stated, by as much as is likeliest: the goals stay."""
@@ -157,11 +160,19 @@ class SolvedHypothesis:
 
     def at(self, goals: Array, unknown: Sequence[int]) -> SolvedHypothesis:
         """The same with the inferred goals of some operations elsewhere, at these of goals (n, 4, 4)."""
-        there = np.array(self.observation.goals)
-        there[list(unknown)] = goals[list(unknown)]
-        moved = replace(self.observation, goals=there)
+        moved = self._moved(goals, unknown)
         correction = tested(moved, _corrected(moved, self.dropped), self.left_out)
         return replace(self, observation=moved, correction=correction)
+
+    def goals_at(self, goals: Array, unknown: Sequence[int]) -> Array | None:
+        """Its goals, (n, 4, 4), alone; None where there are none, or faces of contacts look away from each other."""
+        correction = _corrected(self._moved(goals, unknown), self.dropped)
+        return correction.goals if correction.ok and self.stands_at(correction.goals) else None
+
+    def _moved(self, goals: Array, unknown: Sequence[int]) -> Observation:
+        there = np.array(self.observation.goals)
+        there[list(unknown)] = goals[list(unknown)]
+        return replace(self.observation, goals=there)
 
     def stands_at(self, goals: Array) -> bool:
         """Whether the faces of every contact that is believed look at each other at the goals, (n, 4, 4)."""
@@ -189,9 +200,35 @@ def unbelieved(states: States) -> tuple[int, ...]:
     return tuple(k for k, state in enumerate(states) if all(map(says_nothing, state)))
 
 
-def hypothesis(case: Case, states: States, dropped: tuple[str, ...] = ()) -> SolvedHypothesis:
-    """Solve for the goals that are most likely with these states, and without these relations."""
-    believed = believed_observation(case, states)
+def prior_surprise(case: Case, states: States, dropped: tuple[str, ...]) -> float:
+    """-2 log of how likely states are, and the views in them, whatever contacts say; beside all as stated."""
+    each = sum(case.merged(k, state).surprise for k, state in enumerate(states))
+    return each + together(states, case.model) + len(dropped) * case.model.relation_surprise
+
+
+def softened(observation: Observation, dropped: tuple[str, ...]) -> tuple[NDArray[np.bool_], Array]:
+    """Which equations are those of wrong relations, (3 c,), and how far each may be from nominal, (3 c,), [m].
+
+    Faces of a wrong relation are anywhere: its equations deviate by their distance, not by what play leaves.
+    """
+    soft = soft_deviation(observation)
+    if not dropped:
+        return np.zeros(len(soft), dtype=np.bool_), soft
+    wrong = np.repeat(~observation.assembly.without(dropped), 3)
+    each = np.repeat(np.sqrt(np.diff(pattern(observation.assembly).begin)), 3) * _WRONG_M
+    return wrong, np.where(wrong, each, soft)
+
+
+def hypothesis(
+    case: Case, states: States, dropped: tuple[str, ...] = (), believed: Observation | None = None
+) -> SolvedHypothesis:
+    """Solve for the goals that are most likely with these states, and without these relations.
+
+    Args:
+        believed: The `believed_observation` of the states, if it is at hand.
+    """
+    if believed is None:
+        believed = believed_observation(case, states)
     trusted = all(state and set(state) == {INLIER} for state in states) and not dropped
     correction = as_stated(believed) if trusted else _corrected(believed, dropped)
     return SolvedHypothesis(case, states, dropped, believed, tested(believed, correction, unbelieved(states)))
@@ -234,8 +271,8 @@ def believed_observation(case: Case, states: States) -> Observation:
     goals = np.array(first.goals)
     covariance = np.array(first.covariance)
     unknown = list[int]()
-    for k, (views, state) in enumerate(zip(case.views, states, strict=True)):
-        every = merged(views, state, case.model, exchanged_view(case.views, state))
+    for k, state in enumerate(states):
+        every = case.merged(k, state, exchanged_with(state))
         if every.goal is None:
             unknown.append(k)
             covariance[k] = UNKNOWN

@@ -1,6 +1,7 @@
 """Hypotheses that differ from one by what is believed of an operation, of two that are exchanged, of some in a row."""
 
 from collections.abc import Iterator, Sequence
+from itertools import combinations
 
 import numpy as np
 
@@ -115,3 +116,17 @@ def displaced_together(states: States) -> Iterator[States]:
     if len(displaced) > 2:
         for k in (displaced[0], displaced[-1]):
             yield changed(states, (k,), ((INLIER,),))
+
+
+def false_together(case: Case, start: States) -> Iterator[States]:
+    """All operations seen anywhere, any two exchanged, any row displaced: where no set without the rest agrees."""
+    seen = [k for k, state in enumerate(start) if state]
+    yield changed(start, seen, [(GROSS,) * len(start[k]) for k in seen])
+    for k in seen:
+        for i in case.views[k][0].others:
+            if i > k and start[i]:
+                yield changed(start, (k, i), ((swapped_with(i), *start[k][1:]), (swapped_with(k), *start[i][1:])))
+    for row in combinations(range(len(start)), 2):
+        between = range(row[0], row[1] + 1)
+        if all(len(start[k]) == 1 for k in between):
+            yield changed(start, between, [(DISPLACED,)] * len(between))

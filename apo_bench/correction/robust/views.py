@@ -112,9 +112,14 @@ def merged(views: Sequence[Sighting], state: State, model: OutlierModel, exchang
     return Merged(goal, covariance, unlikely + length + apart)
 
 
+def exchanged_with(state: State) -> int | None:
+    """The operation whose first view belongs to one in this state in place of its own."""
+    return next((swapped_with(belief) for belief in state if belief < 0), None)
+
+
 def exchanged_view(views: Sightings, state: State) -> Sighting | None:
-    """The view that belongs to an operation in place of its own."""
-    other = next((swapped_with(belief) for belief in state if belief < 0), None)
+    """That view."""
+    other = exchanged_with(state)
     return None if other is None else views[other][0]
 
 

@@ -42,7 +42,7 @@ def test_every_corrector_has_a_name_and_refuses_what_was_not_seen(name: str) -> 
     assert isinstance(correct(given, name), Correction)
     blind = replace(given, seen=np.array([True, True, False]))
     if name == "contact-robust":
-        assert correct(blind, name).sentence.endswith("left out what was seen of operation 3")
+        assert correct(blind, name).sentence.endswith("not seen: operation 3")
     else:
         assert correct(blind, name).sentence == "operation 3 was not seen"
 

@@ -31,6 +31,7 @@ from apo_bench.observation.models.failures import Flipped
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.observing import observe
 from apo_bench.observation.relations import make_relations, with_relations
+from apo_bench.trial.pose_error import goal_errors
 from tests.correction.robust.test_looks import Again, at_the_same_place
 from tests.correction.robust.test_robust import astray, fixed_error_mm, look, shown
 
@@ -218,3 +219,17 @@ def test_a_hypothesis_at_which_the_solver_finds_no_number_is_none():
     found = correct(wrong)
     assert found.ok
     assert found.dropped
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_all_operations_may_be_false_together(seed):
+    """Bracket and shaft are seen in each other's place: no set that leaves one of them believed agrees."""
+    scenario = load_scenario("shaft_through_brackets")
+    layout = draw_layout(scenario, np.random.default_rng(seed), 0.0)
+    nothing = np.zeros((2, 6, 6))
+    truth = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, nothing)
+    observation = observe(truth, make_noise("isotropic", Level(1.0, 1.0)), np.random.default_rng(seed))
+    found = correct(replace(observation, goals=observation.goals[::-1]), "contact-robust")
+    assert found.ok
+    assert found.sentence.endswith("seen in each other's place: operation 1, 2")
+    assert goal_errors(scenario.assembly, layout.start, layout.goals, found.goals)[0] < 0.01

@@ -1,0 +1,95 @@
+"""What contacts say of a hypothesis that is not solved: they are linearised once, at what is believed."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly import Observation
+from apo_bench.assembly.pattern import pattern
+from apo_bench.correction.checks.consistency import p_value
+from apo_bench.correction.contact.problem import seen_system
+from apo_bench.correction.robust.beliefs import ROOM, States
+from apo_bench.correction.robust.hypotheses import (
+    Case,
+    believed_observation,
+    prior_surprise,
+    soft_deviation,
+    softened,
+    unbelieved,
+)
+from apo_bench.correction.solvers.compact import linearised_by
+from apo_bench.correction.solvers.posterior import jacobian_rank
+from apo_bench.correction.solvers.whitened import noise_factor
+
+_LEVER_M = 0.1
+"""What is turned by an angle is off by its square times about this, beyond what is linear, [m]."""
+
+
+def expected_badness(case: Case, states: States, dropped: tuple[str, ...], believed: Observation) -> float:
+    """About what `SolvedHypothesis.badness` will be, if there is a solution.
+
+    Args:
+        believed: The `believed_observation` of the states.
+    """
+    left_out = unbelieved(states)
+    wide = np.array(believed.covariance)
+    wide[list(left_out)] = ROOM
+    L = noise_factor(replace(believed, covariance=wide))
+    e, Jt = linearised_by(seen_system(believed), believed.goals, L)
+    _, soft = softened(believed, dropped)
+    # -2 log of the density of e, Gaussian with covariance S = J J^t + soft^2; what is not linear is no contradiction.
+    S = Jt.T @ Jt + np.diag(soft * soft)
+    beyond = _beyond_linear(believed, left_out)
+    square = e @ np.linalg.solve(S + beyond * beyond * np.eye(len(e)), e)
+    return float(square + np.linalg.slogdet(S)[1]) + prior_surprise(case, states, dropped)
+
+
+def _beyond_linear(believed: Observation, unknown: Sequence[int]) -> float:
+    """How far points move beyond what is linear if parts are turned by their noise, [m]."""
+    known = np.delete(believed.covariance, unknown, axis=0)
+    turned = np.sqrt(np.trace(known[:, 3:, 3:], axis1=1, axis2=2).max(initial=0.0))
+    return float(turned * turned * _LEVER_M)
+
+
+@final
+class ContactAgreement:
+    """How well contacts agree that none of some operations has a part in, linearised once at what was seen."""
+
+    def __init__(self, case: Case, states: States) -> None:
+        seen = believed_observation(case, states)
+        self._unknown = unbelieved(states)
+        system = seen_system(seen)
+        self._e, self._Jt = linearised_by(system, seen.goals, noise_factor(seen))
+        # A turn by an angle a moves points by a^2 beyond what is linear: that much is no contradiction.
+        soft = np.hypot(soft_deviation(seen), _beyond_linear(seen, self._unknown))
+        self._S = self._Jt.T @ self._Jt + np.diag(soft * soft)
+        letters = pattern(seen.assembly).letters - len(seen.assembly.solids)
+        c = len(system)
+        self._uses = (letters[..., None] == np.arange(len(seen.goals))).any(axis=1)
+        # e^t S^-1 e of every contact by itself: a lower bound of what any set with it leaves.
+        each = self._e.reshape(c, 3, 1), self._S.reshape(c, 3, c, 3)[np.arange(c), :, np.arange(c)]
+        self._alone = (each[0] * np.linalg.solve(each[1], each[0])).sum(axis=(1, 2))
+
+    def agreement(self, left_out: Sequence[int], contacts: Sequence[int] = ()) -> float:
+        """The p-value of the test of the other contacts."""
+        kept = self._kept(left_out, contacts)
+        if p_value(self._alone[kept].max(initial=0.0), 3 * len(kept)) == 0.0:
+            return 0.0
+        rows = np.repeat(kept, 3)
+        return p_value(self._square(rows), jacobian_rank(self._Jt[:, rows]))
+
+    def disagreement(self) -> float:
+        """The squared length of what all that is believed leaves, in standard deviations."""
+        return self._square(np.repeat(self._kept((), ()), 3))
+
+    def _kept(self, left_out: Sequence[int], contacts: Sequence[int]) -> NDArray[np.bool_]:
+        kept = ~self._uses[:, [*left_out, *self._unknown]].any(axis=1)
+        kept[list(contacts)] = False
+        return np.asarray(kept)
+
+    def _square(self, rows: NDArray[np.bool_]) -> float:
+        e = self._e[rows]
+        return float(e @ np.linalg.solve(self._S[np.ix_(rows, rows)], e))
