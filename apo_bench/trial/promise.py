@@ -57,7 +57,7 @@ _LEAST_WEIGHT = 0.01
 
 
 class Explanation(NamedTuple):
-    """What may be so, and how likely that is beside the others."""
+    """What may be so, and how likely that is; what all of them leave to 1 is that of nothing that was thought of."""
 
     weight: float
     believed: Observation
@@ -81,8 +81,8 @@ def explanations(correction: Correction | None, believed: Observation, goals: Ar
     if not correction.hypotheses:
         return (Explanation(1.0, correction.believed or believed, correction.goals, correction.dropped, blind),)
     likely = [each for each in correction.hypotheses if each.weight >= _LEAST_WEIGHT]
-    total = sum(each.weight for each in likely)
-    return tuple(Explanation(each.weight / total, each.believed, each.goals, each.dropped, blind) for each in likely)
+    share = sum(each.weight for each in correction.hypotheses) / sum(each.weight for each in likely)
+    return tuple(Explanation(share * each.weight, each.believed, each.goals, each.dropped, blind) for each in likely)
 
 
 def promised_success(
