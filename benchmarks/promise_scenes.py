@@ -118,7 +118,29 @@ def stepped(between: Between, rng: np.random.Generator) -> Assembled:
     return Assembled(parts, tuple(places))
 
 
-FAMILIES = (keyed, capped, piled, stepped)
+def tunnelled(between: Between, rng: np.random.Generator) -> Assembled:
+    """A block with a tunnel, perhaps a second one behind it, and a stick that is pushed through them, level."""
+    w = between(20, 30) / 2
+    h = between(24, 32)
+    floor = between(10, 16)
+    out = w + between(12, 16)
+    length = between(40, 56)
+    top = floor + h + between(12, 18)
+    outside = polygon(
+        (-out, 0), (out, 0), (out, top), (-out, top), names={0: "bottom", 1: "side_p", 2: "top", 3: "side_n"}
+    )
+    walls = ("floor", "wall_p", "roof", "wall_n")
+    hole = polygon((-w, floor), (w, floor), (w, floor + h), (-w, floor + h), names=dict(enumerate(walls)), fit=walls)
+    tower = extrude(outside, 0, length, holes=[hole]).moved(turn_deg=(90, 0, 90))
+    xs = (0.0, round(length + between(10, 20), 1)) if rng.uniform() < 0.5 else (0.0,)
+    end = xs[-1] + length
+    long = round(end + between(90, 130), 1)
+    parts = {"tower": tower, "stick": block(long, round(2 * w, 1), h)}
+    places = [Place("tower", f"tower_{i}", (x, 0, 0)) for i, x in enumerate(xs, 1)]
+    return Assembled(parts, (*places, Place("stick", "stick", (round(end / 2, 1), 0, floor))))
+
+
+FAMILIES = (keyed, capped, piled, stepped, tunnelled)
 
 
 def blocks(seed: int) -> Assembled:

@@ -77,7 +77,7 @@ def read_json_observed(
         shared=tuple(_shared(node, len(loaded.assembly)) for node in shared),
         tails=_tails(root["tails"], len(loaded.assembly)) if "tails" in root else None,
     )
-    complete = all("covariance_mm_deg" in entry or {*_DEVIATIONS} <= entry.keys() for entry in entries)
+    complete = all("covariance_mm_deg" in entry or "deviation_mm" in entry for entry in entries)
     return observation, not complete
 
 
@@ -248,15 +248,16 @@ def _stated(entry: Mapping[str, JsonNode], assumed: tuple[float, float] | None) 
                 f"{node.file}, {node.key}: the square root of a variance is out of range; {ALLOWED_DEVIATIONS}."
             )
         return C
-    if "covariance_mm_deg" in entry or (assumed is None and len(by_deviation) != 2):
+    if "covariance_mm_deg" in entry or len(by_deviation) == 1 or not (by_deviation or assumed):
         node = entry["operation"]
         raise InputError(
             f"{node.file}, {node.key.removesuffix(', operation')}: state either 'covariance_mm_deg' or both "
             f"'deviation_mm' and 'deviation_deg', {_named(entry, by_deviation)} was given."
         )
     mm, deg = assumed or (0.0, 0.0)
-    mm = _deviation(entry["deviation_mm"], SHIFT_M, 1e-3) if "deviation_mm" in entry else mm
-    deg = _deviation(entry["deviation_deg"], TURN_RAD, np.pi / 180.0) if "deviation_deg" in entry else deg
+    if by_deviation:
+        mm = _deviation(entry["deviation_mm"], SHIFT_M, 1e-3)
+        deg = _deviation(entry["deviation_deg"], TURN_RAD, np.pi / 180.0)
     return np.diag(np.array([mm] * 3 + [deg] * 3) / TO_MM_DEG) ** 2
 
 

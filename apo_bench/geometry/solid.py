@@ -149,12 +149,12 @@ class Solid:
         """
         return self.rounds[name] if name in self.rounds else self.faces[name]
 
-    @property
+    @cached_property
     def bounds(self) -> Array:
         """Lowest and highest corner of the solid, (2, 3), [m]."""
         low = np.min([piece.center - piece.half for piece in self.pieces], axis=0)
         high = np.max([piece.center + piece.half for piece in self.pieces], axis=0)
-        return np.array([low, high])
+        return frozen([low, high])
 
 
 def world_bounds(posed: Iterable[tuple[Solid, Array]]) -> tuple[Array, Array]:

@@ -11,14 +11,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from apo_bench.assembly import Assembly, Demonstration, Observation
-from apo_bench.errors import InputError, failed, unknown
+from apo_bench.errors import InputError, failed, require, unknown
 from apo_bench.geometry import Array
 from apo_bench.names import resolve
 from apo_bench.observation.models.isotropic import floored
 from apo_bench.observation.models.level import Level
 from apo_bench.observation.presets import noise_path, presets
+from apo_bench.records import FAILURES
 
-__all__ = ["NOISES", "Level", "Noise", "make_noise"]
+__all__ = ["FAILURES", "NOISES", "Level", "Noise", "make_noise"]
 
 Noise = Callable[[Assembly, Demonstration, np.random.Generator], Observation]
 """Any function `(assembly, shown, rng) -> Observation` is a noise model."""
@@ -42,10 +43,8 @@ NOISES = MappingProxyType(
         "displaced-view": "apo_bench.observation.models.failures:DisplacedView",
     }
 )
-FAILURES = ("flips", "stale", "swaps", "rays", "displaced-view")
-"""Those in which a camera fails now and then: the covariance that is stated is that of what is no failure."""
-
-
+_RATES = MappingProxyType({"p": "rate", "r": "repeat"})
+"""What may be stated of a camera that fails now and then -> what it is called there."""
 _LIMITS = {"deviation_mm": 10000.0, "deviation_deg": 180.0}
 """What a function declares as attributes, and the largest that is allowed."""
 
@@ -54,10 +53,11 @@ def make_noise(given: Any, level: Level) -> Noise:
     """The noise model that a name stands for.
 
     Args:
-        given: A name out of `NOISES`, `"package.module:name"`, a noise file (`.toml`, the name of one that comes with
-            the package, or `"empirical:"` and a file of residuals), or the object: a class is made with the level, a
-            function `(assembly, shown, rng) -> Observation` is used as it is, and so is a plain `(goals, rng) -> goals`
-            that has attributes `deviation_mm` and `deviation_deg`.
+        given: A name out of `NOISES`, one out of `FAILURES` with its rates (`flips:p=0.1/r=0.5`),
+            `"package.module:name"`, a noise file (`.toml`, the name of one that comes with the package, or
+            `"empirical:"` and a file of residuals), or the object: a class is made with the level, a function
+            `(assembly, shown, rng) -> Observation` is used as it is, and so is a plain `(goals, rng) -> goals` that has
+            attributes `deviation_mm` and `deviation_deg`.
         level: How much noise.
 
     Raises:
@@ -75,6 +75,8 @@ def make_noise(given: Any, level: Level) -> Noise:
                 return measured
         if ":" not in given and given not in NOISES:
             raise InputError(_unknown(given, (*NOISES, *presets())))
+        if given.partition(":")[0] in FAILURES:
+            return _failing(given, level)
     model = resolve(given, NOISES, "noise model")
     name = given if isinstance(given, str) else getattr(model, "__name__", type(model).__name__)
     try:
@@ -83,6 +85,22 @@ def make_noise(given: Any, level: Level) -> Noise:
         raise
     except Exception as error:
         raise failed(f"the noise model '{name}'", error) from error
+
+
+def _failing(given: str, level: Level) -> Noise:
+    """A camera that fails now and then, as often as its name says: `flips:p=0.1/r=0.5`."""
+    name, colon, stated = given.partition(":")
+    entries = [entry.partition("=") for entry in stated.split("/")] if colon else []
+    try:
+        rates = {_RATES[key]: float(number) for key, _, number in entries}
+        require(len(rates) == len(entries), "twice")
+    except (KeyError, ValueError):
+        raise InputError(
+            f"the noise '{given}' was given; state how often the camera fails, '{name}:p=0.1', or also how often a "
+            f"later look repeats a failure, '{name}:p=0.1/r=0.5'."
+        ) from None
+    noise: Noise = resolve(name, NOISES, "noise model")(level, **rates)
+    return noise
 
 
 def _noise(model: Any, name: str, level: Level) -> Noise:

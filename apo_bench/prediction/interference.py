@@ -1,11 +1,13 @@
 """Parts that a plan puts into one another: at the goal, on the way in, and where that way begins."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
 from apo_bench.assembly import Assembly, Operation, Poses
-from apo_bench.geometry import Array, Solid, ball_around, intrusion_depths, physical_pieces, pose
+from apo_bench.geometry import Array, Solid, ball_around, intrusion_depths, physical_pieces, pose, remembered
 from apo_bench.insertion.line import Attach
 
 _SPACING_M = 0.02
@@ -17,15 +19,17 @@ _LEVEL = 0.5
 """A way in is level if its cosine with the vertical is smaller."""
 FAR_M = 0.01
 """Parts that are further apart count as so far apart."""
-Solids = dict[str, Solid]
+Solids = Mapping[str, Solid]
 
 
+@remembered
 def physical_solids(assembly: Assembly, clearance_mm: float) -> Solids:
-    """The parts as they are made, fit faces receded."""
-    return {
+    """The parts as they are made, fit faces receded; the same ones each time."""
+    made = {
         name: replace(solid, pieces=physical_pieces(solid, clearance_mm * 1e-3))
         for name, solid in assembly.solids.items()
     }
+    return MappingProxyType(made)
 
 
 def depths_on_way(operation: Operation, planned: Poses, how: Attach | None, physical: Solids) -> list[float]:

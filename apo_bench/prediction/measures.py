@@ -122,15 +122,18 @@ def measures(
     attach: Sequence[Attach] = (),
     room_mm: float = 0.0,
     arm: Sequence[ArmMove] = (),
+    brought: Sequence[Poses] = (),
 ) -> Iterator[Measure]:
     """Everything that a plan is measured by, the most important first; always the same things of one schedule.
 
     Args:
         room_mm: Centres of mass are looked at this far aside, too.
         arm: As in `predict`; its reach is not measured.
+        brought: Every part when one is put, for each step of the schedule that puts one; empty: as planned. What falls
+            or leans is not asked of them.
     """
-    acts = tuple(_acts(plan))
-    for act in acts:
+    acts = tuple(_acts(plan, iter(brought)))
+    for act in acts if not brought else ():
         size = imbalance(act.alone, act.operation, act.planned, 1e-3 * room_mm)
         yield Measure(act.number, "falls", size, BALANCED)
     physical = physical_solids(plan.assembly, clearance_mm)
@@ -139,10 +142,11 @@ def measures(
         operation = act.operation
         how = attach[k] if attach else None
         deep_mm = thresholds.fit_margin_mm if operation.carries else thresholds.pushed_mm
-        yield _fit(act, how, clearance_mm, thresholds)
+        fit = _fit(act, how, clearance_mm, thresholds)
+        yield fit
         yield Measure(k, "side", _side_mm(act), thresholds.support_mm)
         stays = not any(operation.main in later.moves for later in plan.assembly.operations[k + 1 :])
-        if stays and clearance_mm > thresholds.fit_margin_mm:
+        if stays and clearance_mm > thresholds.fit_margin_mm and not brought:
             leans = imbalance(act.alone, operation, planned, 1e-3 * room_mm, ceilings=False)
             yield Measure(k, "leans", leans, BALANCED)
         for depth_m in depths_on_way(operation, planned, how, physical):
@@ -151,10 +155,10 @@ def measures(
             yield Measure(k, "from_above", 1e3 * depth_m, _BESIDE_MM)
         for move in (move for move in arm if move.operation == k and not move.undo):
             yield Measure(k, "gripper", move.struck_mm, thresholds.pushed_mm, move.struck)
-            yield from _tip(act, move, how, clearance_mm, thresholds)
+            yield from _tip(act, move, how, clearance_mm, thresholds, fit)
 
 
-def _acts(plan: Plan) -> Iterator[_Act]:
+def _acts(plan: Plan, brought: Iterator[Poses]) -> Iterator[_Act]:
     """What the schedule does, in order; undoing only changes where the parts are, and takes what is carried along."""
     planned = rests = plan.start
     origins = dict[int, tuple[Array, Array]]()
@@ -165,8 +169,9 @@ def _acts(plan: Plan) -> Iterator[_Act]:
             planned, rests = (_put(alone, *pair) for pair in zip((planned, rests), origins[k], strict=True))
             continue
         origins[k] = planned[operation.main], rests[operation.main]
-        planned = _put(alone, planned, target)
-        rests = resting_poses(alone, operation, _put(alone, rests, target))
+        given = next(brought, None)
+        planned, rests = [given] * 2 if given else (_put(alone, poses, target) for poses in (planned, rests))
+        rests = resting_poses(alone, operation, rests)
         yield _Act(k, alone, planned, rests)
 
 
@@ -191,14 +196,15 @@ def _fit(act: _Act, how: Attach | None, clearance_mm: float, thresholds: Thresho
 
 
 def _tip(
-    act: _Act, move: ArmMove, how: Attach | None, clearance_mm: float, thresholds: Thresholds
+    act: _Act, move: ArmMove, how: Attach | None, clearance_mm: float, thresholds: Thresholds, planned: Measure
 ) -> Iterator[Measure]:
     """Of what enters: how far off the arm alone is, which play must take, and how far with what is planned wrong."""
-    if not any(enters(act.alone, contact) for contact in act.operation.contacts):
+    as_planned = not move.beside_mm and np.array_equal(move.sag, np.eye(4))
+    if as_planned or not any(enters(act.alone, contact) for contact in act.operation.contacts):
         return
     moved = {part: move.sag @ act.planned[part] for part in act.operation.moves}
     sagging = act._replace(planned=MappingProxyType({**act.planned, **moved}))
-    planned, off = (_fit(each, how, clearance_mm, thresholds) for each in (act, sagging))
+    off = _fit(sagging, how, clearance_mm, thresholds)
     own = max(0.0, off.size - planned.size) + move.beside_mm
     yield Measure(act.number, "own", own, max(off.allowed - thresholds.fit_margin_mm, 0.0))
     yield Measure(act.number, "tip", off.size + move.beside_mm, off.allowed)

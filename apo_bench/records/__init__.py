@@ -56,6 +56,7 @@ from apo_bench.records.settings import (
 from apo_bench.records.short_names import (
     CORRECTOR,
     CORRECTORS,
+    FAILURES,
     FOREIGN_ARMS,
     METHODS,
     RESIDUALS,
@@ -72,6 +73,7 @@ __all__ = (
     "CORRECTORS",
     "CORRECTOR_LIMIT_S",
     "ENV_ID",
+    "FAILURES",
     "FOREIGN_ARMS",
     "GIVEN",
     "KEY",

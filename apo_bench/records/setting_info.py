@@ -84,10 +84,10 @@ def check_value(info: SettingInfo, value: object, called: str = "", meaning: str
     elif info.called:
         low, high = info.range
         name = called or info.called
-        number = float(value) if isinstance(value, Real) else math.nan
+        number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
         if info.is_whole and not (isinstance(value, Integral) and low <= number <= high):
             raise InputError(f"a {name} of {value} was given; whole numbers from {low} to {high} are allowed.")
         if not low <= number <= high:
-            text = f"{number:g}" if isinstance(value, Real) else repr(value)
+            text = repr(value) if math.isnan(number) else f"{number:g}"
             why = meaning or info.meaning
             raise InputError(f"a {name} of {text} was given; a number from {low:g} to {high:g} is allowed, {why}.")

@@ -44,5 +44,8 @@ WRONG_RELATIONS = MappingProxyType(
 """Wrong relations that a corrector is told."""
 FOREIGN_ARMS = ("menagerie:", "robosuite:")
 """How the arms of other collections begin; what follows is looked up there, and never imported."""
+FAILURES = ("flips", "stale", "swaps", "rays", "displaced-view")
+"""Noise models in which a camera fails now and then: the covariance that is stated is that of what is no failure. Rates
+may follow the name, as in `flips:p=0.1/r=0.5`."""
 RESIDUALS = "empirical:"
 """Begins the name of a noise that draws from a file of residuals."""

@@ -26,6 +26,8 @@ def learned_form(learned: Learned) -> dict[str, Any]:
             for component, estimate in zip(COMPONENTS, noise.deviations, strict=True)
         ],
         "outlier_rate": noise.gross._asdict(),
+        "looked_again": learned.repeats.looked,
+        "repeat_rate": None if (rate := learned.repeats.rate) is None else rate._asdict(),
         "constant_mm_deg": noise.constant.tolist(),
         "constant_covariance_mm_deg": noise.constant_covariance.tolist(),
         "log_likelihood": noise.log_likelihood,
@@ -35,13 +37,14 @@ def learned_form(learned: Learned) -> dict[str, Any]:
 def learned_lines(learned: Learned) -> list[str]:
     """The same in words, line by line; numbers in brackets are 95 % intervals."""
     noise = learned.noise
-    percent = EstimatedNumber(*(100.0 * x for x in noise.gross))
     facts = [
         ("source", learned.measured.source),
         ("observations", f"{noise.observations}, {learned.operations} operations, {learned.unseen} of them not seen"),
         *((of.name, _estimate(found, of.unit)) for of, found in zip(COMPONENTS, noise.deviations, strict=True)),
-        ("outliers", f"{percent.value:.1f} % [{percent.low:.1f} to {percent.high:.1f}] of what was seen"),
+        ("outliers", f"{_percent(noise.gross)} of what was seen"),
     ]
+    if (rate := learned.repeats.rate) is not None:
+        facts.append(("repeated", f"{_percent(rate)} of outliers, {learned.repeats.looked} were looked at again"))
     if noise.constant.any():
         each = [
             f"{x:.2f} +- {s:.2f}"
@@ -49,6 +52,12 @@ def learned_lines(learned: Learned) -> list[str]:
         ]
         facts.append(("constant error", f"({', '.join(each[:3])}) mm, ({', '.join(each[3:])}) deg, axes of the camera"))
     return columns(facts)
+
+
+def _percent(estimate: EstimatedNumber) -> str:
+    """`8.5 % [6.9 to 10.5]`."""
+    value, low, high = (100.0 * x for x in estimate)
+    return f"{value:.1f} % [{low:.1f} to {high:.1f}]"
 
 
 def _estimate(estimate: EstimatedNumber, unit: str) -> str:

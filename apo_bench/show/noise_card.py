@@ -15,10 +15,10 @@ from apo_bench.io.figures import default_looks
 from apo_bench.names import resolve
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.level import Facts
-from apo_bench.observation.noise import NOISES, Level, make_noise
-from apo_bench.observation.noise_file import noise_of_file, read_noise
+from apo_bench.observation.noise import FAILURES, NOISES, Level, make_noise
+from apo_bench.observation.noise_file import read_noise
 from apo_bench.observation.observing import observe
-from apo_bench.observation.presets import presets
+from apo_bench.observation.presets import noise_path, presets
 from apo_bench.scenario.file import load_scenario
 
 SCENARIO = "stick_in_tower"
@@ -63,8 +63,8 @@ def facts(model: Any) -> Facts:
 
 def _model(model: Any) -> Any:
     """What a name stands for: a class, or an object that no level changes, but what is measured at level 1."""
-    measured = noise_of_file(model, Level(1.0, 1.0)) if isinstance(model, str) else None
-    return measured or resolve(model, NOISES, "noise model")
+    known = isinstance(model, str) and (noise_path(model) is not None or model.partition(":")[0] in FAILURES)
+    return make_noise(model, Level(1.0, 1.0)) if known else resolve(model, NOISES, "noise model")
 
 
 def draw_errors(model: Any, level: Level, draws: int = _DRAWS) -> Drawn:

@@ -16,9 +16,9 @@ from apo_bench.records import Row, TrialSettings, one_salt, parsed
 CONFIDENCE = 0.95
 Line = TypeVar("Line", bound=Mapping[str, Any])
 """A row, or a line of timings."""
-NOT_EXECUTED = ("observe", "correct", "promise", "worker")
-"""Stages of failures at which no plan was carried out to its end: there was none, it promised too little, or its
-process died."""
+NOT_EXECUTED = ("observe", "correct", "promise", "plan", "worker")
+"""Stages of failures at which no plan was carried out to its end: there was none, it promised too little, it was
+refused before anything moved, or its process died."""
 
 
 @dataclass(frozen=True)
@@ -81,8 +81,8 @@ class Cell(Place):
     """Successes of which every contact was also made when and where it was shown."""
     loose_successes: int
     not_executed: int
-    """Failures of which no plan was carried out: nothing was corrected, too little was promised, or the
-    worker died. They count as failures."""
+    """Failures of which no plan was carried out: nothing was corrected, too little was promised, the plan was refused
+    before anything moved, or the worker died. They count as failures."""
     abstained: int
     """Those of them whose plan promised too little."""
     promised: float | None

@@ -20,6 +20,7 @@ from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.fitted import ConstantError, MeasuredNoise, ViewNoise, view_frame
 from apo_bench.observation.models.residuals import INLIER_MM, TURNED_DEG
 from apo_bench.observation.models.tails import Split, Tail
+from apo_bench.trial.repeats import JudgedLook, Repeats, repeats
 
 FEWEST_OBSERVATIONS = 5
 """Observations below which nothing is learned."""
@@ -41,6 +42,8 @@ class Learned(NamedTuple):
     unseen: int
     used: int
     """Observations that could be corrected."""
+    repeats: Repeats
+    """What was false and was looked at again, where several observations are of one scene."""
 
 
 def learn(observations: Sequence[Observation], camera: Camera, source: str, *, constant: bool = False) -> Learned:
@@ -83,11 +86,15 @@ def learn(observations: Sequence[Observation], camera: Camera, source: str, *, c
     learned = learn_noise(evidence, start, constant)
     gross_of = [list(each.readings[0].gross - each.unseen) for each in evidence]
     far = np.concatenate([size[gross, 0] for size, gross in zip(sizes, gross_of, strict=True)])
+    looks = [
+        JudgedLook(observation, correction.goals, frozenset(gross))
+        for (observation, correction), gross in zip(usable, gross_of, strict=True)
+    ]
     operations = sum(each.n for each in evidence)
     missing = sum(len(each.unseen) for each in evidence)
     # a size is a mean per axis: sqrt(3) of it is the length of the shift
     measured = _measured(learned, far * np.sqrt(3.0), source, missing / operations, P)
-    return Learned(learned, measured, camera, operations, missing, len(usable))
+    return Learned(learned, measured, camera, operations, missing, len(usable), repeats(looks, _GROSS * typical))
 
 
 def _measured(learned: LearnedNoise, far_mm: Array, source: str, missed: float, P: Array) -> MeasuredNoise:

@@ -11,15 +11,17 @@ A simulator is asked only for a scene, for what its arm reaches and where a robo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import math
+from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, placements
+from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Poses, placements
 from apo_bench.errors import InputError
-from apo_bench.geometry import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.judging.rules import least_overlaps
 from apo_bench.prediction.arm import ArmMove
 from apo_bench.prediction.measures import Measure, measures
@@ -31,8 +33,8 @@ from apo_bench.trial.promise_table import RATES, SCORES
 if TYPE_CHECKING:
     from apo_bench.simulation.scene.scene import Scene
 
-TRUTHS = 32
-ROBOTS = 24
+TRUTHS = 16
+ROBOTS = 16
 """Draws of the truth and, where the robot has stated errors, of those."""
 _STREAM = 2_030
 """Of the draws of a promise, the same for every plan: no trial has streams of that many words."""
@@ -45,6 +47,9 @@ _FARTHEST_RAD = 0.5
 """A truth is drawn no further along a free direction of which nothing is known, one standard deviation."""
 _FALLS = 0.02
 """How near to fitting a plan is in which a part would fall or lean."""
+_LEVEL = 0.5
+"""A way in is level if its cosine with the vertical is smaller: no weight helps there, and the play is all there is."""
+_WEIGHED = ("falls", "leans")
 _UNKNOWN = 0.5
 """The share where no truth could be drawn at which faces meet."""
 _LEAST_WEIGHT = 0.01
@@ -52,15 +57,15 @@ _LEAST_WEIGHT = 0.01
 
 
 class Explanation(NamedTuple):
-    """What may be so, and how likely that is beside the others."""
+    """What may be so, and how likely that is; what all of them leave to 1 is that of nothing that was thought of."""
 
     weight: float
     believed: Observation
     goals: Array
     """(n, 4, 4), world frame, [m]."""
     dropped: tuple[str, ...] = ()
-    spread: float = 1.0
-    """By how much what was seen is off more than is stated."""
+    turned: bool = False
+    """Which way all of it is turned on the table is not known, since nothing was seen."""
 
 
 def explanations(correction: Correction | None, believed: Observation, goals: Array) -> tuple[Explanation, ...]:
@@ -70,25 +75,14 @@ def explanations(correction: Correction | None, believed: Observation, goals: Ar
         believed: What the corrector was given.
         goals: (n, 4, 4), of the plan.
     """
+    blind = not believed.seen.any()
     if correction is None:
         return (Explanation(1.0, believed, goals),)
     if not correction.hypotheses:
-        seen = correction.believed or believed
-        return (Explanation(1.0, seen, correction.goals, correction.dropped, _spread(correction)),)
+        return (Explanation(1.0, correction.believed or believed, correction.goals, correction.dropped, blind),)
     likely = [each for each in correction.hypotheses if each.weight >= _LEAST_WEIGHT]
-    total = sum(each.weight for each in likely)
-    return tuple(
-        Explanation(each.weight / total, each.believed, each.goals, each.dropped, _spread(correction))
-        for each in likely
-    )
-
-
-def _spread(correction: Correction) -> float:
-    """The Birge ratio of a correction, 1 at least: the root of chi-square over its degrees of freedom."""
-    test = correction.test_after or correction.test
-    if test is None or test.freedom < 1 or not np.isfinite(test.chi_square):
-        return 1.0
-    return float(np.sqrt(max(1.0, test.chi_square / test.freedom)))
+    share = sum(each.weight for each in correction.hypotheses) / sum(each.weight for each in likely)
+    return tuple(Explanation(share * each.weight, each.believed, each.goals, each.dropped, blind) for each in likely)
 
 
 def promised_success(
@@ -141,7 +135,7 @@ def plan_score(
         told: The assembly with the contacts that the planner was told.
         where, robot_error, searches: As in `promised_success`.
     """
-    ends, arm = ([plan], ()) if isinstance(where, Scenario) else _by_arm(plan, where, robot_error, searches)
+    ends, arm = ((), ()) if isinstance(where, Scenario) else _by_arm(plan, where, robot_error, searches)
     if any(move.refused is not None for move in arm):
         return 0.0
     rng = np.random.default_rng(_STREAM)
@@ -150,14 +144,15 @@ def plan_score(
     for each in explained:
         assembly = _without(told, each.dropped)
         if each.dropped not in fits:
-            near = [_fit_share(replace(end, assembly=assembly), where, arm) for end in ends]
-            fits[each.dropped] = float(np.mean(near))
+            fits[each.dropped] = _fit_share(replace(plan, assembly=assembly), where, arm, ends)
         truths = drawn_truths(each, max(1, round(TRUTHS * each.weight)), rng)
         score += each.weight * fits[each.dropped] * _cover_share(replace(plan, assembly=assembly), truths, where)
     return score
 
 
-def _by_arm(plan: Plan, scene: Scene, robot_error: str, searches: bool) -> tuple[list[Plan], tuple[ArmMove, ...]]:
+def _by_arm(
+    plan: Plan, scene: Scene, robot_error: str, searches: bool
+) -> tuple[list[tuple[Poses, ...]], tuple[ArmMove, ...]]:
     """Where robots with errors that were drawn bring the parts, and what the arm makes of the plan."""
     from apo_bench.simulation.arm_checks.plan_check import arm_moves
     from apo_bench.trial.robot_draws import brought
@@ -165,9 +160,14 @@ def _by_arm(plan: Plan, scene: Scene, robot_error: str, searches: bool) -> tuple
 
     arm = arm_moves(plan, scene, searches)
     if robot_error == NO_ROBOT_ERROR or any(move.refused is not None for move in arm):
-        return [plan], arm
-    errors = (robot_error_of(robot_error, scene, _stream_of(draw)) for draw in range(ROBOTS))
+        return [], arm
+    errors = (robot_error_of(robot_error, scene, partial(_robot_draw, draw)) for draw in range(ROBOTS))
     return [brought(plan, scene, error, searches) for error in errors], arm
+
+
+def _robot_draw(draw: int, which: int, shape: tuple[int, ...]) -> Array:
+    """Standard normal numbers of one of the robots that are drawn, of one stream."""
+    return np.asarray(_spread(np.random.default_rng([_STREAM, which]), ROBOTS, shape)[draw])
 
 
 def drawn_truths(explanation: Explanation, count: int, rng: np.random.Generator) -> Array:
@@ -177,21 +177,30 @@ def drawn_truths(explanation: Explanation, count: int, rng: np.random.Generator)
         space = free_space(explanation.believed, goals)
     except InputError:
         space = None
-    if space is None:
-        return np.repeat(goals[None], count, axis=0)
-    widths = _widths(space, explanation.spread)
-    return np.array([space.tangent(widths * rng.standard_normal(len(space))) for _ in range(count)])
+    truths = np.repeat(goals[None], count, axis=0)
+    if space is not None:
+        widths = _widths(space)
+        truths = np.array([space.tangent(widths * s) for s in _spread(rng, count, (len(space),))])
+    if explanation.turned:
+        middle = pose.at(goals[:, :3, 3].mean(axis=0))
+        turns = [pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw)) for yaw in 360.0 * (rng.permutation(count) + 0.5) / count]
+        truths = np.array([middle @ turn @ pose.inverse(middle) @ T for turn, T in zip(turns, truths, strict=True)])
+    return truths
 
 
-def _widths(space: FreeSpace, spread: float) -> Array:
+def _widths(space: FreeSpace) -> Array:
     """How far to draw along each free direction, in its stated standard deviations, (f,)."""
     far = np.linalg.norm(space.twists[:, :3], axis=1).max(axis=0) / _FARTHEST_M
     turned = np.linalg.norm(space.twists[:, 3:], axis=1).max(axis=0) / _FARTHEST_RAD
-    return np.asarray(1.0 / np.maximum(1.0 / spread, np.maximum(far, turned)))
+    return np.asarray(1.0 / np.maximum(1.0, np.maximum(far, turned)))
 
 
-def _stream_of(draw: int) -> Callable[[int], np.random.Generator]:
-    return lambda which: np.random.default_rng([_STREAM, draw, which])
+def _spread(rng: np.random.Generator, count: int, shape: tuple[int, ...]) -> Array:
+    """Standard normal numbers, (count, *shape), of each place one in every part of equal probability (McKay, 1979)."""
+    from scipy.special import ndtri
+
+    parts = rng.permuted(np.tile(np.arange(count), (math.prod(shape), 1)), axis=1).T
+    return np.asarray(ndtri((parts + rng.uniform(size=parts.shape)) / count).reshape(count, *shape))
 
 
 def _without(assembly: Assembly, dropped: tuple[str, ...]) -> Assembly:
@@ -210,19 +219,34 @@ def _without(assembly: Assembly, dropped: tuple[str, ...]) -> Assembly:
     return replace(assembly, operations=tuple(operations))
 
 
-def _fit_share(plan: Plan, where: Scene | Scenario, arm: Sequence[ArmMove]) -> float:
-    """How surely everything that a plan is measured by is within what is allowed, from 0 to 1."""
+def _fit_share(plan: Plan, where: Scene | Scenario, arm: Sequence[ArmMove], ends: Sequence[Sequence[Poses]]) -> float:
+    """How surely everything that a plan is measured by is within what is allowed, from 0 to 1.
+
+    Args:
+        ends: Where robots bring the parts, one with each of the errors that were drawn; none: as planned.
+    """
     scenario = where if isinstance(where, Scenario) else where.scenario
-    every = measures(plan, where.clearance_mm, scenario.thresholds, scenario.attach, arm=arm)
-    return float(np.prod([_within(measure) for measure in every]))
+    margin_mm = scenario.thresholds.fit_margin_mm
+    ways = [abs(float(T[2, :3] @ how.direction)) for how, T in zip(scenario.attach, plan.goals, strict=True)]
+    less_mm = [margin_mm if rise < _LEVEL else 0.0 for rise in ways]
+    every = partial(measures, plan, where.clearance_mm, scenario.thresholds, scenario.attach, arm=arm)
+    stands = np.prod([_within(each, less_mm) for each in every() if each.kind in _WEIGHED or not ends])
+    near = [np.prod([_within(each, less_mm) for each in every(brought=end)]) for end in ends]
+    return float(stands * np.mean(near or 1.0))
 
 
-def _within(measure: Measure) -> float:
+def _within(measure: Measure, less_mm: Sequence[float]) -> float:
+    """How surely one measure is.
+
+    Args:
+        less_mm: By how much less than the judge what goes in allows, of each operation.
+    """
     from scipy.special import ndtr
 
-    if measure.kind in ("falls", "leans"):
+    if measure.kind in _WEIGHED:
         return _FALLS if measure.exceeded else 1.0
-    return float(ndtr((measure.allowed - measure.size) / _SLACK_MM))
+    allowed = measure.allowed - (less_mm[measure.operation] if measure.kind in ("fit", "tip") else 0.0)
+    return float(ndtr((allowed - measure.size) / _SLACK_MM))
 
 
 def _cover_share(plan: Plan, truths: Array, where: Scene | Scenario) -> float:

@@ -1,15 +1,20 @@
 """Where a robot with errors of its own would bring the parts of a plan: geometry, no physics.
 
 The hand goes where the errors put it. Closing, its pads centre the part between them and lie flat on it, so what is
-wrong along and about them when the part is taken is taken along, and what is wrong across them is not.
+wrong along and about them when the part is taken is taken along, and what is wrong across them is not. What is let go
+comes to rest on what carries it and against what it was slid to; where the hand closes on it once more, across, it is
+centred there, too.
 """
+
+from dataclasses import replace
 
 import numpy as np
 
-from apo_bench.assembly import Plan
+from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.execution.prepare import Move, key_angles, moves
-from apo_bench.simulation.execution.transfer import after_transfer
+from apo_bench.prediction.resting import resting_poses
+from apo_bench.simulation.execution.prepare import key_angles, moves
+from apo_bench.simulation.execution.transfer import Grip, after_transfer
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.scene.scene import Scene
 
@@ -17,37 +22,46 @@ _CENTRED = np.array([0.0, 1.0, 1.0, 1.0, 0.0, 0.0])
 """Of a twist in the frame of the tip, whose first axis the pads close along: what is left once they have closed."""
 _PICK = 1
 """Of the key poses of a transfer; the last one is its goal."""
+_UP = np.array([0.0, 0.0, 1.0])
 
 
-def brought(plan: Plan, scene: Scene, error: RobotError, searches: bool = False) -> Plan:
-    """The plan as it would end up: goals where a robot with these errors brings the parts.
+def brought(plan: Plan, scene: Scene, error: RobotError, searches: bool = False) -> tuple[Poses, ...]:
+    """Every part when a robot with these errors puts one, for each step of the schedule that does: the others rest.
+
+    What is pushed in level floats on its way, as it is carried out.
 
     Args:
         searches: As in `moves`.
     """
-    actual = plan.start
-    goals = plan.goals.copy()
+    resting = plan.start
+    states = list[Poses]()
     for move in moves(plan, scene, searches):
+        t = move.transfer
         k = move.step.operation
-        T = _put(move, scene, error, actual[move.transfer.part])
-        actual = after_transfer(plan.assembly.operations[k], T, actual)
-        if not move.step.undo:
-            goals[k] = T
-    return plan.with_goals(goals)
+        operation = plan.assembly.operations[k]
+        leant = [error.hand_eye @ _leant(scene, key_angles(t, scene).reached[i], error) for i in (_PICK, -1)]
+        taken, let_go = leant
+        last = t.grips[-1].T_part_tip
+        held = _held(t.grips[0], taken @ t.T_world_start @ t.grips[0].T_part_tip @ error.tool, resting[t.part])
+        put = let_go @ t.T_world_goal @ last @ error.tool @ error.in_hand[k] @ held @ pose.inverse(last)
+        now = after_transfer(operation, put, resting)
+        if move.step.undo:
+            resting = now
+            continue
+        floats = pose.at(t.floats * _UP) if t.into.level else np.eye(4)
+        states.append(after_transfer(operation, floats @ put, resting))
+        alone = replace(plan.assembly, operations=(operation,))
+        resting = resting_poses(alone, operation, now)
+        for grip in t.centring:
+            tip = let_go @ t.T_world_goal @ grip.T_part_tip @ error.tool
+            centred = tip @ _held(grip, tip, resting[t.part]) @ pose.inverse(grip.T_part_tip)
+            resting = resting_poses(alone, operation, after_transfer(operation, centred, resting))
+    return tuple(states)
 
 
-def _put(move: Move, scene: Scene, error: RobotError, T_part: Array) -> Array:
-    """Where the part of a transfer ends up that stands at T_part, (4, 4), world."""
-    t = move.transfer
-    path = key_angles(t, scene).reached
-    first = t.grips[0].T_part_tip
-    last = t.grips[-1].T_part_tip
-    taken = error.hand_eye @ _leant(scene, path[_PICK], error) @ t.T_world_start @ first @ error.tool
-    let_go = error.hand_eye @ _leant(scene, path[-1], error) @ t.T_world_goal @ last @ error.tool
-    # T_tip_part = exp(xi) T_tip_part as planned; pads that close set xi to zero across them
-    xi = pose.log(pose.inverse(taken) @ T_part @ first)
-    held = error.in_hand[move.step.operation] @ pose.exp(_CENTRED * xi)
-    return np.asarray(let_go @ held @ pose.inverse(last))
+def _held(grip: Grip, tip: Array, T_part: Array) -> Array:
+    """How a part that stands at T_part is off in the hand once its pads have closed at a tip, in its frame, (4, 4)."""
+    return np.asarray(pose.exp(_CENTRED * pose.log(pose.inverse(tip) @ T_part @ grip.T_part_tip)))
 
 
 def _leant(scene: Scene, q: Array, error: RobotError) -> Array:

@@ -165,10 +165,10 @@ def draw_robot_error(name: str, scene: Scene, seed: int, salt: Salt | None = Non
     """
     if name == NO_ROBOT_ERROR:
         return None
-    return robot_error_of(name, scene, lambda which: stream(seed, which, salt))
+    return robot_error_of(name, scene, lambda which, shape: stream(seed, which, salt).standard_normal(shape))
 
 
-def robot_error_of(name: str, scene: Scene, stream_of: Callable[[int], np.random.Generator]) -> RobotError:
+def robot_error_of(name: str, scene: Scene, drawn: Callable[[int, tuple[int, ...]], Array]) -> RobotError:
     """What is wrong with a robot.
 
     The base is turned about the middle of the nominal goals. A part slips along the pads, the second and third axis of
@@ -176,21 +176,21 @@ def robot_error_of(name: str, scene: Scene, stream_of: Callable[[int], np.random
 
     Args:
         name: As in a row.
-        stream_of: Makes the random numbers of one of the streams `HAND_EYE`, `JOINTS`, `TOOL`, `IN_HAND`.
+        drawn: Draws so many standard normal numbers of one of the streams `HAND_EYE`, `JOINTS`, `TOOL`, `IN_HAND`.
     """
     sigmas = robot_sigmas(name)
-    drawn = stream_of(HAND_EYE).standard_normal(6)
-    hand_eye = pose.at(1e-3 * sigmas.hand_eye[0] * drawn[:3], sigmas.hand_eye[1] * drawn[3:])
+    shift, turn = drawn(HAND_EYE, (2, 3))
+    hand_eye = pose.at(1e-3 * sigmas.hand_eye[0] * shift, sigmas.hand_eye[1] * turn)
     middle = np.eye(4)
     middle[:3, 3] = scene.scenario.goals[:, :3, 3].mean(axis=0)
     # turned about the middle of the goals: E becomes T_m E T_m^-1
     if sigmas.hand_eye != (0.0, 0.0):
         hand_eye = middle @ hand_eye @ pose.inverse(middle)
-    joints = np.radians(sigmas.joints_deg) * stream_of(JOINTS).standard_normal(len(scene.arm.joints))
-    tool = pose.at(1e-3 * sigmas.tool_mm * stream_of(TOOL).standard_normal(3), (0.0, 0.0, 0.0))
+    joints = np.radians(sigmas.joints_deg) * drawn(JOINTS, (len(scene.arm.joints),))
+    tool = pose.at(1e-3 * sigmas.tool_mm * drawn(TOOL, (3,)), (0.0, 0.0, 0.0))
     m = 1e-3 * sigmas.in_hand[0]
     deg = sigmas.in_hand[1]
-    slips = stream_of(IN_HAND).standard_normal((len(scene.scenario.assembly), 3))
+    slips = drawn(IN_HAND, (len(scene.scenario.assembly), 3))
     in_hand = np.array([pose.at((0.0, m * y, m * z), (deg * turn, 0.0, 0.0)) for y, z, turn in slips])
     return RobotError(hand_eye, joints, tool, in_hand)
 

@@ -180,6 +180,20 @@ def test_a_measured_file_may_be_short(tmp_path: Path) -> None:
     assert lowered == pytest.approx(SCENARIO.clearance_mm * 1e-3)
 
 
+@pytest.mark.parametrize("key", ["deviation_mm", "deviation_deg"])
+@pytest.mark.parametrize("assumed", [None, (1.0, 1.0)])
+def test_one_deviation_without_the_other_is_refused(
+    tmp_path: Path, key: str, assumed: tuple[float, float] | None
+) -> None:
+    document = form()
+    del document["operations"][1]["covariance_mm_deg"]
+    document["operations"][1][key] = 2.0
+    path = tmp_path / "seen.json"
+    path.write_text(json.dumps(document))
+    with pytest.raises(InputError, match=rf"state either 'covariance_mm_deg' or both .*, '{key}' was given\.$"):
+        json_reading.read_json_observed(path, SCENARIO, assumed)
+
+
 def test_a_scenario_file_is_found_beside_the_observation(tmp_path: Path) -> None:
     from apo_bench.resources import folder
 
@@ -333,13 +347,13 @@ def test_deviations_may_be_assumed_if_that_is_asked_for(tmp_path: Path) -> None:
     first = document["operations"][1]
     second = document["operations"][2]
     del second["covariance_mm_deg"]
-    second["deviation_mm"] = 3.0
+    second |= {"deviation_mm": 3.0, "deviation_deg": 0.25}
     path = tmp_path / "some.json"
     path.write_text(json.dumps(document), encoding="utf-8-sig")
     seen, assumed = json_reading.read_json_observed(path, SCENARIO, (2.0, 0.5))
     assert assumed
     found = np.sqrt(np.diagonal(seen.covariance, axis1=1, axis2=2))[:, [0, 3]]
-    np.testing.assert_allclose(found[[0, 2]], [[2e-3, np.radians(0.5)], [3e-3, np.radians(0.5)]])
+    np.testing.assert_allclose(found[[0, 2]], [[2e-3, np.radians(0.5)], [3e-3, np.radians(0.25)]])
     np.testing.assert_allclose(found[1, 0], 1e-3 * np.sqrt(first["covariance_mm_deg"][0][0]))
     with pytest.raises(InputError, match="operation 1: state either"):
         json_reading.read_json_observation(path, SCENARIO)

@@ -10,7 +10,7 @@ from apo_bench import Demonstration, InputError, draw_layout, load_scenario
 from apo_bench.geometry import approximate_symmetries, pose
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.models.failures import AlongRay, DisplacedView, Flipped, Stale, Swapped
-from apo_bench.observation.noise import Level
+from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.observing import observe
 
 KINDS = (Flipped, Stale, Swapped, AlongRay, DisplacedView)
@@ -106,3 +106,23 @@ def test_a_later_look_repeats_what_was_false_as_often_as_stated(repeat):
 def test_a_share_that_makes_no_sense_is_refused():
     with pytest.raises(InputError, match=r"a share of failures of 1.5 was given; give a number from 0 to 1"):
         Flipped(LEVEL, rate=1.5)
+
+
+def test_rates_may_follow_the_name():
+    noise = make_noise("flips:p=0.1/r=0.5", LEVEL)
+    assert (type(noise), noise.rate, noise.repeat) == (Flipped, 0.1, 0.5)
+    assert make_noise("stale:r=0.5", LEVEL).rate == make_noise("stale", LEVEL).rate
+    stated = observe(demonstration(), "flips:p=0.1/r=0.5", np.random.default_rng(1)).outliers
+    assert (stated.gross, stated.repeat) == pytest.approx((0.1, 0.5))
+
+
+@pytest.mark.parametrize("given", ["flips:", "flips:0.1", "flips:p", "flips:q=0.1", "flips:p=one", "flips:p=0.1/p=0.2"])
+def test_rates_that_are_none_are_refused(given):
+    with pytest.raises(InputError, match=rf"'{given}' was given; state how often the camera fails, 'flips:p=0\.1'"):
+        make_noise(given, LEVEL)
+
+
+@pytest.mark.parametrize("given", ["flips:p=1.1", "flips:p=nan", "flips:r=-0.1"])
+def test_rates_that_make_no_sense_are_refused(given):
+    with pytest.raises(InputError, match="give a number from 0 to 1"):
+        make_noise(given, LEVEL)

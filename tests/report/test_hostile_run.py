@@ -106,6 +106,7 @@ def test_a_scenario_is_one_of_ours_or_a_file_that_the_run_names(tmp_path: Path) 
     ("names", "own"),
     [
         ({"noise": "my noise.toml"}, ()),
+        ({"noise": "flips:p=0.1/r=0.5"}, ()),
         ({"noise": "empirical:mine.csv", "relations": "shifted:3", "method": "contact", "arm": "six_axis"}, ()),
         *((names, tuple(names.values())) for names in NAMES),
     ],

@@ -27,6 +27,7 @@ from apo_bench.show.learned_text import learned_lines
 from apo_bench.show.noise_card import Drawn, noise_card
 from apo_bench.show.recognised_text import confidence_line, difference_lines, evidence_table, recognition_form
 from apo_bench.simulation.arms.finding import find_arm
+from apo_bench.trial.repeats import Repeats
 from tests import bop_made, scenes
 
 ON_TABLE = Contact(PartFace("castle1", "bottom"), PartFace("table", "top"))
@@ -203,12 +204,14 @@ def test_what_noise_was_learned_is_said_with_its_interval() -> None:
         constant_covariance=np.diag([0.04, 0.04, 0.04, 0.01, 0.01, 0.01]),
     )
     measured = SimpleNamespace(source="made")
-    lines = learned_lines(SimpleNamespace(noise=noise, measured=measured, operations=36, unseen=2))  # type: ignore[arg-type]
+    found = SimpleNamespace(noise=noise, measured=measured, operations=36, unseen=2, repeats=Repeats(3, 5))
+    lines = learned_lines(found)  # type: ignore[arg-type]
     first, second = COMPONENTS[:2]
     assert lines[1].endswith("12, 36 operations, 2 of them not seen")
     assert lines[2].split(first.name)[1].strip() == f"0.46 {first.unit} [0.4 to 0.54]"
     assert lines[3].split(second.name)[1].strip() == f"none found, at most 1 {second.unit}"
-    assert lines[-2].endswith("5.0 % [1.0 to 20.0] of what was seen")
+    assert lines[-3].endswith("5.0 % [1.0 to 20.0] of what was seen")
+    assert lines[-2].endswith("58.3 % [20.9 to 90.6] of outliers, 5 were looked at again")
     assert "(1.00 +- 0.20, 0.00 +- 0.20, 0.00 +- 0.20) mm, (0.00 +- 0.10, 0.00 +- 0.10, 0.50 +- 0.10) deg" in lines[-1]
 
 

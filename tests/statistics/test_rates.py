@@ -122,13 +122,13 @@ def test_wilson_published_examples(successes: int, trials: int, expected: tuple[
 
 
 def test_what_was_not_executed_is_a_failure_and_stands_beside() -> None:
-    """Nothing corrected, nothing seen or a dead worker: failures; of those whose plan was carried out, 3 of 4."""
-    stages = {1: "correct", 2: "observe", 3: "worker", 4: "judge"}
+    """Nothing corrected, nothing seen, a plan refused or a dead worker: failures; of those carried out, 3 of 4."""
+    stages = {1: "correct", 2: "observe", 3: "worker", 4: "judge", 5: "plan"}
     rows = [row(seed=i, success=i not in stages, failure_stage=stages.get(i)) for i in range(8)]
     (cell,) = tally([*rows, row(seed=9, success=None)])
-    assert (cell.trials, cell.successes, cell.not_executed, cell.excluded) == (8, 4, 3, 1)
-    assert (cell.rate, cell.executed, cell.executed.rate) == (0.5, (4, 5), 0.8)
-    assert cell.executed.interval == wilson(4, 5)
+    assert (cell.trials, cell.successes, cell.not_executed, cell.excluded) == (8, 3, 4, 1)
+    assert (cell.rate, cell.executed, cell.wrong_when_executed) == (0.375, (3, 4), 0.25)
+    assert cell.executed.interval == wilson(3, 4)
     assert Rate(0, 0).rate is None
 
 

@@ -45,8 +45,8 @@ def _facts(title: str, formula: str, *notes: str) -> Facts:
         formula=(f"T_seen = S exp(L e), {formula} of a failure, else S = T",),
         frame="of the part that is seen, the same in every direction",
         parameters=(
-            f"p = {RATE:g}: share of operations that fail",
-            "r = 0: probability that a later look repeats what was false in the first",
+            f"p = {RATE:g} if nothing else is stated: share of operations that fail",
+            "r = 0 if nothing else is stated: probability that a later look repeats what was false in the first",
         ),
         states="L^2, the covariance of what is no failure, with p, r and where the camera stands",
         notes=(*notes, "At level 0 nothing fails; how far a failure is off does not depend on the level"),

@@ -8,12 +8,12 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from apo_bench.records.relations import WRONG
-from apo_bench.records.short_names import FOREIGN_ARMS, RESIDUALS
+from apo_bench.records.short_names import FAILURES, FOREIGN_ARMS, RESIDUALS
 
 DATA_PREFIXES: Mapping[str, tuple[str, ...]] = {
     "method": (),
     "arm": FOREIGN_ARMS,
-    "noise": (RESIDUALS,),
+    "noise": (RESIDUALS, *(f"{name}:" for name in FAILURES)),
     "relations": tuple(f"{kind}:" for kind in WRONG),
 }
 """Column -> how names with a colon begin that are data, and no code."""

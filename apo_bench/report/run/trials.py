@@ -70,7 +70,7 @@ def sample(rows: Iterable[Row], most: int, *, trust_code: bool = False) -> list[
     ways = grouped(
         ((str(row["failure_stage"]), str(row["failure_code"])), row)
         for row in failed
-        if row["failure_stage"] not in (*NOT_EXECUTED, "plan") and (trust_code or not own_code(row))
+        if row["failure_stage"] not in NOT_EXECUTED and (trust_code or not own_code(row))
     )
     chosen: list[Row] = []
     for _, alike in sorted(ways.items(), key=lambda way: (-len(way[1]), way[0]))[:most]:
