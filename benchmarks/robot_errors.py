@@ -24,8 +24,8 @@ SAID = """\
 # Errors of the robot
 
 Written by `python benchmarks/robot_errors.py` from sweeps of `benchmarks/robot_errors.toml` and of parts of it.
-Success: the finished assembly is right; the same seeds in every cell, a careful human, clearance of 0.25 mm per side, and for
-`contact` and `none` a noise of 1 mm and 1 degree. A [robot
+Success: the finished assembly is right; the same seeds in every cell, a careful human, clearance of 0.25 mm per side,
+and for `contact` and `none` a noise of 1 mm and 1 degree. A [robot
 error](../guide/arm.md#what-is-wrong-with-the-robot-itself) is drawn anew for every trial; the numbers are standard
 deviations in mm and degrees. Percentages are over all scenarios, with a 95 % interval (Wilson).
 
