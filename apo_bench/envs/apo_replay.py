@@ -11,6 +11,7 @@ import numpy as np
 from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Poses, Step
 from apo_bench.envs.episode import Episode, Scenes, Settings, watch_human, with_options
 from apo_bench.envs.infos import step_info
+from apo_bench.envs.robot import RobotSettings, carried_out
 from apo_bench.envs.spaces import Action, Seen, action_space, as_seen_entries, moved, observation_space
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
@@ -22,36 +23,25 @@ from apo_bench.records import (
     Predicted,
     TrialSettings,
     check,
-    checked_robot_error,
-    checked_stated_error,
-    checked_wrench,
     level_pair,
     refuse_noise,
-    told_error,
 )
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.scene.scene import build_scene
-from apo_bench.trial.feeling import feels_of
 from apo_bench.trial.fitting import fitting_plan
 from apo_bench.trial.promise import abstained, promised_success
 from apo_bench.trial.stages import (
-    WRENCH,
     demonstration_failure,
-    draw_robot_error,
     looks_at,
     observation_failure,
     observe_demonstration,
     predicted_outcome,
     range_sensor,
-    replay_and_judge,
-    stream_key,
     trial_outcome,
 )
 
 PICTURE = (480, 640)
-LONGEST_REPLAY_S = 1000.0
-"""Simulated time after which a replay begins no further step: seven times the longest of the benchmark."""
 
 
 @final
@@ -113,10 +103,8 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     - `timestep_s`: of the physics.
     - `robot_error`: what is wrong with the robot itself, as standard deviations: `none`, or `hand_eye:1/0.2+tool:0.5`.
     - `feels`: whether the robot finds out by touching how wrong it is itself, as with the methods `METHOD+feel`.
-    - `wrench`: the force and torque sensor at its wrist, `external` or another name or noise; nothing reads it unless
-      the robot feels.
-    - `stated_error`: how wrong the robot is said to be, `drawn`, `unstated`, or standard deviations; nobody asks unless
-      it feels.
+    - `wrench`: the force and torque sensor at its wrist, `external` or another name or noise, if it feels.
+    - `stated_error`: how wrong it is said to be, `drawn`, `unstated`, or standard deviations, if it feels.
     - `looks`: how often `env.unwrapped.look(operations)`, or a corrector that can ask, may look at operations again.
     - `abstain`: a plan that promises to succeed with less than this probability is not carried out: reward 0, stage
       `promise`, code `abstained`. 0 carries out everything.
@@ -158,10 +146,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         check("looks", looks)
         check("abstain", abstain)
         self._abstain = abstain
-        self._robot_error = checked_robot_error(robot_error)
-        self._feels = feels
-        self._wrench = checked_wrench(wrench)
-        self._stated_error = checked_stated_error(stated_error)
+        self._robot = RobotSettings(robot_error, feels, wrench, stated_error).checked()
         self.render_mode = render_mode
         if eye == RANGE and noise is not None:
             refuse_noise(noise)
@@ -333,22 +318,13 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             return failed, demonstration_failure(simulated.demonstration), None, None
         if self._refused is not None:
             return failed, self._refused, None, None
-        predicted = predicted_outcome(plan, self._scene, self._feels)
-        promised = promised_success(plan, self.seen, self._correction, self._scene, self._robot_error, self._feels)
+        robot = self._robot
+        predicted = predicted_outcome(plan, self._scene, robot.feels)
+        told = robot.robot_error, robot.feels, robot.feels
+        promised = promised_success(plan, self.seen, self._correction, self._scene, *told)
         if promised < self._abstain:
             return failed, abstained(promised, self._abstain), predicted, promised
-        told = told_error(self._stated_error, self._robot_error)
-        noise = stream_key(episode.trial, WRENCH)
-        attempt = replay_and_judge(
-            plan,
-            self._scene,
-            simulated.layout.goals,
-            self._watch(),
-            searches=self._feels,
-            most_s=LONGEST_REPLAY_S,
-            error=draw_robot_error(self._robot_error, self._scene, episode.trial),
-            feels=feels_of(plan, self._scene, told, noise, self._wrench) if self._feels else None,
-        )
+        attempt = carried_out(robot, plan, self._scene, simulated.layout.goals, episode.trial, self._watch())
         if attempt.result.reached.final is not None:
             self._poses = attempt.result.reached.final.poses
         judged = attempt.verdict

@@ -92,6 +92,7 @@ def promised_success(
     where: Scene | Scenario,
     robot_error: str = NO_ROBOT_ERROR,
     searches: bool = False,
+    feels: bool = False,
 ) -> float:
     """The probability that a plan succeeds; the same for the same arguments.
 
@@ -100,11 +101,12 @@ def promised_success(
         correction: What the corrector made of it; None where none was asked, or a plan is nobody's correction.
         where: What the plan is to be carried out in. Of a scenario, everything counts as in reach.
         robot_error: The errors that are stated of the robot, as in rows; of a scenario they are not asked for.
-        searches: The robot feels for a hole where a motion into it is stopped, as one with `+feel` does too; what that
-            one makes up for by touching is not known here yet.
+        searches: The robot feels for a hole where a motion into it is stopped, as one with `+feel` does too.
+        feels: The robot touches first, and makes up for its errors: it counts as one that has none.
     """
     explained = explanations(correction, believed, plan.goals)
-    score = plan_score(plan, believed.assembly, explained, where, robot_error, searches)
+    wrong = NO_ROBOT_ERROR if feels else robot_error
+    score = plan_score(plan, believed.assembly, explained, where, wrong, searches)
     return float(np.interp(score, SCORES, RATES))
 
 

@@ -206,7 +206,8 @@ def _outcome(
         assert planned.failure is not None
         return result(planned.failure, success=False) | method_columns(planned)
     _, searches, by_touch = parsed(settings.method)
-    promised = promised_success(planned.plan, believed, planned.correction, scene, settings.robot_error, searches)
+    wrong = settings.robot_error
+    promised = promised_success(planned.plan, believed, planned.correction, scene, wrong, searches, by_touch)
     said: Row = {"predicted": predicted_outcome(planned.plan, scene, searches), "promised": promised}
     if promised < settings.abstain:
         return result(abstained(promised, settings.abstain), success=False) | method_columns(planned) | said

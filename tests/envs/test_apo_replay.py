@@ -18,8 +18,7 @@ from gymnasium.utils.env_checker import check_env
 import apo_bench
 from apo_bench import Correction, InputError, Observation, Scene, TrialSettings, correct, run_trial
 from apo_bench.assembly import Outcome, Step
-from apo_bench.envs import apo_replay as envs
-from apo_bench.envs import episode
+from apo_bench.envs import episode, robot
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.infos import nullable, predicted_info
 from apo_bench.geometry import pose
@@ -29,7 +28,7 @@ from apo_bench.simulation.execution import controller as replays
 from apo_bench.trial.stages import SimulatedDemonstration, looks_at, simulate_demonstration
 
 SEED = 5
-REPLAY = "apo_bench.envs.apo_replay.replay_and_judge"
+REPLAY = "apo_bench.envs.robot.replay_and_judge"
 
 
 @pytest.fixture(scope="module")
@@ -290,7 +289,7 @@ def test_simulated_time_has_a_limit(watched: APOReplay, monkeypatch: pytest.Monk
     info = watched.step(zeros(watched))[4]
     assert [info[key] for key in ("is_success", "stage", "code", "operation")] == [False, "plan", "time_limit", 1]
     monkeypatch.undo()
-    monkeypatch.setattr(envs, "LONGEST_REPLAY_S", 5.0)
+    monkeypatch.setattr(robot, "LONGEST_REPLAY_S", 5.0)
     watched.reset(seed=SEED)
     info = watched.step(zeros(watched))[4]
     assert [info[key] for key in ("is_success", "stage", "code")] == [False, "pick", "time_limit"]
