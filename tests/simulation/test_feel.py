@@ -55,7 +55,7 @@ def test_the_floor_is_touched_at_three_places_around_the_goals(name):
     # every third of a turn, so the middle is inside
     assert np.diff(sorted([*angles, min(angles) + 2 * np.pi])).max() < np.pi
     for place in places:
-        touched = pose.apply(place.T_world_tip, place.point[None])[0]
+        touched = pose.apply(place.T_world_tip, place.patch).mean(axis=0)
         assert place.normal @ touched - place.offset == pytest.approx(0.004, abs=1e-9)
 
 

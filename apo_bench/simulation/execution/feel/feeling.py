@@ -5,7 +5,7 @@ is believed to be. The drawn errors enter in two ways, as in every replay: they 
 it to be, and `believed_tip` takes them off again, since what it tells is what the robot's own encoders say.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol, final
 
@@ -25,10 +25,14 @@ ACTS = ("square", "touch", "lay", "search")
 """Parts are squared before they are taken, what is fixed is touched, what is inserted level is laid flat first, and
 what is stopped all the same is searched for."""
 _TOUCH_SIGMA_M = 3e-5
-"""How exactly a guarded touch tells a plane: the patch of the finger that meets it may be tilted."""
+"""How exactly a guarded touch tells a plane, [m]."""
 _SQUARED = np.array([5e-5, 2e-4, 1e-3, 5e-3, 3e-3, 3e-3])
 """How exactly a part lies between pads that closed twice, [m, rad], a twist in the frame of the tip: closing tips a
 round part by 0.3 degrees, and pressed on a floor it slides up between the pads."""
+_CORNERS = 3
+_FLAT_M = 1e-5
+"""Which corner of the hand touched is asked so often, as what is believed changes; a patch that lies within the second
+touched with its middle."""
 _TOUCH_N = 2.0
 _SIGMAS = 6.0
 """A touch ends by this force, or by so many standard deviations of what the wrist feels."""
@@ -143,17 +147,18 @@ class Feeling:
         """The body Jacobian of the tip, (6, joints)."""
         return self._kinematics.jacobian(robot.q)
 
-    def without_common(self, touches: Sequence[Touch]) -> list[Touch]:
-        """Touches of one wall less what they have in common beyond what is believed: their differences stay."""
-        if len(touches) < 2:
-            return []
-        tips = [self.belief.real(touch.T_world_tip, touch.jacobian) for touch in touches]
-        beyond = [t.normal @ pose.apply(X, t.point[None])[0] - t.offset for t, X in zip(touches, tips, strict=True)]
-        return [replace(t, offset=t.offset + float(np.mean(beyond))) for t in touches]
+    def learn(self, robot: Robot, felt: Sequence[tuple[Touch, Array]], differ: bool = False) -> None:
+        """Believe what was felt; from now on commands make up for it.
 
-    def learn(self, robot: Robot, touches: Iterable[Touch]) -> None:
-        """Believe what was felt; from now on commands make up for it."""
-        self.belief = self.belief.touch(*touches)
+        Args:
+            felt: Touches of the hand, each with the corners of its patch, (k, 3), in the frame of the tip: of a hand
+                that is believed to be tilted the foremost corner touched.
+            differ: Only what differs between the touches counts, which are of one wall: the fingers give way.
+        """
+        before = self.belief
+        for _ in range(_CORNERS):
+            touches = [self._cornered(touch, patch) for touch, patch in felt]
+            self.belief = before.touch(*(_less_common(before, touches) if differ else touches))
         left = self._error
         E = self.belief.hand_eye
         tool = np.array(left.tool)
@@ -162,6 +167,13 @@ class Feeling:
             left, hand_eye=left.hand_eye @ pose.inverse(E), tool=tool, joints=left.joints - self.belief.encoders
         )
         robot.compensate(self.residual.joints)
+
+    def _cornered(self, touch: Touch, patch: Array) -> Touch:
+        """The touch by the corner of the patch that is foremost as it is believed."""
+        X = self.belief.real(touch.T_world_tip, touch.jacobian)
+        ahead = pose.apply(X, patch) @ touch.normal
+        flat = float(np.ptp(ahead)) < _FLAT_M
+        return replace(touch, point=patch.mean(axis=0) if flat else patch[int(np.argmin(ahead))])
 
     def taken(self, operation: int) -> None:
         """A part was taken between pads that closed twice; it may have slipped since."""
@@ -196,3 +208,12 @@ class Feeling:
         J = self.jacobian(robot)
         grasp, T_tip_part = held or (None, None)
         return Touch(self.believed_tip(robot), normal, offset, point, _TOUCH_SIGMA_M, J, grasp, T_tip_part)
+
+
+def _less_common(belief: Belief, touches: Sequence[Touch]) -> list[Touch]:
+    """Touches of one wall less what they have in common beyond what is believed: their differences stay."""
+    if len(touches) < 2:
+        return []
+    tips = [belief.real(touch.T_world_tip, touch.jacobian) for touch in touches]
+    beyond = [t.normal @ pose.apply(X, t.point[None])[0] - t.offset for t, X in zip(touches, tips, strict=True)]
+    return [replace(t, offset=t.offset + float(np.mean(beyond))) for t in touches]

@@ -47,8 +47,8 @@ class TouchPlace(NamedTuple):
     """Where the motion begins, (4, 4), [m]."""
     way: Array
     """Unit vector, (3,), world: into the face."""
-    point: Array
-    """What touches, (3,), in the frame of the tip, [m]."""
+    patch: Array
+    """Corners of what touches, (k, 3), in the frame of the tip, [m]: of a hand that is tilted one of them does."""
     normal: Array
     """Of the face, outwards, (3,), world."""
     offset: float
@@ -66,7 +66,8 @@ def floor_places(plan: Plan, scene: Scene) -> tuple[TouchPlace, ...]:
     d = float(n @ (T[:3, :3] @ face.outline[0] + T[:3, 3]))
     around = obstacles(plan.assembly.solids, plan.start, (part,))
     rest = scene.kinematics.forward(scene.arm.home)[:3, :3]
-    point = _lowest(_boxes(scene))
+    patch = _lowest(_boxes(scene))
+    point = patch.mean(axis=0)
     middle = plan.goals[:, :2, 3].mean(axis=0)
     to_face = pose.inverse(T @ plane_frame(face))
 
@@ -77,7 +78,7 @@ def floor_places(plan: Plan, scene: Scene) -> tuple[TouchPlace, ...]:
         begins = frame(rest, touched + STAND_OFF_M * n - rest @ point)
         if not own_shape(face).contains(Point(pose.apply(to_face, touched[None])[0, :2]).buffer(_PATCH_M)):
             return None
-        return TouchPlace(begins, -n, point, n, d) if _free(scene, begins, around) else None
+        return TouchPlace(begins, -n, patch, n, d) if _free(scene, begins, around) else None
 
     best: list[TouchPlace] = []
     for radius in _RADII_M:
@@ -158,19 +159,21 @@ def _at_wall(scene: Scene, face: Face, T: Array, ahead: Array) -> TouchPlace:
     x = ahead[0] * into + ahead[1] * np.cross(into, -UP)
     R = np.column_stack([x, np.cross(-UP, x), -UP])
     boxes = _boxes(scene)
-    reach = _lowest(boxes)[2]
+    reach = float(_lowest(boxes)[0, 2])
     ends = [box for box in boxes if box.center[2] + box.half[2] > reach - _END_M]
     sides = [float(ahead @ box.center[:2] + np.abs(ahead) @ box.half[:2]) for box in ends]
-    level = np.mean(
-        [box.center[:2] for box, side in zip(ends, sides, strict=True) if side > max(sides) - _END_M], axis=0
-    )
-    level += (max(sides) - ahead @ level) * ahead
+    those = [box for box, side in zip(ends, sides, strict=True) if side > max(sides) - _END_M]
+    across = np.abs(ahead[::-1])
+    low_across = min(float(across @ (box.center - box.half)[:2]) for box in those)
+    high_across = max(float(across @ (box.center + box.half)[:2]) for box in those)
     foot = low + min(_OVER_M, (high - low) / 2)
     common = min(high - foot, 2.0 * min(float(box.half[2]) for box in ends))
-    point = np.array([*level, reach - common / 2])
+    level = [max(sides) * ahead + reach_across * across for reach_across in (low_across, high_across)]
+    patch = np.array([(*xy, z) for xy in level for z in (reach - common, reach)])
     touched = np.append(corners[:, :2].mean(axis=0), foot + common / 2)
     touched += (d - n @ touched) * n
-    return TouchPlace(frame(R, touched + STAND_OFF_M * n - R @ point), -n, point, n, d)
+    begins = frame(R, touched + STAND_OFF_M * n - R @ patch.mean(axis=0))
+    return TouchPlace(begins, -n, patch, n, d)
 
 
 def _boxes(scene: Scene) -> tuple[Box, ...]:
@@ -178,10 +181,12 @@ def _boxes(scene: Scene) -> tuple[Box, ...]:
 
 
 def _lowest(boxes: Sequence[Box]) -> Array:
-    """The middle of what reaches farthest ahead, (3,), in the frame of the tip."""
+    """The corners of what reaches farthest ahead, (4, 3), in the frame of the tip."""
     reach = max(float(box.center[2] + box.half[2]) for box in boxes)
-    ends = [box.center for box in boxes if box.center[2] + box.half[2] > reach - 1e-4]
-    return np.array([*np.mean(ends, axis=0)[:2], reach])
+    ends = [box for box in boxes if box.center[2] + box.half[2] > reach - _END_M]
+    low = np.min([box.center - box.half for box in ends], axis=0)
+    high = np.max([box.center + box.half for box in ends], axis=0)
+    return np.array([(x, y, reach) for x in (low[0], high[0]) for y in (low[1], high[1])])
 
 
 def _free(scene: Scene, T: Array, around: Sequence[Obstacle]) -> bool:

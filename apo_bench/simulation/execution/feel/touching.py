@@ -1,6 +1,7 @@
 """Touching what is fixed with the closed, empty hand: down on the floor around the goals, and against walls."""
 
 from apo_bench.assembly import Touch
+from apo_bench.geometry import Array
 from apo_bench.simulation.execution.feel.feeling import Feeling
 from apo_bench.simulation.execution.feel.places import (
     OPENING_M,
@@ -41,14 +42,12 @@ def find_out(robot: Robot, feeling: Feeling) -> None:
         return
     robot.fingers(OPENING_M)
     for places in (floor_places, wall_places, opposite_places):
-        felt = [touch for place in places(feeling.plan, robot.scene) for touch in _touched(robot, feeling, place)]
-        if places is opposite_places:
-            felt = feeling.without_common(felt)
-        feeling.learn(robot, felt)
+        felt = [each for place in places(feeling.plan, robot.scene) for each in _touched(robot, feeling, place)]
+        feeling.learn(robot, felt, differ=places is opposite_places)
 
 
-def _touched(robot: Robot, feeling: Feeling, place: TouchPlace) -> list[Touch]:
-    """Go there, press, come back; what it tells, if anything was felt."""
+def _touched(robot: Robot, feeling: Feeling, place: TouchPlace) -> list[tuple[Touch, Array]]:
+    """Go there, press, come back; what it tells, if anything was felt, and what of the hand may have touched."""
     E = feeling.residual.hand_eye
     T = E @ place.T_world_tip @ feeling.residual.tool
     way = E[:3, :3] @ place.way
@@ -64,7 +63,8 @@ def _touched(robot: Robot, feeling: Feeling, place: TouchPlace) -> list[Touch]:
     with sleeping(robot.scene.work, False), reading(robot, feeling.wrist):
         end = shifted(robot.T, way, STAND_OFF_M + _BEYOND_M)
         left = press(robot, steady(robot.T, end, _SPEED), way, feeling.touch_n, feeling.wrist)
-        felt = [] if left is None else [feeling.touch(robot, place.normal, place.offset, place.point)]
+        middle = place.patch.mean(axis=0)
+        touched = feeling.touch(robot, place.normal, place.offset, middle)
         robot.follow(smooth(robot.T, T, _BACK))
     robot.follow(smooth(robot.T, with_height(T, T[2, 3] + _HIGH_M), _BACK))
-    return felt
+    return [] if left is None else [(touched, place.patch)]
