@@ -33,7 +33,9 @@ def plan(name):
 
 
 def drawn(name, kinds, seed=3):
-    return robot_error_of(kinds, scene(name), lambda which: np.random.default_rng([seed, which]))
+    return robot_error_of(
+        kinds, scene(name), lambda which, shape: np.random.default_rng([seed, which]).standard_normal(shape)
+    )
 
 
 def found_out(name, error, parts_at=None, stated=STATED):
