@@ -51,7 +51,7 @@ def lay(robot: Robot, feeling: Feeling, operation: int, t: Transfer, grip: Grip)
     """
     T_before = robot.T
     held = pose.inverse(grip.T_part_tip @ pose.inverse(feeling.residual.tool))
-    robot.macro = "lay-flat"
+    robot.stage, robot.macro = "attach", "lay-flat"
     robot.follow(smooth(robot.T, shifted(t.flush.T @ grip.T_part_tip, UP, _NEAR_M), _DOWN))
     robot.stand()
     with sleeping(robot.scene.work, False), reading(robot, feeling.wrist):

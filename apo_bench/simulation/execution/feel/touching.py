@@ -59,7 +59,7 @@ def _touched(robot: Robot, feeling: Feeling, place: TouchPlace) -> list[tuple[To
     robot.go(with_height(T, high), _OVER)
     robot.follow(smooth(robot.T, T, _DOWN))
     robot.stand()
-    # While what is fixed is let sleep, no collision of the arm with it is noticed.
+    # Nothing sleeps meanwhile: what the arm strikes is noticed, whatever rests.
     with sleeping(robot.scene.work, False), reading(robot, feeling.wrist):
         end = shifted(robot.T, way, STAND_OFF_M + _BEYOND_M)
         left = press(robot, steady(robot.T, end, _SPEED), way, feeling.touch_n, feeling.wrist)
