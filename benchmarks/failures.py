@@ -152,7 +152,13 @@ def corrected(draw: Draw) -> dict[str, object]:
         ends[name] = made.ok and right(scenario, shown, made.goals)
         sentence = made.sentence if name == "contact-robust" else sentence
     false_ones = [int(k) + 1 for k in np.flatnonzero(false)]
-    return asdict(draw) | {"false": false_ones, "right": ends, "seconds": seconds, "sentence": sentence}
+    return asdict(draw) | {
+        "scene": draw.scene,
+        "false": false_ones,
+        "right": ends,
+        "seconds": seconds,
+        "sentence": sentence,
+    }
 
 
 def main() -> None:

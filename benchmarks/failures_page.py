@@ -62,10 +62,20 @@ def write(draws: Iterable[Mapping[str, Any]]) -> None:
         for cell, each in sorted(ends.items()):
             writer.writerow([f"{cell.stated:.4g}", *cell[1:], len(each), sum(each)])
     times = {name: tuple(np.percentile(each, [50, 95])) for name, each in seconds.items()}
-    part = "\n".join([*section(read()), "", times_said(times)])
-    before, _, rest = PAGE.read_text(encoding="utf-8").partition(FIRST)
-    PAGE.write_text(f"{before}{FIRST}\n{part}\n{LAST}{rest.partition(LAST)[2]}", encoding="utf-8")
-    print(f"Wrote {KEPT} and {PAGE}")
+    false = sum(bool(draw["false"]) for draw in draws)
+    put(
+        [*section(read()), "", f"In {false} of all {len(draws)} draws something is false. {times_said(times)}"],
+        FIRST,
+        LAST,
+    )
+
+
+def put(part: Iterable[str], first: str, last: str) -> None:
+    """Write these lines between two marks of the page."""
+    before, _, rest = PAGE.read_text(encoding="utf-8").partition(first)
+    inside = "\n".join(part)
+    PAGE.write_text(f"{before}{first}\n{inside}\n{last}{rest.partition(last)[2]}", encoding="utf-8")
+    print(f"Wrote {PAGE}")
 
 
 def read() -> dict[Cell, Count]:

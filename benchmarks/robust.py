@@ -1,7 +1,8 @@
 """Keep what `contact-robust` is worth: `python benchmarks/robust.py FOLDER [FOLDER ...] [--trials N]`.
 
 Takes sweeps of benchmarks/robust.toml, whole or not, and writes results/robust.csv, one line for each cell, and
-docs/results/robust.md: success with Wilson's 95 % intervals, and the paired difference to `contact` with Tango's.
+the last part of docs/results/robust.md: success with Wilson's 95 % intervals, and the paired difference to `contact`
+with Tango's.
 """
 
 from __future__ import annotations
@@ -30,6 +31,7 @@ NAMES = {
     "outliers": "10 % ten times as bad, 2 % missed",
 }
 PLAIN = "isotropic"
+HEADING = "# In simulation"
 
 
 class Place(NamedTuple):
@@ -61,8 +63,10 @@ def main() -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow([*Place._fields, *Count._fields])
         writer.writerows([*place, *count] for place, count in sorted(cells.items()))
-    written = "\n".join(page(rows, cells)) + "\n"
-    PAGE.write_text(with_mujoco(written, mujoco_of(given.folders)), encoding="utf-8")
+    before = PAGE.read_text(encoding="utf-8").partition(f"#{HEADING}\n")[0]
+    written = with_mujoco("\n".join(page(rows, cells)) + "\n", mujoco_of(given.folders))
+    # It is the last part of its page, so its heading is one of the second order there.
+    PAGE.write_text(f"{before}#{written}", encoding="utf-8")
     print(f"Wrote {KEPT} and {PAGE}")
 
 
@@ -82,7 +86,7 @@ def place_of(row: Row) -> Place:
 def page(rows: list[Row], cells: Mapping[Place, Count]) -> list[str]:
     scenarios = sorted({place.scenario for place in cells})
     return [
-        "# Outliers",
+        HEADING,
         "",
         "Written by `python benchmarks/robust.py` from sweeps of `benchmarks/robust.toml`; counts in "
         "`benchmarks/results/robust.csv`. Success: the finished assembly is right; Wilson's 95 % intervals, the four "
