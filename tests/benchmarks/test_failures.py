@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks import wrong_relations
 from benchmarks.failures import KINDS, STATED, Draw, drawn
 from benchmarks.failures_page import PAGE, Cell, Count, fallen_short, read, row, section
 from benchmarks.failures_page import STATED as TITLES
@@ -17,6 +18,11 @@ def counts(told: int, robust: int, looks: int, kind: str = "flips") -> dict[Cell
 
 def test_the_page_holds_what_is_kept() -> None:
     assert "\n".join(section(read())) in PAGE.read_text(encoding="utf-8"), "run: python -m benchmarks.failures FILE"
+
+
+def test_the_page_holds_what_is_kept_of_wrong_relations() -> None:
+    lines = wrong_relations.section(wrong_relations.read())
+    assert "\n".join(lines) in PAGE.read_text(encoding="utf-8"), "run: python -m benchmarks.wrong_relations"
 
 
 def test_a_row_has_counts_and_shares_of_the_ceiling() -> None:
