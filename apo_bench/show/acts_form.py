@@ -34,7 +34,7 @@ from apo_bench.simulation.scene.scene import Scene
 
 
 def acts_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> dict[str, Any]:
-    """What `json` can write; mm, N, s, degrees and unit vectors, but yields, which are as they are used.
+    """What `json` can write; mm, N, Nm, s, degrees and unit vectors.
 
     Args:
         sensor: That of the wrist, as in `wrench_noise`.
@@ -116,8 +116,7 @@ def _grip(grip: Grip, T: Array, scene: Scene, frames: RobotFrames) -> dict[str, 
 
 
 def _laid(t: Transfer, frames: RobotFrames) -> dict[str, Any]:
-    """Which of the grips holds the part then follows from whether it is changed on the way out."""
-    grip = t.grips[0 if t.out.left is None else 1]
+    grip = t.grips[0 if t.out.left is None else 1]  # changed once already, if it is on the way out
     foot = pose.apply(t.flush.T, t.flush.feet[:1])[0]
     return {
         "when": "before the last motion" if t.into.level else "before it is carried",
