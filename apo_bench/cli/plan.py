@@ -14,6 +14,7 @@ from apo_bench.cli.printing import print_json
 from apo_bench.cli.setting_options import AsJson, ScenarioArgument, StatedDeg, StatedMm, takes, trial_options
 from apo_bench.errors import InputError
 from apo_bench.files.deviations import assumed_deviations
+from apo_bench.files.robot_frames import RobotFrames
 from apo_bench.io.processes import redirect_output
 from apo_bench.records import CORRECTOR
 from apo_bench.scenario.scenario import Scenario
@@ -88,6 +89,10 @@ def plan_command(
         Path | None,
         typer.Option(help="Base, flange, order of quaternions of --robot: .toml; default: world, tip, xyzw."),
     ] = None,
+    acts: Annotated[
+        str | None,
+        typer.Option(help="Write into --robot too what a robot that feels does, with this sensor at its wrist."),
+    ] = None,
     arm: Annotated[
         str | None, typer.Option(help="Say whether this arm would carry it out; compiles its scene.")
     ] = None,
@@ -95,7 +100,7 @@ def plan_command(
 ) -> None:
     """Say how every operation is done: contact states, macros, from where until where, what is guarded, the grasp."""
     from apo_bench.files.json_forms import write_form
-    from apo_bench.files.robot_frames import RobotFrames, read_robot_frames
+    from apo_bench.files.robot_frames import read_robot_frames
     from apo_bench.scenario.file import load_scenario
     from apo_bench.show.plan_text import plan_lines, plan_lines_form, plan_text
     from apo_bench.show.robot_form import robot_form
@@ -103,6 +108,8 @@ def plan_command(
     check_outputs([(robot, "--robot", (".json",))])
     if frames is not None and robot is None:
         raise InputError(f"--frames {frames} was given without --robot, whose frames they would be; give both.")
+    if acts is not None and robot is None:
+        raise InputError(f"--acts {acts} was given without --robot, the file for them; give both.")
     robot_frames = RobotFrames() if frames is None else read_robot_frames(frames)
     if observation is None:
         if method is not None:
@@ -129,7 +136,9 @@ def plan_command(
         notes.append(arm_sentence(loaded, None if observation is None else plan, arm))
     lines = plan_lines(plan, loaded)
     if robot is not None:
-        write_form(robot_form(lines, plan, loaded, robot_frames, notes), robot)
+        form = robot_form(lines, plan, loaded, robot_frames, notes)
+        more = {} if acts is None else {"acts": _acts_form(loaded, plan, robot_frames, acts, arm)}
+        write_form(form | more, robot)
     if as_json:
         print_json(plan_lines_form(lines, loaded, notes) | {"promised": promised})
         return
@@ -141,6 +150,14 @@ def plan_command(
     typer.echo("\n".join([*plan_text(lines), *([""] if notes else []), *notes]))
     if robot is not None:
         typer.echo(f"\nWrote {robot}")
+
+
+def _acts_form(scenario: Scenario, plan: Plan, frames: RobotFrames, sensor: str, arm: str | None) -> dict[str, Any]:
+    from apo_bench.records import SETTINGS
+    from apo_bench.show.acts_form import acts_form
+    from apo_bench.simulation.scene.scene import build_scene
+
+    return acts_form(plan, build_scene(scenario, arm=arm or SETTINGS["arm"].default), frames, sensor)
 
 
 def _planned(

@@ -53,11 +53,11 @@ def robot_form(
             "position": "mm",
             "quaternion": frames.quaternion,
             "tip": "between the fingertips: z ahead, x along the direction in which the fingers close",
-            "base_in_world": _pose(frames.T_world_base, frames),
-            "flange_to_tip": None if frames.T_flange_tip is None else _pose(frames.T_flange_tip, frames),
+            "base_in_world": pose_form(frames.T_world_base, frames),
+            "flange_to_tip": None if frames.T_flange_tip is None else pose_form(frames.T_flange_tip, frames),
         },
         "parts": {
-            part: {"starts": _pose(to_base @ T, frames), "fixed": part in plan.assembly.fixed}
+            part: {"starts": pose_form(to_base @ T, frames), "fixed": part in plan.assembly.fixed}
             for part, T in plan.start.items()
         },
         "steps": steps,
@@ -97,16 +97,19 @@ def _step(
         "carries": list(line.what.carries),
         "makes": [str(contact) for contact in contacts],
         "grasp": {
-            "tip_in_part": _pose(grip, frames),
+            "tip_in_part": pose_form(grip, frames),
             "part_is_at_most_mm_wide": round(1e3 * width, 6),
         },
-        "pick": {"above": _tip(_shifted(tip, np.array([0.0, 0.0, 1.0]), _ABOVE_M), frames), "at": _tip(tip, frames)},
+        "pick": {
+            "above": tip_form(_shifted(tip, np.array([0.0, 0.0, 1.0]), _ABOVE_M), frames),
+            "at": tip_form(tip, frames),
+        },
         "motions": [
             *_departs(line, here, grip, frames),
             *_arrives(line, goal, grip, frames),
         ],
-        "leave": _tip(_shifted(end, end[:3, 2], -_ABOVE_M), frames),
-        "part_at_goal": _pose(pose.inverse(frames.T_world_base) @ goal, frames),
+        "leave": tip_form(_shifted(end, end[:3, 2], -_ABOVE_M), frames),
+        "part_at_goal": pose_form(pose.inverse(frames.T_world_base) @ goal, frames),
         "trouble": line.trouble or None,
     }
 
@@ -160,8 +163,8 @@ def _motion(
     direction = pose.inverse(frames.T_world_base)[:3, :3] @ way
     return {
         "macro": name,
-        "from": _tip(begin @ grip, frames),
-        "to": _tip(end @ grip, frames),
+        "from": tip_form(begin @ grip, frames),
+        "to": tip_form(end @ grip, frames),
         "direction": (np.round(direction, 12) + 0.0).tolist(),
         "length_mm": round(1e3 * float(np.linalg.norm(end[:3, 3] - begin[:3, 3])), 6),
         "guarded": guarded,
@@ -169,13 +172,13 @@ def _motion(
     }
 
 
-def _tip(T_world_tip: Array, frames: RobotFrames) -> dict[str, Any]:
+def tip_form(T_world_tip: Array, frames: RobotFrames) -> dict[str, Any]:
     """A pose of the tip, or of the flange that carries it, in the frame of the base."""
     T = pose.inverse(frames.T_world_base) @ T_world_tip
-    return _pose(T if frames.T_flange_tip is None else T @ pose.inverse(frames.T_flange_tip), frames)
+    return pose_form(T if frames.T_flange_tip is None else T @ pose.inverse(frames.T_flange_tip), frames)
 
 
-def _pose(T: Array, frames: RobotFrames) -> dict[str, Any]:
+def pose_form(T: Array, frames: RobotFrames) -> dict[str, Any]:
     packed = pose.pack(T)
     q = packed[3:] if frames.quaternion == "wxyz" else np.roll(packed[3:], -1)
     return {"position_mm": (packed[:3] * 1e3).round(9).tolist(), f"quaternion_{frames.quaternion}": q.tolist()}

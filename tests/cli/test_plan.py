@@ -361,10 +361,15 @@ def test_a_plan_for_a_robot_is_written_in_the_frames_that_were_stated(
     found = json.loads(out.read_text(encoding="utf-8"))
     assert found["poses"]["quaternion"] == "wxyz"
     assert [step["part"] for step in found["steps"]] == ["castle1", "castle2", "stick"]
+    assert cli.main([*seen, "--robot", str(out), "--frames", str(frames), "--acts", "cobot"]) == 0
+    with_acts = json.loads(out.read_text(encoding="utf-8"))
+    assert with_acts.pop("acts")["sensor"]["noise_n"] == 3.5
+    assert with_acts == found
     capsys.readouterr()
     for wrong, sentence in (
         (["plan", "stick_in_tower", "--robot", str(out)], "--robot was given without --observation"),
         ([*seen, "--frames", str(frames)], "was given without --robot"),
+        ([*seen, "--acts", "external"], "--acts external was given without --robot"),
     ):
         assert cli.main(wrong) == 2
         assert sentence in capsys.readouterr().err

@@ -14,8 +14,8 @@ from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth
 from apo_bench.simulation.robot.robot import Robot
 
-_YAWS_DEG = (1.0, -1.0, 2.0, -2.0)
-_YAWED_RADIUS_M = 0.001
+YAWS_DEG = (1.0, -1.0, 2.0, -2.0)
+YAWED_RADIUS_M = 0.001
 """Where the first spiral finds nothing, the part is turned about the vertical and a shorter one follows, so often."""
 _BACK_M = 0.0005
 _BACK = 0.005
@@ -23,7 +23,7 @@ _BRING = 0.03
 """Drawn back so far, a part touches nothing ahead; peak speeds [m/s] there, and then to where a spiral begins."""
 _DEEP_M = 0.001
 """What goes so much deeper than where it was stopped has found the hole."""
-_SEARCHES = 3
+SEARCHES = 3
 """A motion is searched for so many times at most, in one transfer up to twice as often."""
 _PIECE_M = 0.01
 _NOTHING_M = 1e-6
@@ -46,7 +46,7 @@ def press_in(
     T_search = None
     aside = 0.0
     T_tip_front = pose.inverse(grip.T_part_tip) @ pose.at(t.front)
-    for _ in range(_SEARCHES):
+    for _ in range(SEARCHES):
         if left <= near or aside >= RADIUS_M:
             break
         stopped = shifted(end, guard.way, float((robot.T - end)[:3, 3] @ guard.way))
@@ -83,11 +83,11 @@ def search_hole(robot: Robot, stopped: Array, front: Array, guard: Guard, press:
         What brings the poses that were meant to those that were found, (4, 4), world; None if nothing was found.
     """
     off = shifted(stopped, guard.way, -_BACK_M)
-    for yaw in (0.0, *_YAWS_DEG):
+    for yaw in (0.0, *YAWS_DEG):
         turn = _turned(yaw, front)
         _bring(robot, turn @ off, guard.way)
         turned = Guard(turn[:3, :3] @ guard.way, guard.newton)
-        far = min(radius, _YAWED_RADIUS_M) if yaw else radius
+        far = min(radius, YAWED_RADIUS_M) if yaw else radius
         spiral = Spiral(turned, press, far, _BACK_M + _DEEP_M, robot.step_s)
         servo(robot, spiral)
         if spiral.found:

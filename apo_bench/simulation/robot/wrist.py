@@ -66,6 +66,21 @@ def part_loads(scene: Scene, T_tip_part: Mapping[str, Array]) -> tuple[Load, ...
     return tuple(loads)
 
 
+def low_pass_part(bandwidth_hz: float = BANDWIDTH_HZ) -> float:
+    """How much of a new reading goes into what is felt."""
+    return 1.0 - math.exp(-2.0 * math.pi * bandwidth_hz * READING_S)
+
+
+def felt_noise(noise: WrenchNoise, part: float) -> WrenchNoise:
+    """What a low pass leaves of the noise: y' = (1 - a) y + a x has the variance a / (2 - a) of the white noise x.
+
+    Args:
+        part: a, how much of a new reading goes into what is felt.
+    """
+    left = math.sqrt(part / (2.0 - part))
+    return WrenchNoise(left * noise.force_n, left * noise.torque_nm)
+
+
 @final
 class WristSensor:
     """What one arm feels at its wrist during one replay."""
@@ -93,7 +108,7 @@ class WristSensor:
         self._encoders = encoders
         self._sigma = np.repeat(noise, 3)
         self._rng = rng
-        self._part = 1.0 - math.exp(-2.0 * math.pi * bandwidth_hz * READING_S)
+        self._part = low_pass_part(bandwidth_hz)
         self._offset = OFFSETS * self._sigma * rng.standard_normal(6)
         self._zero: Array = np.zeros(6)
         self._T_tip_sensor = _sensor_frame(scene.kinematics, scene.arm)
@@ -109,12 +124,8 @@ class WristSensor:
 
     @property
     def sigma(self) -> tuple[float, float]:
-        """Standard deviation of what is felt behind the low pass, per axis, [N] and [Nm].
-
-        y' = (1 - a) y + a x has the variance a / (2 - a) of the white noise x.
-        """
-        force, torque = (self._sigma[[0, 3]] * math.sqrt(self._part / (2.0 - self._part))).tolist()
-        return force, torque
+        """Standard deviation of what is felt behind the low pass, per axis, [N] and [Nm]."""
+        return felt_noise(WrenchNoise(*self._sigma[[0, 3]].tolist()), self._part)
 
     def hold(self, *parts: Load) -> None:
         """Say what is in the hand, or nothing, as it is believed (`part_loads`); its weight is not felt then."""

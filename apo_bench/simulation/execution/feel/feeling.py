@@ -24,9 +24,9 @@ from apo_bench.simulation.scene.scene import Scene
 ACTS = ("square", "touch", "lay", "search")
 """Parts are squared before they are taken, what is fixed is touched, what is inserted level is laid flat first, and
 what is stopped all the same is searched for."""
-_TOUCH_SIGMA_M = 3e-5
+TOUCH_SIGMA_M = 3e-5
 """How exactly a guarded touch tells a plane, [m]."""
-_SQUARED = np.array([5e-5, 2e-4, 1e-3, 5e-3, 3e-3, 3e-3])
+SQUARED = np.array([5e-5, 2e-4, 1e-3, 5e-3, 3e-3, 3e-3])
 """How exactly a part lies between pads that closed twice, [m, rad], a twist in the frame of the tip: closing tips a
 round part by 0.3 degrees, and pressed on a floor it slides up between the pads."""
 _CORNERS = 3
@@ -36,6 +36,11 @@ touched with its middle."""
 _TOUCH_N = 2.0
 _SIGMAS = 6.0
 """A touch ends by this force, or by so many standard deviations of what the wrist feels."""
+
+
+def touch_guard(sigma_n: float) -> float:
+    """The force that ends a touch, [N], of a wrist that feels with this standard deviation, [N]."""
+    return max(_TOUCH_N, _SIGMAS * sigma_n)
 
 
 class Belief(Protocol):
@@ -128,7 +133,7 @@ class Feeling:
     @property
     def touch_n(self) -> float:
         """The force that ends a touch, [N]: well above what the sensor shows of nothing."""
-        return max(_TOUCH_N, _SIGMAS * self.wrist.sigma[0])
+        return touch_guard(self.wrist.sigma[0])
 
     def as_seen(self, normal: Array, point: Array) -> tuple[Array, float]:
         """Normal and offset of a plane, (3,) and [m], in the world as the eye has it, from where the arm takes it."""
@@ -177,7 +182,7 @@ class Feeling:
 
     def taken(self, operation: int) -> None:
         """A part was taken between pads that closed twice; it may have slipped since."""
-        self.belief = self.belief.grasp(operation, np.hypot(self._feels.slip, _SQUARED))
+        self.belief = self.belief.grasp(operation, np.hypot(self._feels.slip, SQUARED))
 
     def T_tip_held(self, T_tip_part: Array) -> Array:
         """Where the arm takes a part to be in the frame of its tip, (4, 4), that is believed at a pose in that of the
@@ -207,7 +212,7 @@ class Feeling:
         """
         J = self.jacobian(robot)
         grasp, T_tip_part = held or (None, None)
-        return Touch(self.believed_tip(robot), normal, offset, point, _TOUCH_SIGMA_M, J, grasp, T_tip_part)
+        return Touch(self.believed_tip(robot), normal, offset, point, TOUCH_SIGMA_M, J, grasp, T_tip_part)
 
 
 def _less_common(belief: Belief, touches: Sequence[Touch]) -> list[Touch]:

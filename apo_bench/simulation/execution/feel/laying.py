@@ -18,29 +18,29 @@ from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.wrist import READING_S, part_loads
 from apo_bench.simulation.scene.world import sleeping
 
-_PRESS_N = 3.0
+PRESS_N = 3.0
 """How hard it is pressed on the floor."""
-_NEAR_M = 0.004
+NEAR_M = 0.004
 """From so far above where the floor is expected it goes down by force."""
 _DOWN = 0.2
 _UP = 0.2
 _OFF = 0.02
 _OFF_M = 0.002
 """Peak speeds, [m/s]; off the floor it goes slowly at first."""
-_YIELD_M = 0.0005
+YIELD_M = 0.0005
 _TURN_RAD = 0.015
 """How fast it gives way, [m/s] to a newton, and how fast it turns, [rad/s], while it lies on one foot only."""
-_FASTEST = 0.005
-_FASTEST_RAD = 0.05
+FASTEST = 0.005
+FASTEST_RAD = 0.05
 """[m/s], [rad/s]."""
-_CALM = 0.15
-_CALM_RAD = 6e-4
+CALM = 0.15
+CALM_RAD = 6e-4
 """It lies when the press is met within this part of it, and it turns slower than this, [rad/s], for a while, [s]; how
 fast it turns is averaged over as long, since a sensor is noisy."""
-_CALM_S = 0.1
-_AVERAGED = READING_S / _CALM_S
-_MOST_S = 15.0
-_DEEPEST_M = 0.012
+CALM_S = 0.1
+_AVERAGED = READING_S / CALM_S
+MOST_S = 15.0
+DEEPEST_M = 0.012
 
 
 def lay(robot: Robot, feeling: Feeling, operation: int, t: Transfer, grip: Grip) -> Grip:
@@ -52,7 +52,7 @@ def lay(robot: Robot, feeling: Feeling, operation: int, t: Transfer, grip: Grip)
     T_before = robot.T
     held = pose.inverse(grip.T_part_tip @ pose.inverse(feeling.residual.tool))
     robot.stage, robot.macro = "attach", "lay-flat"
-    robot.follow(smooth(robot.T, shifted(t.flush.T @ grip.T_part_tip, UP, _NEAR_M), _DOWN))
+    robot.follow(smooth(robot.T, shifted(t.flush.T @ grip.T_part_tip, UP, NEAR_M), _DOWN))
     robot.stand()
     with sleeping(robot.scene.work, False), reading(robot, feeling.wrist):
         feeling.wrist.hold(*part_loads(robot.scene, {t.part: held}))
@@ -75,31 +75,36 @@ def _laid(robot: Robot, feeling: Feeling, operation: int, flush: Flush, held: Ar
     return [feeling.foot(robot, operation, flush, held, foot) for foot in flush.feet] if law.lies else []
 
 
+def turn_yield(flush: Flush) -> float:
+    """How fast a part gives way to a torque while it is laid flat, [rad/s/Nm]: on one foot as fast as `_TURN_RAD`."""
+    lever = float(np.linalg.norm(flush.feet - flush.feet.mean(axis=0), axis=1).max())
+    return _TURN_RAD / (PRESS_N * lever)
+
+
 class _Laying:
     """Down until pushed back by the press, turning about level axes as the torque has it, until it lies."""
 
     def __init__(self, flush: Flush) -> None:
         self._n = flush.normal
-        lever = float(np.linalg.norm(flush.feet - flush.feet.mean(axis=0), axis=1).max())
-        self._yield = _TURN_RAD / (_PRESS_N * lever)
+        self._yield = turn_yield(flush)
         self._offset = np.zeros(6)
         self._turning = np.full(3, _TURN_RAD)
         self._calm = 0
-        self._left = round(_MOST_S / READING_S)
+        self._left = round(MOST_S / READING_S)
         self.lies = False
 
     def __call__(self, wrench: Array) -> Array | None:
         """How far the hand shall be from where it began, (6,), world; None at the end."""
         push = float(wrench[:3] @ self._n)
         torque = wrench[3:] - (wrench[3:] @ self._n) * self._n
-        down = float(np.clip(_YIELD_M * (_PRESS_N - push), -_FASTEST, _FASTEST))
-        turn = np.zeros(3) if push < _PRESS_N / 4 else np.clip(self._yield * torque, -_FASTEST_RAD, _FASTEST_RAD)
+        down = float(np.clip(YIELD_M * (PRESS_N - push), -FASTEST, FASTEST))
+        turn = np.zeros(3) if push < PRESS_N / 4 else np.clip(self._yield * torque, -FASTEST_RAD, FASTEST_RAD)
         self._offset = self._offset + READING_S * np.concatenate([-down * self._n, turn])
         self._left -= 1
         self._turning = self._turning + _AVERAGED * (turn - self._turning)
-        calm = abs(push - _PRESS_N) < _CALM * _PRESS_N and float(np.abs(self._turning).max()) < _CALM_RAD
+        calm = abs(push - PRESS_N) < CALM * PRESS_N and float(np.abs(self._turning).max()) < CALM_RAD
         self._calm = self._calm + 1 if calm else 0
-        self.lies = self._calm * READING_S >= _CALM_S
-        if self.lies or self._left <= 0 or -float(self._offset[:3] @ self._n) > _DEEPEST_M:
+        self.lies = self._calm * READING_S >= CALM_S
+        if self.lies or self._left <= 0 or -float(self._offset[:3] @ self._n) > DEEPEST_M:
             return None
         return self._offset

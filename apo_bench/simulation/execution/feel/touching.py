@@ -16,9 +16,9 @@ from apo_bench.simulation.robot.paths import shifted, smooth, steady, turn_from,
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.world import sleeping
 
-_SPEED = 0.0025
+SPEED = 0.0025
 """Steady speed of a touch, [m/s]: a stiff hand four times as fast strikes harder than an arm may."""
-_BEYOND_M = 0.005
+BEYOND_M = 0.005
 """So far beyond where it is expected the floor or a wall is felt for."""
 _DOWN = 0.4
 _OVER = 0.8
@@ -61,8 +61,8 @@ def _touched(robot: Robot, feeling: Feeling, place: TouchPlace) -> list[tuple[To
     robot.stand()
     # Nothing sleeps meanwhile: what the arm strikes is noticed, whatever rests.
     with sleeping(robot.scene.work, False), reading(robot, feeling.wrist):
-        end = shifted(robot.T, way, STAND_OFF_M + _BEYOND_M)
-        left = press(robot, steady(robot.T, end, _SPEED), way, feeling.touch_n, feeling.wrist)
+        end = shifted(robot.T, way, STAND_OFF_M + BEYOND_M)
+        left = press(robot, steady(robot.T, end, SPEED), way, feeling.touch_n, feeling.wrist)
         middle = place.patch.mean(axis=0)
         touched = feeling.touch(robot, place.normal, place.offset, middle)
         robot.follow(smooth(robot.T, T, _BACK))

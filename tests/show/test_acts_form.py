@@ -1,0 +1,117 @@
+"""What a real robot is told to feel is what the simulated one does, in whatever frames it is written."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from apo_bench import InputError, Plan, Scene, build_scene, load_scenario
+from apo_bench.files.robot_frames import RobotFrames
+from apo_bench.geometry import Array, pose
+from apo_bench.scenario.layout import layout_at
+from apo_bench.show.acts_form import acts_form
+from apo_bench.simulation.execution.feel.feeling import ACTS, touch_guard
+from apo_bench.simulation.execution.feel.places import STAND_OFF_M, floor_places, opposite_places, wall_places
+from apo_bench.simulation.execution.prepare import moves
+from apo_bench.simulation.robot.by_wrist import wrist_of
+from apo_bench.simulation.robot.robot import Robot
+from tests.show.test_robot_form import BASE, TOOL, matrix
+
+NAMES = ["stick_in_tower", "peg_in_hole"]
+FRAMES = {"tip": RobotFrames(), "flange": RobotFrames(BASE, TOOL, "wxyz")}
+PLACES = {"floor": floor_places, "walls": wall_places, "one_wall_from_both_sides": opposite_places}
+
+
+@cache
+def scene(name: str) -> Scene:
+    return build_scene(load_scenario(name))
+
+
+@cache
+def plan(name: str) -> Plan:
+    layout = layout_at(load_scenario(name), 0.1, 0.0, 0.3)
+    return Plan(scene(name).scenario.assembly, layout.start, layout.goals)
+
+
+@cache
+def form(name: str, frames: str = "tip", sensor: str = "external") -> dict[str, Any]:
+    return json.loads(json.dumps(acts_form(plan(name), scene(name), FRAMES[frames], sensor), allow_nan=False))
+
+
+def tip(said: dict[str, Any], frames: str) -> Array:
+    """A pose of the file as one of the tip in the world."""
+    of, tool = FRAMES[frames].T_world_base, FRAMES[frames].T_flange_tip
+    return of @ matrix(said) @ (np.eye(4) if tool is None else tool)
+
+
+def plane(said: dict[str, Any], frames: str) -> tuple[Array, float]:
+    """Normal and offset of the file in the world, [m]."""
+    base = FRAMES[frames].T_world_base
+    n = base[:3, :3] @ said["normal"]
+    return n, 1e-3 * said["offset_mm"] + float(n @ base[:3, 3])
+
+
+@pytest.mark.parametrize("frames", FRAMES)
+@pytest.mark.parametrize("name", NAMES)
+def test_touches_are_where_the_simulated_hand_touches(name: str, frames: str) -> None:
+    said = form(name, frames)["touch"]
+    for kind, places in PLACES.items():
+        for one, place in zip(said[kind], places(plan(name), scene(name)), strict=True):
+            T = tip(one["from"], frames)
+            n, d = plane(one, frames)
+            v = 1e-3 * np.array(one["point_in_tip_mm"])
+            assert np.allclose(T, place.T_world_tip, atol=1e-9)
+            assert np.allclose(v, place.patch.mean(axis=0), atol=1e-9)
+            assert np.allclose(n, place.normal, atol=1e-9)
+            assert d == pytest.approx(place.offset, abs=1e-9)
+            assert np.allclose(FRAMES[frames].T_world_base[:3, :3] @ one["direction"], place.way, atol=1e-9)
+            assert n @ pose.apply(T, v[None])[0] - d == pytest.approx(STAND_OFF_M, abs=1e-9)
+    assert said["at_most_mm"] > said["expected_after_mm"] == 1e3 * STAND_OFF_M
+
+
+def test_only_what_has_walls_to_fit_into_is_touched_from_the_side() -> None:
+    stick, peg = (form(name)["touch"] for name in NAMES)
+    assert (len(stick["floor"]), stick["walls"], stick["one_wall_from_both_sides"]) == (3, [], [])
+    assert (len(peg["floor"]), len(peg["one_wall_from_both_sides"])) == (3, 2)
+    assert peg["walls"]
+
+
+@pytest.mark.parametrize("frames", FRAMES)
+@pytest.mark.parametrize("name", NAMES)
+def test_steps_are_those_of_the_simulated_robot(name: str, frames: str) -> None:
+    assert any(one["lay_flat"] for one in form(name)["steps"])
+    for one, (step, t) in zip(form(name, frames)["steps"], moves(plan(name), scene(name), True, ACTS), strict=True):
+        assert (one["operation"], one["undo"], one["part"]) == (step.operation + 1, step.undo, t.part)
+        for grip, said in zip((*t.squaring, t.grips[0]), (*one["square"], one["grasp_twice"]), strict=True):
+            assert np.allclose(tip(said["at"], frames), t.T_world_start @ grip.T_part_tip, atol=1e-9)
+            assert said["each_finger_open_mm"] > said["closed_on_part_mm"] == pytest.approx(1e3 * grip.half_width)
+        assert one["guards_n"]["insert"] == pytest.approx(t.insert_n, abs=1e-6)
+        assert (one["search_press_n"] is None) == (t.front is None)
+        assert (one["lay_flat"] is None) == (t.flush is None)
+        if t.flush is not None:
+            laid = one["lay_flat"]
+            part = tip(laid["at"], frames) @ matrix(laid["part_in_tip"])
+            n, d = plane(laid, frames)
+            feet = pose.apply(part, 1e-3 * np.array(laid["feet_in_part_mm"]))
+            assert np.allclose(part, t.flush.T, atol=1e-9)
+            assert feet @ n == pytest.approx(d, abs=1e-9)
+
+
+@pytest.mark.parametrize("sensor", ["ideal", "external", "cobot", "0.5/0.02"])
+def test_the_guard_is_that_of_the_sensor(sensor: str) -> None:
+    """A wrist that is noisier is let push harder before it says that it touched something."""
+    robot = Robot(scene("stick_in_tower"), plan("stick_in_tower").start)
+    felt = wrist_of(robot, sensor, np.random.default_rng(0)).sigma[0]
+    said = form("stick_in_tower", sensor=sensor)
+    assert said["touch"]["guard_n"] == pytest.approx(touch_guard(felt), abs=1e-6)
+    assert said["touch"]["guard_n"] > 5.0 * felt
+    assert (said["touch"]["guard_n"] > 4.0) == (sensor == "cobot")
+
+
+def test_an_unknown_sensor_is_refused() -> None:
+    with pytest.raises(InputError, match="externl"):
+        acts_form(plan("stick_in_tower"), scene("stick_in_tower"), RobotFrames(), "externl")
