@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from apo_bench.geometry import Array, Hull, first_of_each
+from apo_bench.geometry import Array, Hull, first_of_each, remembered
 
 ON_M = 1e-7
 PARALLEL = 1e-7
@@ -31,6 +31,7 @@ def around(a: Hull, b: Hull) -> Hull:
     return _hull_of(a.name, np.concatenate([a.corners, b.corners]))
 
 
+@remembered
 def volume(hull: Hull) -> float:
     """[m^3]."""
     from scipy.spatial import ConvexHull
@@ -92,7 +93,9 @@ def _as_one(a: Hull, b: Hull) -> Hull | None:
 
 
 def _beside(a: Hull, b: Hull) -> bool:
-    """Whether a side of one is in the plane of a side of the other, and looks the other way."""
+    """Whether a side of one is in the plane of a side of the other, looks the other way, and is near."""
+    if (np.abs(a.center - b.center) > a.half + b.half + ON_M).any():
+        return False
     n = a.planes[:, :3] @ b.planes[:, :3].T
     d = a.planes[:, 3][:, None] + b.planes[:, 3]
     return bool(((n < PARALLEL - 1.0) & (np.abs(d) < ON_M)).any())

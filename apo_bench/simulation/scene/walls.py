@@ -53,8 +53,8 @@ class _Wall(NamedTuple):
 @remembered
 def linings(solid: Solid, clearance_m: float) -> Mapping[str, float]:
     """Name of a wall that has something behind it -> how far from the axis of its hole that is, [m]."""
-    groups = _groups(solid, physical_pieces(solid, clearance_m), clearance_m)
-    return {wall.hull.name: wall.behind_m for group in groups for wall in group if _beyond(wall) is not None}
+    walls = [wall for group in _groups(solid, clearance_m) for wall in group]
+    return {wall.hull.name: wall.behind_m for wall in walls if _reaches_beyond(wall)}
 
 
 @remembered
@@ -72,13 +72,11 @@ def simulated_pieces(solid: Solid, clearance_m: float) -> Mapping[str, tuple[Pie
 def _cut(solid: Solid, pieces: tuple[Piece, ...], clearance_m: float) -> Mapping[str, tuple[Piece, ...]]:
     behind: list[Hull] = []
     walls: dict[str, Hull | None] = {}
-    for group in _groups(solid, pieces, clearance_m):
-        outer = [_beyond(wall) for wall in group]
-        walls |= {wall.hull.name: wall.hull for wall, out in zip(group, outer, strict=True) if out is None}
-        lining = [wall for wall, out in zip(group, outer, strict=True) if out is not None]
-        walls |= dict.fromkeys(wall.hull.name for wall in lining)
+    for group in _groups(solid, clearance_m):
+        lining = [wall for wall in group if _reaches_beyond(wall)]
+        walls |= {wall.hull.name: None if _reaches_beyond(wall) else wall.hull for wall in group}
         walls |= {hull.name: hull for hull in _coarser(lining, clearance_m)}
-        behind += joined([out for out in outer if out is not None])
+        behind += joined(within(wall.hull, -wall.cut) for wall in lining)
     behind = joined_across(behind)
     others = [p for p in pieces if isinstance(p, Hull) and p.cylinder is None and p.name not in walls]
     flats = [plane for plane in _flats(solid, clearance_m) if any(has_side(hull, plane) for hull in behind)]
@@ -91,15 +89,18 @@ def _cut(solid: Solid, pieces: tuple[Piece, ...], clearance_m: float) -> Mapping
     return cut
 
 
-def _groups(solid: Solid, pieces: Iterable[Piece], clearance_m: float) -> Iterator[list[_Wall]]:
+@remembered
+def _groups(solid: Solid, clearance_m: float) -> list[list[_Wall]]:
     """The walls of all holes, those with the same cut together; each wedge is the wall of one hole."""
-    left = list(pieces)
+    groups: list[list[_Wall]] = []
+    left = list(physical_pieces(solid, clearance_m))
     for face in solid.rounds.values():
         if face.hole and face.kind != "rim":
             walls = list(_walls(face, left, clearance_m))
             taken = {wall.hull.name for wall in walls}
             left = [piece for piece in left if piece.name not in taken]
-            yield from _sectors(walls)
+            groups += _sectors(walls)
+    return groups
 
 
 def _walls(face: RoundFace, pieces: Iterable[Piece], clearance_m: float) -> Iterator[_Wall]:
@@ -183,11 +184,9 @@ def _sectors(walls: Sequence[_Wall]) -> Iterator[list[_Wall]]:
         yield [group[i] for i in np.argsort(middle @ along)]
 
 
-def _beyond(wall: _Wall) -> Hull | None:
-    """What is behind a wall; None if that is thinner than anything is made."""
-    n = wall.cut[:3]
-    d = wall.cut[3]
-    return within(wall.hull, -wall.cut) if (wall.hull.corners @ n - d).max() > _THINNEST_M else None
+def _reaches_beyond(wall: _Wall) -> bool:
+    """Whether anything is behind a wall that is thicker than the thinnest that is made."""
+    return bool((wall.hull.corners @ wall.cut[:3] - wall.cut[3]).max() > _THINNEST_M)
 
 
 def _flats(solid: Solid, clearance_m: float) -> list[Array]:
