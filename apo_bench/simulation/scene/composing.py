@@ -17,6 +17,7 @@ from apo_bench.scenario import Scenario, layout_at
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.physics import Physics, set_contact, set_options
 from apo_bench.simulation.scene.geoms import dress
+from apo_bench.simulation.scene.meeting import OF_PARTS, Bits, meetings
 from apo_bench.simulation.scene.walls import simulated_pieces
 from apo_bench.simulation.scene.world import WRIST_SENSORS
 
@@ -90,8 +91,10 @@ def room_with_parts(scenario: Scenario, clearance_mm: float, settings: Physics) 
     set_options(spec.option, settings)
     start = layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=clearance_mm).start
     files = {path: read_part(path) for path in dict.fromkeys(scenario.part_files.values())}
+    bits = meetings(scenario.assembly.solids, clearance_mm * 1e-3)
     for part in scenario.assembly.solids:
-        _add_part(spec, scenario, part, files[scenario.part_files[part]], start[part], clearance_mm, settings)
+        file = files[scenario.part_files[part]]
+        _add_part(spec, scenario, part, file, start[part], clearance_mm, settings, bits[part])
     return spec
 
 
@@ -103,13 +106,14 @@ def _add_part(
     T: Array,
     clearance_mm: float,
     settings: Physics,
+    bits: Mapping[str, Bits],
 ) -> None:
     """Attach a part's file at T, its fit faces receded."""
     solid = scenario.assembly.solids[part]
     if [piece.name for piece in file.pieces] != [piece.name for piece in solid.pieces]:
         raise InputError(f"{file.path}: the pieces are others than those of part '{part}'; load the scenario again.")
     own = mujoco.MjSpec.from_string(file.xml)
-    dress(own, solid, simulated_pieces(solid, clearance_mm * 1e-3), file.density)
+    dress(own, solid, simulated_pieces(solid, clearance_mm * 1e-3), file.density, bits)
     set_contact(own.geoms, settings)
     if part in scenario.colors:
         for geom in own.geoms:
@@ -160,6 +164,9 @@ def _add_arm(spec: Any, arm: Arm, settings: Physics) -> None:
         for geom in own.geoms:
             geom.condim = _PAD_CONDIM
             geom.priority = 1
+    for geom in own.geoms:
+        if geom.conaffinity & 1:  # it met parts, by the bit that they had
+            geom.conaffinity |= OF_PARTS
     stand = spec.worldbody.add_body(name="arm/", pos=arm.base, quat=arm.turn)
     spec.attach(own, frame=stand.add_frame(), prefix="arm/")
 

@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 
 from apo_bench.geometry import Array, Hull, Piece, Solid, all_boxes
+from apo_bench.simulation.scene.meeting import Bits, is_lining
 
 _ROLLING_CONDIM = 6
 """Of contacts of a cylinder: without friction of rolling, one that lies on a box begins to roll by itself."""
@@ -70,22 +71,38 @@ def set_mass(body: Any, solid: Solid, density: float) -> None:
     body.explicitinertial = True
 
 
-def dress(spec: Any, solid: Solid, pieces: Mapping[str, Iterable[Piece]], density: float) -> None:
+def dress(
+    spec: Any, solid: Solid, pieces: Mapping[str, Iterable[Piece]], density: float, bits: Mapping[str, Bits]
+) -> None:
     """Give the geoms of a part, as its file was read, the shapes of its pieces, and the part its mass.
 
+    Walls of holes that not everything meets are a body of their own, fixed in the part: MuJoCo passes over it as one.
+
     Args:
-        pieces: By the name of the geom in the part file. The first of them is that geom, others become geoms like it.
+        pieces: By the name of the geom in the part file, which is that of one of them, or goes; others become geoms
+            like it.
+        bits: By the name of a piece, what it meets.
     """
     body = spec.worldbody.bodies[0]
+    lining = body.add_body(name=f"{body.name}_lining") if any(map(is_lining, bits.values())) else body
     for mesh in spec.meshes:
         spec.delete(mesh)
-    for name, (first, *others) in pieces.items():
+    for name, several in pieces.items():
         geom = spec.geom(name)
         surface = {key: np.array(getattr(geom, key)) for key in _SURFACE}
-        set_shape(spec, geom, first)
-        add_pieces(spec, body, others, surface)
+        own = [piece for piece in several if piece.name == name and not is_lining(bits[name])]
+        for piece in own:
+            set_shape(spec, geom, piece)
+        if not own:
+            spec.delete(geom)
+        others = [piece for piece in several if piece not in own]
+        add_pieces(spec, body, [piece for piece in others if not is_lining(bits[piece.name])], surface)
+        walls = [piece for piece in others if is_lining(bits[piece.name])]
+        add_pieces(spec, lining, walls, surface | {"mass": 0.0})
     set_mass(body, solid, density)
-    for geom in body.geoms:
+    for geom in dict.fromkeys((*body.geoms, *lining.geoms)):
+        if geom.name in bits:
+            geom.contype, geom.conaffinity = bits[geom.name]
         if geom.friction[0] < _GRIPPY:
             geom.priority = SMOOTH_PRIORITY
             geom.condim = max(geom.condim, _PADS_CONDIM)

@@ -1,0 +1,123 @@
+"""Walls of holes are met by what could come in, and by nothing that is too wide for that."""
+
+import mujoco
+import numpy as np
+import pytest
+from scipy.spatial import ConvexHull
+
+from apo_bench import Scene, build_scene, load_scenario
+from apo_bench.geometry import Box, Cylinder, Hull, cylinder_hull, pose
+from apo_bench.simulation.scene.hulls import joined_across, volume, within
+from apo_bench.simulation.scene.meeting import Bits, is_lining, meetings, widest_disc
+from apo_bench.simulation.scene.walls import COARSE_M, linings, simulated_pieces
+from apo_bench.simulation.scene.world import World, initial_state, place
+
+CLEARANCE_M = 0.25e-3
+ROUND = ("peg_in_hole", "nested_bushings", "shaft_through_brackets", "l_bracket_on_plate")
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return build_scene(load_scenario("peg_in_hole"))
+
+
+def meet(a: Bits, b: Bits) -> bool:
+    return bool(a.contype & b.conaffinity or b.contype & a.conaffinity)
+
+
+def named(name: str, model: mujoco.MjModel) -> Bits:
+    geom = model.geom(name)
+    return Bits(int(geom.contype[0]), int(geom.conaffinity[0]))
+
+
+def test_the_widest_disc_of_boxes_and_cylinders() -> None:
+    slab = Box("slab", np.zeros(3), np.array([0.03, 0.005, 0.02]))
+    rod = cylinder_hull("rod", Cylinder(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.004, 0.05))
+    assert widest_disc(slab) == 0.02
+    assert widest_disc(rod) == 0.004
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_what_goes_through_a_hole_has_no_wider_disc(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    inside = rng.normal(size=(12, 2))
+    inside *= rng.uniform(0.2, 1.0, size=(12, 1)) / np.linalg.norm(inside, axis=1)[:, None]
+    points = np.column_stack([inside, rng.uniform(-3.0, 3.0, size=12)])
+    hull = Hull("any", points[ConvexHull(points).vertices])
+    assert widest_disc(hull) <= 1.0
+
+
+@pytest.mark.parametrize("name", ROUND)
+def test_walls_meet_what_could_come_in_and_the_arm(name: str) -> None:
+    solids = load_scenario(name).assembly.solids
+    bits = meetings(solids, CLEARANCE_M)
+    arm = Bits(1, 0)
+    for part, solid in solids.items():
+        for wall, width in linings(solid, CLEARANCE_M).items():
+            if wall not in bits[part]:
+                continue  # it has become one with its neighbour
+            assert meet(bits[part][wall], arm)
+            for other in solids:
+                for pieces in simulated_pieces(solids[other], CLEARANCE_M).values():
+                    for piece in pieces:
+                        if other != part and not is_lining(bits[other][piece.name]) and widest_disc(piece) <= width:
+                            assert meet(bits[part][wall], bits[other][piece.name])
+
+
+@pytest.mark.parametrize("name", ROUND)
+def test_all_else_meets_as_ever(name: str) -> None:
+    bits = meetings(load_scenario(name).assembly.solids, CLEARANCE_M)
+    plain = [b for pieces in bits.values() for b in pieces.values() if not is_lining(b)]
+    assert all(meet(a, b) for a in plain for b in plain)
+
+
+def test_a_plate_lies_on_another_by_what_is_behind_their_walls(scene: Scene) -> None:
+    world = scene.shown
+    data = initial_state(world, scene.scenario.start)
+    base = pose.at((0.1, 0.2, 0.0))
+    world.model.body_pos[world.body["base"]] = base[:3, 3]
+    place(world, data, "plate", base @ pose.at((0.0, 0.0, 0.02 - 1e-5), (0.0, 0.0, 30.0)))
+    mujoco.mj_forward(world.model, data)
+    names = ["/".join(world.model.geom(g).name.split("/")[1:]) for pair in data.contact.geom for g in pair]
+    solid = scene.scenario.assembly.solids["plate"]
+    assert data.ncon >= 4
+    assert not set(names) & set(linings(solid, CLEARANCE_M))
+
+
+def test_what_is_narrower_than_a_hole_lies_on_its_rim(scene: Scene) -> None:
+    """A peg that comes down beside its hole is stopped, wherever that is."""
+    model = scene.shown.model
+    assert all(
+        meet(named(f"plate/{wall}", model), named("peg/p1", model))
+        for wall in meetings(scene.scenario.assembly.solids, CLEARANCE_M)["plate"]
+    )
+
+
+def play(world: World, data: mujoco.MjData, angle: float, off_m: float) -> int:
+    """At how many points a peg in the middle of a plate touches it that is so far off the axis."""
+    plate = pose.at((0.3, 0.2, 0.3))
+    place(world, data, "plate", plate)
+    place(world, data, "peg", plate @ pose.at((off_m * np.cos(angle), off_m * np.sin(angle), -0.03)))
+    mujoco.mj_kinematics(world.model, data)
+    mujoco.mj_comPos(world.model, data)
+    mujoco.mj_collision(world.model, data)
+    parts = world.geom_part[data.contact.geom]
+    pair = {world.free.index("plate"), world.free.index("peg")}
+    return sum({int(a), int(b)} == pair for a, b in parts)
+
+
+def test_a_peg_has_its_play_in_every_direction(scene: Scene) -> None:
+    data = initial_state(scene.shown, scene.scenario.start)
+    for angle in np.radians(np.arange(0.0, 360.0, 3.7)):
+        assert play(scene.shown, data, angle, CLEARANCE_M - 1e-6) == 0
+        assert play(scene.shown, data, angle, CLEARANCE_M + COARSE_M) > 0
+
+
+def test_a_box_that_was_cut_is_put_together_again() -> None:
+    box = Hull("box", np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)]))
+    cut = np.array([0.6, 0.8, 0.0, 0.7])
+    halves = [within(box, cut), within(box, -cut)]
+    quarters = [within(half, by * np.array([0.0, 0.0, 1.0, 0.5])) for half in halves for by in (1.0, -1.0)]
+    (whole,) = joined_across(quarters)
+    assert volume(whole) == pytest.approx(1.0)
+    assert len(joined_across([quarters[0], quarters[3]])) == 2
