@@ -8,7 +8,7 @@ import pytest
 from apo_bench import Plan, build_scene, load_scenario
 from apo_bench.geometry import extent, pose
 from apo_bench.simulation.execution.feel.feeling import Feeling
-from apo_bench.simulation.execution.feel.laying import _Laying
+from apo_bench.simulation.execution.feel.laying import _Laying, averaged_s
 from apo_bench.simulation.execution.feel.places import floor_places, opposite_places, wall_places
 from apo_bench.simulation.execution.feel.touching import find_out
 from apo_bench.simulation.execution.flush import Flush
@@ -105,7 +105,7 @@ def test_a_robot_that_does_not_feel_does_nothing_besides():
 def test_a_part_that_is_pressed_on_comes_to_lie(half):
     """Two feet on springs: tilted by 1 degree, it turns until both carry."""
     feet = np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0], [0.0, -half, 0.0], [0.0, half, 0.0]])
-    law = _Laying(Flush(np.eye(4), np.array([0.0, 0.0, 1.0]), feet))
+    law = _Laying(Flush(np.eye(4), np.array([0.0, 0.0, 1.0]), feet), 0.1)
     tilt, wrench, offset = np.radians(1.0), np.zeros(6), np.zeros(6)
     while (wanted := law(wrench)) is not None:
         offset = wanted
@@ -115,6 +115,18 @@ def test_a_part_that_is_pressed_on_comes_to_lie(half):
         wrench = np.array([0.0, 0.0, pushes.sum(), feet[:, 1] @ pushes, -feet[:, 0] @ pushes, 0.0])
     assert law.lies
     assert abs(tilt + offset[4]) < np.radians(0.1)
+
+
+def test_a_sensor_is_averaged_until_it_tells_lying():
+    """The torque of 3 N on a foot 5 mm off is 15 mNm: an external sensor tells it, an arm's own one does not."""
+    small, long = (
+        Flush(np.eye(4), np.array([0.0, 0.0, 1.0]), np.array([[-r, 0, 0], [r, 0, 0]])) for r in (0.005, 0.08)
+    )
+    external, own = (0.0224, 0.00112), (0.78, 0.045)
+    assert averaged_s(long, external) == 0.1
+    assert 0.1 < averaged_s(small, external) < 1.0
+    assert 1.0 < averaged_s(long, own) < 3.0
+    assert averaged_s(small, own) > 100.0
 
 
 def test_touches_tell_where_the_base_and_the_tool_are():

@@ -15,7 +15,7 @@ from apo_bench.simulation.execution.transfer import Grip, Transfer
 from apo_bench.simulation.robot.by_wrist import comply, reading
 from apo_bench.simulation.robot.paths import shifted, smooth, with_height
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.robot.wrist import READING_S, part_loads
+from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, READING_S, part_loads
 from apo_bench.simulation.scene.world import sleeping
 
 PRESS_N = 3.0
@@ -35,10 +35,13 @@ FASTEST_RAD = 0.05
 """[m/s], [rad/s]."""
 CALM = 0.15
 CALM_RAD = 6e-4
-"""It lies when the press is met within this part of it, and it turns slower than this, [rad/s], for a while, [s]; how
-fast it turns is averaged over as long, since a sensor is noisy."""
+"""It lies when the press is met within this part of it, and it turns slower than this, [rad/s], for a while, [s]; both
+are averaged over `averaged_s`."""
 CALM_S = 0.1
-_AVERAGED = READING_S / CALM_S
+_SURELY = 3.0
+"""What is averaged has so many times less noise than tells lying."""
+_LONGEST_S = 3.0
+"""A sensor that would have to be averaged longer cannot tell: nothing is laid then."""
 MOST_S = 15.0
 DEEPEST_M = 0.012
 
@@ -49,6 +52,8 @@ def lay(robot: Robot, feeling: Feeling, operation: int, t: Transfer, grip: Grip)
     Raises:
         Halt: It fell out of the hand, or something was struck.
     """
+    if averaged_s(t.flush, feeling.wrist.sigma) > _LONGEST_S:
+        return grip
     T_before = robot.T
     held = pose.inverse(grip.T_part_tip @ pose.inverse(feeling.residual.tool))
     robot.stage, robot.macro = "attach", "lay-flat"
@@ -68,7 +73,7 @@ def lay(robot: Robot, feeling: Feeling, operation: int, t: Transfer, grip: Grip)
 
 def _laid(robot: Robot, feeling: Feeling, operation: int, flush: Flush, held: Array) -> list[Touch]:
     """Press the part on the floor until it lies; all its feet touch then."""
-    law = _Laying(flush)
+    law = _Laying(flush, averaged_s(flush, feeling.wrist.sigma))
     # About the middle of the feet: there, what rubs has no lever.
     feet = pose.apply(robot.T @ feeling.T_tip_held(held), flush.feet)
     comply(robot, law, feet.mean(axis=0), feeling.wrist)
@@ -81,14 +86,28 @@ def turn_yield(flush: Flush) -> float:
     return _TURN_RAD / (PRESS_N * lever)
 
 
+def averaged_s(flush: Flush, sigma: tuple[float, float]) -> float:
+    """How long what is felt while a part is laid flat must be averaged, [s], so that noise looks like no motion.
+
+    Args:
+        sigma: Of what is felt behind the low pass, [N] and [Nm].
+    """
+    # An average over a time T has sqrt(t / T) of the noise of a low pass with the time constant t.
+    turning = _SURELY * turn_yield(flush) * sigma[1] / CALM_RAD
+    pushing = _SURELY * sigma[0] / (CALM * PRESS_N)
+    return max(CALM_S, max(turning, pushing) ** 2 / (2.0 * np.pi * BANDWIDTH_HZ))
+
+
 class _Laying:
     """Down until pushed back by the press, turning about level axes as the torque has it, until it lies."""
 
-    def __init__(self, flush: Flush) -> None:
+    def __init__(self, flush: Flush, averaged: float) -> None:
         self._n = flush.normal
+        self._part = READING_S / averaged
         self._yield = turn_yield(flush)
         self._offset = np.zeros(6)
         self._turning = np.full(3, _TURN_RAD)
+        self._push = 0.0
         self._calm = 0
         self._left = round(MOST_S / READING_S)
         self.lies = False
@@ -101,8 +120,9 @@ class _Laying:
         turn = np.zeros(3) if push < PRESS_N / 4 else np.clip(self._yield * torque, -FASTEST_RAD, FASTEST_RAD)
         self._offset = self._offset + READING_S * np.concatenate([-down * self._n, turn])
         self._left -= 1
-        self._turning = self._turning + _AVERAGED * (turn - self._turning)
-        calm = abs(push - PRESS_N) < CALM * PRESS_N and float(np.abs(self._turning).max()) < CALM_RAD
+        self._turning = self._turning + self._part * (turn - self._turning)
+        self._push += self._part * (push - self._push)
+        calm = abs(self._push - PRESS_N) < CALM * PRESS_N and float(np.abs(self._turning).max()) < CALM_RAD
         self._calm = self._calm + 1 if calm else 0
         self.lies = self._calm * READING_S >= CALM_S
         if self.lies or self._left <= 0 or -float(self._offset[:3] @ self._n) > DEEPEST_M:
