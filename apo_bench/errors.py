@@ -48,6 +48,11 @@ def kind(value: Any) -> str:
     return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
 
 
+def require_text(called: str, value: Any) -> None:
+    """Raise an `InputError` unless a value is text: `None was given as wrench sensor; a name is needed, a str.`"""
+    require(isinstance(value, str), f"{kind(value)} was given as {called}; a name is needed, a str.")
+
+
 def require(holds: object, sentence: str) -> None:
     """Raise an `InputError` with this sentence unless something holds."""
     if not holds:

@@ -2,7 +2,10 @@
 
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from apo_bench.assembly import Plan
+from apo_bench.errors import kind, require
 from apo_bench.geometry import Array
 from apo_bench.records import checked_robot_error, checked_stated_error, checked_wrench, told_error
 from apo_bench.simulation.scene.scene import Scene
@@ -25,10 +28,16 @@ class RobotSettings(NamedTuple):
         """The same, spelled as rows spell them.
 
         Raises:
-            InputError: An unknown name, or a number that is not allowed.
+            InputError: An unknown name, a number that is not allowed, or no truth value.
         """
+        require(
+            isinstance(self.feels, bool | np.bool_),
+            f"{kind(self.feels)} was given as feels; True or False is allowed: whether the robot feels.",
+        )
         error = checked_robot_error(self.robot_error)
-        return RobotSettings(error, self.feels, checked_wrench(self.wrench), checked_stated_error(self.stated_error))
+        return RobotSettings(
+            error, bool(self.feels), checked_wrench(self.wrench), checked_stated_error(self.stated_error)
+        )
 
 
 def carried_out(robot: RobotSettings, plan: Plan, scene: Scene, reference: Array, trial: int, watch: Any) -> Attempt:

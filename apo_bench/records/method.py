@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import InputError, require_text, unknown
 from apo_bench.names import resolve
 from apo_bench.records.short_names import LOOKING, METHODS, SIMULATED, UNCORRECTED
 
@@ -40,6 +40,7 @@ def checked_method(method: str) -> str:
             a corrector by name, or `module:name`, nor one with `+search`
             or `+feel`.
     """
+    require_text("method", method)
     plan, searches, by_touch = parsed(method)
     if searches and parsed(plan).searches:
         raise InputError(

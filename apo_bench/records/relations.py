@@ -9,7 +9,7 @@
 
 import math
 
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import InputError, require_text, unknown
 from apo_bench.records.short_names import WRONG_RELATIONS
 
 GIVEN = "given"
@@ -44,6 +44,7 @@ def relations_name(text: str) -> str:
 
 def checked_relations(text: str) -> str:
     """The relations as rows spell them; raise an `InputError` unless there are such."""
+    require_text("relations", text)
     name = relations_name(text)
     if name.partition(":")[0] in _KINDS and name not in _KINDS and not name.startswith("shifted:"):
         raise InputError(f"the relations '{text}' were given; only shifted has a size, as in shifted:3.")

@@ -16,7 +16,7 @@ Several are joined by `+`. A robot that feels is told how wrong it is (its state
 import math
 from typing import NamedTuple
 
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import InputError, require_text, unknown
 
 NO_ROBOT_ERROR = "none"
 DRAWN = "drawn"
@@ -45,6 +45,7 @@ def robot_sigmas(name: str, called: str = "robot error") -> Sigmas:
     Raises:
         InputError: An unknown kind, one that is there twice, or a number that is not allowed.
     """
+    require_text(called, name)
     sigmas: dict[str, tuple[float, float]] = {}
     for entry in name.split("+") if name != NO_ROBOT_ERROR else ():
         kind, _, sizes = entry.partition(":")
@@ -72,6 +73,7 @@ def checked_stated_error(name: str) -> str:
     Raises:
         InputError: It is neither `drawn` nor `unstated`, nor what `robot_sigmas` takes.
     """
+    require_text("stated error", name)
     if name in (DRAWN, _UNSTATED):
         return name
     if name != NO_ROBOT_ERROR and any(entry.partition(":")[0] not in _UNITS for entry in name.split("+")):

@@ -13,7 +13,7 @@ import math
 from types import MappingProxyType
 from typing import NamedTuple
 
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import InputError, require_text, unknown
 
 
 class WrenchNoise(NamedTuple):
@@ -40,8 +40,9 @@ def wrench_noise(name: str) -> WrenchNoise:
     """The noise that a name stands for.
 
     Raises:
-        InputError: An unknown name, or a number that is not allowed.
+        InputError: No name, an unknown one, or a number that is not allowed.
     """
+    require_text("wrench sensor", name)
     if name in _PRESETS:
         return _PRESETS[name]
     if not name[:1].isdigit() and name[:1] not in ("-", "+", ".", "/"):

@@ -62,3 +62,10 @@ def test_by_default_no_robot_feels(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_wrong_name_is_one_sentence(wrong: str, said: str) -> None:
     with pytest.raises(InputError, match=said):
         APOReplay(SCENARIO, **{wrong: "glue"})  # type: ignore[arg-type]
+
+
+def test_whether_it_feels_is_true_or_false() -> None:
+    with pytest.raises(InputError, match="a str was given as feels; True or False is allowed"):
+        APOReplay(SCENARIO, feels="no")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="None was given as wrench sensor"):
+        APOReplay(SCENARIO, wrench=None)  # type: ignore[arg-type]

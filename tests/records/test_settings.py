@@ -78,6 +78,11 @@ def test_settings_of_a_row_are_those_that_it_was_made_with() -> None:
         ),
         ({"wrench": "externall"}, "unknown wrench sensor 'externall'; did you mean 'external'?"),
         ({"stated_error": "drawnn"}, "unknown stated error 'drawnn'; did you mean 'drawn'?"),
+        ({"wrench": None}, "None was given as wrench sensor; a name is needed, a str."),
+        ({"stated_error": 1.0}, "a float was given as stated error; a name is needed, a str."),
+        ({"robot_error": None}, "None was given as robot error;"),
+        ({"method": None}, "None was given as method;"),
+        ({"relations": 1}, "an int was given as relations;"),
         ({"seed": 1.5}, "a seed of 1.5 was given; whole numbers from 0 to"),
         ({"careless": "much"}, "a carelessness of 'much' was given; a number from 0 to 10 is allowed"),
         (

@@ -19,7 +19,7 @@ from apo_bench.correction.touches.robot_model import (
     tip_displacement,
 )
 from apo_bench.correction.touches.robust_estimate import NumberedTouch, robust_estimate
-from apo_bench.errors import require
+from apo_bench.errors import kind, require
 from apo_bench.geometry import Array, copyable, freeze, pose
 from apo_bench.records.robot_error import Sigmas
 
@@ -130,9 +130,10 @@ class RobotBelief:
         """What is believed after further touches, from all of them and the priors.
 
         Raises:
-            InputError: A touch of a grasp that was not made, or with a Jacobian of other joints.
+            InputError: No touch, one of a grasp that was not made, or with a Jacobian of other joints.
         """
         for touch in touches:
+            require(isinstance(touch, Touch), f"{kind(touch)} was given as a touch; give each as a Touch: touch(a, b).")
             self._jacobian(touch.jacobian)
         felt = (*self.felt, *(NumberedTouch(touch, self._grasp(touch.grasp)) for touch in touches))
         mean, covariance, taken = robust_estimate(felt, self.sigmas, self.joints, self.middle)
@@ -210,7 +211,12 @@ def believe(sigmas: Sigmas, joints: int, middle: ArrayLike) -> RobotBelief:
         joints: How many joints the arm has.
         middle: (3,), [m], world frame: the mean of the goals.
     """
-    require(joints >= 0, f"{joints} joints were given; give the number of joints of the arm.")
+    require(
+        isinstance(sigmas, Sigmas),
+        f"{kind(sigmas)} was given as sigmas; give UNSTATED, or apo_bench.records.robot_sigmas('hand_eye:1/0.2').",
+    )
+    whole = isinstance(joints, int | np.integer) and joints >= 0
+    require(whole, f"{joints} joints were given; give the number of joints of the arm.")
     mm, deg = sigmas.hand_eye
     prior = np.zeros(joints_in(joints).stop)
     prior[HAND_EYE] = np.repeat([1e-3 * mm, np.radians(deg)], 3)

@@ -207,6 +207,12 @@ def test_wrong_requests_get_one_sentence() -> None:
         belief.grasp(0, np.zeros(3))
     with pytest.raises(InputError, match="-1 joints were given"):
         believe(UNSTATED, -1, MIDDLE)
+    with pytest.raises(InputError, match=r"1\.5 joints were given"):
+        believe(UNSTATED, 1.5, MIDDLE)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="a str was given as sigmas; give UNSTATED, or"):
+        believe("unstated", 6, MIDDLE)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="a list was given as a touch; give each as a Touch"):
+        belief.touch([])  # type: ignore[arg-type]
     with pytest.raises(InputError, match="the middle cannot be used: every number must be finite"):
         believe(UNSTATED, 6, np.full(3, np.nan))
     with pytest.raises(InputError, match="the standard deviations cannot be used"):
