@@ -13,7 +13,7 @@ from apo_bench.assembly import Plan
 from apo_bench.files.json_forms import TO_MM_DEG
 from apo_bench.files.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
-from apo_bench.records import wrench_noise
+from apo_bench.records import WrenchNoise, wrench_noise
 from apo_bench.show.robot_form import pose_form, tip_form
 from apo_bench.simulation.execution import search, spiral
 from apo_bench.simulation.execution.feel import laying, touching
@@ -43,7 +43,8 @@ def acts_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> dic
         InputError: An unknown sensor.
     """
     noise = wrench_noise(sensor)
-    guard = touch_guard(felt_noise(noise, low_pass_part()).force_n)
+    felt = felt_noise(noise, low_pass_part())
+    guard = touch_guard(felt.force_n)
     touches = {"floor": floor_places, "walls": wall_places, "one_wall_from_both_sides": opposite_places}
     return {
         "sensor": {"name": sensor, "noise_n": noise.force_n, "noise_nm": noise.torque_nm},
@@ -78,7 +79,7 @@ def acts_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> dic
             "at_most_times": search.SEARCHES,
         },
         "squared_within_mm_deg": (SQUARED * TO_MM_DEG).round(6).tolist(),
-        "steps": [_step(move, scene, frames) for move in moves(plan, scene, True, ACTS)],
+        "steps": [_step(move, scene, frames, felt) for move in moves(plan, scene, True, ACTS)],
     }
 
 
@@ -92,7 +93,7 @@ def _touch(place: TouchPlace, frames: RobotFrames) -> dict[str, Any]:
     }
 
 
-def _step(move: Move, scene: Scene, frames: RobotFrames) -> dict[str, Any]:
+def _step(move: Move, scene: Scene, frames: RobotFrames, felt: WrenchNoise) -> dict[str, Any]:
     t = move.transfer
     first = t.grips[0]
     return {
@@ -101,7 +102,7 @@ def _step(move: Move, scene: Scene, frames: RobotFrames) -> dict[str, Any]:
         "part": t.part,
         "square": [_grip(grip, t.T_world_start, scene, frames) for grip in t.squaring],
         "grasp_twice": _grip(first, t.T_world_start, scene, frames),
-        "lay_flat": None if t.flush is None else _laid(t, frames),
+        "lay_flat": None if t.flush is None else _laid(t, frames, felt),
         "guards_n": {"down": round(t.place_n, 6), "insert": round(t.insert_n, 6), "slide": round(t.slide_n, 6)},
         "search_press_n": None if t.front is None else round(t.slide_n, 6),
     }
@@ -116,7 +117,11 @@ def _grip(grip: Grip, T: Array, scene: Scene, frames: RobotFrames) -> dict[str, 
     }
 
 
-def _laid(t: Transfer, frames: RobotFrames) -> dict[str, Any]:
+def _laid(t: Transfer, frames: RobotFrames, felt: WrenchNoise) -> dict[str, Any] | None:
+    """None where the sensor could not tell lying."""
+    averaged = laying.averaged_s(t.flush, felt)
+    if averaged > laying.LONGEST_S:
+        return None
     grip = t.grips[0 if t.out.left is None else 1]  # changed once already, if it is on the way out
     foot = pose.apply(t.flush.T, t.flush.feet[:1])[0]
     return {
@@ -126,6 +131,7 @@ def _laid(t: Transfer, frames: RobotFrames) -> dict[str, Any]:
         "feet_in_part_mm": [_mms(foot) for foot in t.flush.feet],
         **_plane(t.flush.normal, float(t.flush.normal @ foot), frames),
         "yield_deg_s_per_nm": _deg(laying.turn_yield(t.flush)),
+        "averaged_over_s": round(averaged, 6),
     }
 
 

@@ -15,6 +15,7 @@ from apo_bench.geometry import Array, pose
 from apo_bench.scenario.layout import layout_at
 from apo_bench.show.acts_form import acts_form
 from apo_bench.simulation.execution.feel.feeling import ACTS, touch_guard
+from apo_bench.simulation.execution.feel.laying import averaged_s
 from apo_bench.simulation.execution.feel.places import STAND_OFF_M, floor_places, opposite_places, wall_places
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.robot.by_wrist import wrist_of
@@ -110,6 +111,23 @@ def test_the_guard_is_that_of_the_sensor(sensor: str) -> None:
     assert said["touch"]["guard_n"] == pytest.approx(touch_guard(felt), abs=1e-6)
     assert said["touch"]["guard_n"] > 5.0 * felt
     assert (said["touch"]["guard_n"] > 4.0) == (sensor == "cobot")
+
+
+def test_lying_is_averaged_as_the_simulated_robot_does_and_not_asked_of_a_sensor_that_cannot_tell() -> None:
+    def averaged(name: str, sensor: str) -> list[float | None]:
+        laid = [one["lay_flat"] for one in form(name, sensor=sensor)["steps"]]
+        flat = [move.transfer.flush for move in moves(plan(name), scene(name), True, ACTS)]
+        return [each and each["averaged_over_s"] for each, f in zip(laid, flat, strict=True) if f is not None]
+
+    for sensor, felt in (("external", 0.1), ("cobot", 3.5)):
+        sigma = wrist_of(
+            Robot(scene("stick_in_tower"), plan("stick_in_tower").start), sensor, np.random.default_rng(0)
+        ).sigma
+        flush = moves(plan("stick_in_tower"), scene("stick_in_tower"), True, ACTS)[-1].transfer.flush
+        assert sigma[0] < felt
+        assert averaged("stick_in_tower", sensor) == [pytest.approx(averaged_s(flush, sigma), abs=1e-6)]
+    assert averaged("peg_in_hole", "cobot") == [None]
+    assert averaged("peg_in_hole", "external") != [None]
 
 
 def test_an_unknown_sensor_is_refused() -> None:

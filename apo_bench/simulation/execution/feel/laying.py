@@ -40,7 +40,7 @@ are averaged over `averaged_s`."""
 CALM_S = 0.1
 _SURELY = 3.0
 """What is averaged has so many times less noise than tells lying."""
-_LONGEST_S = 3.0
+LONGEST_S = 3.0
 """A sensor that would have to be averaged longer cannot tell: nothing is laid then."""
 MOST_S = 15.0
 DEEPEST_M = 0.012
@@ -52,7 +52,7 @@ def lay(robot: Robot, feeling: Feeling, operation: int, t: Transfer, grip: Grip)
     Raises:
         Halt: It fell out of the hand, or something was struck.
     """
-    if averaged_s(t.flush, feeling.wrist.sigma) > _LONGEST_S:
+    if averaged_s(t.flush, feeling.wrist.sigma) > LONGEST_S:
         return grip
     T_before = robot.T
     held = pose.inverse(grip.T_part_tip @ pose.inverse(feeling.residual.tool))
