@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import argparse
 import sys
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from statistics import median
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from apo_bench.records import Row
+from apo_bench.records import Row, TrialSettings
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.statistics import Cell, tally, wilson
 from benchmarks.made_with import mujoco_of, with_mujoco
@@ -39,6 +40,14 @@ COST = """
 
 Simulated seconds of a trial, at the median, over all errors.
 """
+OTHERS = """
+## Other sensors, statements, arms and scenarios
+
+The sensor is that of the wrist (`--wrench`), and stated is how wrong the robot was said to be (`--stated-error`).
+"""
+SCENARIOS = ("peg_in_hole", "stick_in_tower", "carried_bridge")
+USUAL = {"arm": "six_axis", "wrench": TrialSettings.wrench, "stated_error": TrialSettings.stated_error}
+OTHER_KEYS = ("robot_error", *USUAL)
 TAUGHT = """
 Contacts repair the eye's error, not the robot's own: with one, `oracle`, which knows the truth, fails. A robot that
 [feels](../how/feel.md) makes contacts by itself and corrects itself by them.
@@ -54,8 +63,10 @@ def main() -> None:
     print(f"Wrote {PAGE}")
 
 
-def page(rows: Iterable[Row]) -> str:
-    rows = list(rows)
+def page(every: Iterable[Row]) -> str:
+    every = list(every)
+    rows = [row for row in every if row["scenario"] in SCENARIOS and all(row[k] == v for k, v in USUAL.items())]
+    others = [row for row in every if row not in rows]
     cells = [cell for cell in tally(rows) if cell.trials]
     scenarios = sorted({cell.scenario for cell in cells})
     methods = list(dict.fromkeys(cell.method for cell in cells))
@@ -76,8 +87,20 @@ def page(rows: Iterable[Row]) -> str:
         + _table("robot error", heads, errors, each)
         + COST
         + _table("method", scenarios, methods, cost)
+        + (OTHERS + _others(others) if others else "")
         + TAUGHT
     )
+
+
+def _others(rows: Sequence[Row]) -> str:
+    """One line for each combination that is not the usual one."""
+    cells = Counter((*(row[key] for key in OTHER_KEYS), row["scenario"], row["method"]) for row in rows)
+    won = Counter((*(r[key] for key in OTHER_KEYS), r["scenario"], r["method"]) for r in rows if r["success"])
+    lines = ["| robot error | arm | sensor | stated | scenario | method | successes |", f"|{'---|' * 7}"]
+    lines += [
+        f"| {' | '.join(f'`{name}`' for name in cell)} | {won[cell]} of {cells[cell]} |" for cell in sorted(cells)
+    ]
+    return "\n" + "\n".join(lines) + "\n"
 
 
 def _table(first: str, heads: Sequence[str], names: Sequence[str], cells: Sequence[Sequence[str]]) -> str:
