@@ -80,7 +80,7 @@ def bring(robot: Robot, t: Transfer, i: int, lay: Callable[[Transfer, Grip], Gri
     """Carry the part that is held by its i-th grip, attach it, let go and depart.
 
     Args:
-        lay: Lays it flat before a level insertion, and says how it is held then.
+        lay: Lays it flat first, before a level insertion below where that begins, and says how it is held then.
 
     Raises:
         Halt: Something went wrong; the stage and code say what.

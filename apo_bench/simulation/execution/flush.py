@@ -17,7 +17,7 @@ from apo_bench.simulation.execution.transfer import Transfer, first_contact_pose
 from apo_bench.simulation.robot.paths import shifted
 from apo_bench.simulation.scene.scene import Scene
 
-_LEVEL = float(np.cos(np.radians(10.0)))
+LEVEL = float(np.cos(np.radians(10.0)))
 """A face that looks up by less than ten degrees off is one to lie on."""
 _LOWEST_M = 1e-4
 """Corners this near to the lowest one lie on the floor."""
@@ -58,7 +58,7 @@ def flush_pose(assembly: Assembly, scene: Scene, t: Transfer, believed: Poses) -
         each
         for part in assembly.fixed
         for face in assembly.solids[part].faces.values()
-        if believed[part][2, :3] @ face.normal > _LEVEL
+        if believed[part][2, :3] @ face.normal > LEVEL
         for each in [_on(scene, t.part, T, up, face, believed[part])]
         if each is not None and each.T[2, 3] < T[2, 3]
     ]

@@ -142,7 +142,7 @@ class Feeling:
         return n, float(n @ (back[:3, :3] @ point + back[:3, 3]))
 
     def believed_tip(self, robot: Robot) -> Array:
-        """Where the robot would believe its tip if it made up for nothing, (4, 4), world, and the Jacobian there."""
+        """Where the robot would believe its tip if it made up for nothing, (4, 4), world."""
         left = self.residual
         measured = self._kinematics.forward(robot.encoders())
         corrected = pose.inverse(left.hand_eye) @ measured @ pose.inverse(left.tool)

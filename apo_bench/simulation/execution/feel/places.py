@@ -12,6 +12,7 @@ from shapely import Point
 from apo_bench.assembly import Plan
 from apo_bench.geometry import Array, Box, Face, face_area, own_shape, plane_frame, pose
 from apo_bench.insertion.macros import UP
+from apo_bench.simulation.execution.flush import LEVEL
 from apo_bench.simulation.execution.grasping import gripper_depth, obstacles
 from apo_bench.simulation.frames import frame
 from apo_bench.simulation.robot.gripper import gripper_boxes
@@ -31,7 +32,6 @@ _PATCH_M = 0.025
 """The hand touches a floor that is whole so far around."""
 _SLACK = 3
 """Places of the floor: on a ring around the goals, a third of a turn apart but for so many of its parts."""
-_LEVEL = float(np.cos(np.radians(10.0)))
 _END_M = 1e-4
 _OVER_M = 0.003
 """A wall is touched so high over its foot, with the lowest part of the fingers."""
@@ -120,7 +120,7 @@ def _floor(plan: Plan) -> tuple[str, Face] | None:
         (part, face)
         for part in sorted(plan.assembly.fixed)
         for face in plan.assembly.solids[part].faces.values()
-        if plan.start[part][2, :3] @ face.normal > _LEVEL
+        if plan.start[part][2, :3] @ face.normal > LEVEL
     ]
     return max(up, key=lambda each: face_area(each[1]), default=None)
 
@@ -137,7 +137,7 @@ def _walls(plan: Plan) -> Iterator[tuple[str, Face]]:
                 named = [of.face] if of.face in solid.faces else list(solid.faces)
                 for name in named:
                     face = solid.faces[name]
-                    upright = abs(float(plan.start[of.part][2, :3] @ face.normal)) < np.sqrt(1.0 - _LEVEL**2)
+                    upright = abs(float(plan.start[of.part][2, :3] @ face.normal)) < np.sqrt(1.0 - LEVEL**2)
                     if upright and (of.part, name) not in done:
                         done.add((of.part, name))
                         yield of.part, face
