@@ -16,11 +16,11 @@ from apo_bench.geometry import Array, pose
 from apo_bench.records import WrenchNoise, wrench_noise
 from apo_bench.show.robot_form import pose_form, tip_form
 from apo_bench.simulation.execution import search, spiral
+from apo_bench.simulation.execution.beside import STAND_OFF_M
 from apo_bench.simulation.execution.feel import laying, touching
-from apo_bench.simulation.execution.feel.feeling import ACTS, SQUARED, TOUCH_SIGMA_M, touch_guard
+from apo_bench.simulation.execution.feel.feeling import ACTS, FOOT_SIGMA_M, SQUARED, TOUCH_SIGMA_M, touch_guard
 from apo_bench.simulation.execution.feel.places import (
     OPENING_M,
-    STAND_OFF_M,
     TouchPlace,
     floor_places,
     opposite_places,
@@ -69,7 +69,7 @@ def acts_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> dic
                 "for_s": laying.CALM_S,
             },
             "gives_up": {"after_s": laying.MOST_S, "below_begin_mm": _mm(laying.DEEPEST_M)},
-            "sigma_mm": _mm(TOUCH_SIGMA_M),
+            "sigma_mm": _mm(FOOT_SIGMA_M),
         },
         "search": {
             "radius_mm": _mm(spiral.RADIUS_M),
@@ -132,6 +132,15 @@ def _laid(t: Transfer, frames: RobotFrames, felt: WrenchNoise) -> dict[str, Any]
         **_plane(t.flush.normal, float(t.flush.normal @ foot), frames),
         "yield_deg_s_per_nm": _deg(laying.turn_yield(t.flush)),
         "averaged_over_s": round(averaged, 6),
+        "then_walls": [
+            {
+                "from": tip_form(place.T @ grip.T_part_tip, frames),
+                "direction": _turned(place.way, frames),
+                "point_in_part_mm": _mms(place.point),
+                **_plane(place.normal, float(place.normal @ place.edge), frames),
+            }
+            for place in t.beside
+        ],
     }
 
 

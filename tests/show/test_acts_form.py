@@ -14,9 +14,10 @@ from apo_bench.files.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
 from apo_bench.scenario.layout import layout_at
 from apo_bench.show.acts_form import acts_form
+from apo_bench.simulation.execution.beside import STAND_OFF_M
 from apo_bench.simulation.execution.feel.feeling import ACTS, touch_guard
 from apo_bench.simulation.execution.feel.laying import averaged_s
-from apo_bench.simulation.execution.feel.places import STAND_OFF_M, floor_places, opposite_places, wall_places
+from apo_bench.simulation.execution.feel.places import floor_places, opposite_places, wall_places
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.robot.by_wrist import wrist_of
 from apo_bench.simulation.robot.robot import Robot
@@ -100,6 +101,12 @@ def test_steps_are_those_of_the_simulated_robot(name: str, frames: str) -> None:
             feet = pose.apply(part, 1e-3 * np.array(laid["feet_in_part_mm"]))
             assert np.allclose(part, t.flush.T, atol=1e-9)
             assert feet @ n == pytest.approx(d, abs=1e-9)
+            for told, place in zip(laid["then_walls"], t.beside, strict=True):
+                begins = tip(told["from"], frames) @ matrix(laid["part_in_tip"])
+                n, d = plane(told, frames)
+                assert np.allclose(begins, place.T, atol=1e-9)
+                touched = pose.apply(begins, 1e-3 * np.array([told["point_in_part_mm"]]))[0]
+                assert n @ touched - d == pytest.approx(STAND_OFF_M, abs=1e-9)
 
 
 @pytest.mark.parametrize("sensor", ["ideal", "external", "cobot", "0.5/0.02"])

@@ -7,7 +7,7 @@ import pytest
 
 from apo_bench import Plan, build_scene, load_scenario
 from apo_bench.geometry import extent, pose
-from apo_bench.simulation.execution.feel.feeling import Feeling
+from apo_bench.simulation.execution.feel.feeling import ACTS, Feeling
 from apo_bench.simulation.execution.feel.laying import _Laying, averaged_s
 from apo_bench.simulation.execution.feel.places import floor_places, opposite_places, wall_places
 from apo_bench.simulation.execution.feel.touching import find_out
@@ -94,10 +94,47 @@ def test_what_is_inserted_level_lies_flat_first():
     assert np.ptp(flush.feet, axis=0).max() > 0.1
 
 
+def test_what_is_inserted_from_above_touches_a_wall_low_and_high():
+    """Leaned towards the wall the peg touches its upper edge first, with the pads along the way of the touch."""
+    plate, peg = (move.transfer for move in moves(plan("peg_in_hole"), scene("peg_in_hole"), True, ACTS))
+    assert not plate.beside
+    low, high = peg.beside
+    assert high.point[2] - low.point[2] > 0.01
+    for place in peg.beside:
+        touched = pose.apply(place.T, place.point[None])[0]
+        assert touched - place.edge == pytest.approx(0.004 * place.normal, abs=1e-9)
+        assert np.linalg.norm(place.point[:2]) == pytest.approx(0.005, abs=1e-5)
+        assert np.degrees(np.arccos(place.T[2, 2])) == pytest.approx(3.0)
+        assert place.T[:3, 2] @ place.way == pytest.approx(np.sin(np.radians(3.0)))
+        along_pads = (place.T @ peg.grips[0].T_part_tip)[:3, 1]
+        assert abs(along_pads @ place.way) == pytest.approx(np.cos(np.radians(3.0)))
+    assert not any(move.transfer.beside for move in moves(plan("stick_in_tower"), scene("stick_in_tower"), True, ACTS))
+
+
+def test_what_is_felt_for_begins_before_the_first_mouth():
+    """The peg goes into the plate 40 mm before its goal, and into the base 20 mm before it."""
+    blind, felt = (moves(plan("peg_in_hole"), scene("peg_in_hole"), True, acts)[-1].transfer for acts in ((), ACTS))
+    assert felt.mouths == pytest.approx((0.04, 0.02))
+    assert blind.slow < felt.mouths[0] < felt.slow < felt.begins
+
+
+def test_a_round_peg_that_slipped_and_tipped_in_the_hand_is_known_by_its_side():
+    """Turned by 1.7 degrees between the pads: laid on its small foot it is known to a degree, by a wall much better."""
+    name = "peg_in_hole"
+    slips = np.tile(np.eye(4), (2, 1, 1))
+    slips[1] = pose.at((0.0, 0.0006, 0.0), (1.7, 0.0, 0.0))
+    error = RobotError(np.eye(4), np.zeros(6), np.eye(4), slips)
+    feels = feels_of(plan(name), scene(name), "in_hand:0.5/1", (6,))
+    felt = replay_and_judge(plan(name), scene(name), plan(name).goals, fidelity="contact", error=error, feels=feels)
+    assert felt.verdict.success
+    assert (felt.result.felt.touches, felt.result.felt.refused) == (15, 0)
+
+
 def test_a_robot_that_does_not_feel_does_nothing_besides():
     for move in moves(plan("peg_in_hole"), scene("peg_in_hole"), True):
         assert not move.transfer.squaring
         assert move.transfer.flush is None
+        assert not move.transfer.beside
         assert not move.transfer.in_last
 
 

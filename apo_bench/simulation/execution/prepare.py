@@ -9,8 +9,17 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Plan, Poses, Step
 from apo_bench.geometry import Array, extent, pose, remembered
-from apo_bench.insertion.surroundings import OVER_M, ends_of, mouths, neighbours, slide_directions, slow_before
+from apo_bench.insertion.surroundings import (
+    OVER_M,
+    WALL_MARGIN_M,
+    ends_of,
+    mouths,
+    neighbours,
+    slide_directions,
+    slow_before,
+)
 from apo_bench.scenario.layout import nominal_operations
+from apo_bench.simulation.execution.beside import beside_places
 from apo_bench.simulation.execution.flush import flush_pose
 from apo_bench.simulation.execution.grips import centring_grips, squaring_grips, transfer_grips
 from apo_bench.simulation.execution.transfer import (
@@ -169,11 +178,15 @@ def _with_acts(
     free = not (t.out.level or t.away or t.drawn)
     squared = "square" in acts and free
     laid = "lay" in acts and (t.into.level or (bool(t.mouths) and free))
+    flush = flush_pose(assembly, scene, t, believed) if laid else None
+    beside = () if flush is None or t.into.level else beside_places(assembly, scene, t, flush.T[:3, :3], believed)
     return replace(
         t,
         in_last="search" in acts,
+        slow=t.slow if t.into.level else max(t.slow, max(t.mouths, default=0.0) + WALL_MARGIN_M),
         squaring=squaring_grips(assembly, scene, k, t.grips[0], believed) if squared else (),
-        flush=flush_pose(assembly, scene, t, believed) if laid else None,
+        flush=flush,
+        beside=beside,
     )
 
 

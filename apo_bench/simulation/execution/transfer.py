@@ -110,6 +110,8 @@ class Transfer:
     flush: Any = None
     """A `Flush`: the part laid flat, below where a level insertion begins, or where it stood before one from above;
     None where it cannot or need not."""
+    beside: tuple[Any, ...] = ()
+    """Each a `Beside`: where the part touches a wall with its side, before an insertion from above."""
     front: Array | None = None
     """Where the part, with what it carries, ends ahead on its way: the middle of it, in its own frame, (3,), [m]; None
     where a hole is not searched for."""

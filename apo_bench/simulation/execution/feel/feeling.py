@@ -15,6 +15,7 @@ from apo_bench.assembly import Felt, Plan, Touch
 from apo_bench.geometry import Array, pose
 from apo_bench.records import USUAL_WRENCH
 from apo_bench.simulation.execution.flush import Flush
+from apo_bench.simulation.execution.transfer import Grip
 from apo_bench.simulation.robot.by_wrist import wrist_of, zero
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.robot_error import RobotError
@@ -22,10 +23,12 @@ from apo_bench.simulation.robot.wrist import WristSensor
 from apo_bench.simulation.scene.scene import Scene
 
 ACTS = ("square", "touch", "lay", "search")
-"""Parts are squared before they are taken, what is fixed is touched, what is inserted level is laid flat first, and
-what is stopped all the same is searched for."""
+"""Parts are squared before they are taken, what is fixed is touched, what is inserted is laid flat first (and touches a
+wall, if it comes from above), and what is stopped all the same is searched for."""
 TOUCH_SIGMA_M = 3e-5
 """How exactly a guarded touch tells a plane, [m]."""
+FOOT_SIGMA_M = 1e-4
+"""How exactly a foot of a part that was laid flat stands on the floor, [m]: pressed on, it sinks by as much."""
 SQUARED = np.array([5e-5, 2e-4, 1e-3, 5e-3, 3e-3, 3e-3])
 """How exactly a part lies between pads that closed twice, [m, rad], a twist in the frame of the tip: closing tips a
 round part by 0.3 degrees, and pressed on a floor it slides up between the pads."""
@@ -192,18 +195,28 @@ class Feeling:
     def foot(self, robot: Robot, operation: int, flush: Flush, T_tip_part: Array, foot: Array) -> Touch:
         """What a foot of the held part tells that stands on the floor."""
         n, d = self.as_seen(flush.normal, pose.apply(flush.T, flush.feet[:1])[0])
-        return self.touch(robot, n, d, foot, (operation, T_tip_part))
+        return self.touch(robot, n, d, foot, (operation, T_tip_part), FOOT_SIGMA_M)
 
-    def holds(self, operation: int, touches: Sequence[Touch], T_tip_part: Array) -> Array:
-        """Where a held part is believed in the frame of the tip after what its feet told, (4, 4).
+    def grip(self, operation: int, touches: Sequence[Touch], T_tip_part: Array, grip: Grip) -> Grip:
+        """How a part is believed to be held after what it told that touched.
 
         What hand and eye are off is not believed anew: what has been put down stands where it was put.
+
+        Args:
+            T_tip_part: Where it was believed in the frame of the tip when it was taken, (4, 4).
         """
         self.belief = self.belief.touch(*touches)
-        return self.belief.held(operation, T_tip_part)
+        held = self.belief.held(operation, T_tip_part)
+        return Grip(pose.inverse(held) @ self.residual.tool, grip.half_width)
 
     def touch(
-        self, robot: Robot, normal: Array, offset: float, point: Array, held: tuple[int, Array] | None = None
+        self,
+        robot: Robot,
+        normal: Array,
+        offset: float,
+        point: Array,
+        held: tuple[int, Array] | None = None,
+        sigma_m: float = TOUCH_SIGMA_M,
     ) -> Touch:
         """What touching a plane tells: the robot stands where it felt it.
 
@@ -212,7 +225,7 @@ class Feeling:
         """
         J = self.jacobian(robot)
         grasp, T_tip_part = held or (None, None)
-        return Touch(self.believed_tip(robot), normal, offset, point, TOUCH_SIGMA_M, J, grasp, T_tip_part)
+        return Touch(self.believed_tip(robot), normal, offset, point, sigma_m, J, grasp, T_tip_part)
 
 
 def _less_common(belief: Belief, touches: Sequence[Touch]) -> list[Touch]:

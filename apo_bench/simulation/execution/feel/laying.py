@@ -1,7 +1,7 @@
 """Laying a part that is held on what is fixed, before it is inserted.
 
 Pressed on lightly and giving way to torque, it comes to lie flush: a plane on a plane. Then its height and its tilts in
-the hand are known, as well as the floor is.
+the hand are known, as well as the floor is and as its feet are apart. Before an insertion from above a wall tells more.
 """
 
 import numpy as np
@@ -9,6 +9,7 @@ import numpy as np
 from apo_bench.assembly import Touch
 from apo_bench.geometry import Array, pose
 from apo_bench.insertion.macros import UP
+from apo_bench.simulation.execution.feel.beside import touch_beside
 from apo_bench.simulation.execution.feel.feeling import Feeling
 from apo_bench.simulation.execution.flush import Flush, before_insertion
 from apo_bench.simulation.execution.transfer import Grip, Transfer
@@ -47,7 +48,7 @@ DEEPEST_M = 0.012
 
 
 def lay(robot: Robot, feeling: Feeling, operation: int, t: Transfer, grip: Grip) -> Grip:
-    """Lay the held part down and lift it again; returns how it is known to be held now.
+    """Lay the held part down and lift it again, and touch a wall with its side; returns how it is known to be held now.
 
     Raises:
         Halt: It fell out of the hand, or something was struck.
@@ -64,7 +65,9 @@ def lay(robot: Robot, feeling: Feeling, operation: int, t: Transfer, grip: Grip)
         touches = _laid(robot, feeling, operation, t.flush, held)
         feeling.wrist.hold()
         robot.follow(smooth(robot.T, shifted(robot.T, UP, _OFF_M), _OFF))
-    grip = Grip(pose.inverse(feeling.holds(operation, touches, held)) @ feeling.residual.tool, grip.half_width)
+    grip = feeling.grip(operation, touches, held, grip)
+    for place in t.beside:
+        grip = touch_beside(robot, feeling, operation, t, place, grip, held)
     above = before_insertion(t) @ grip.T_part_tip if t.into.level else with_height(robot.T, float(T_before[2, 3]))
     robot.follow(smooth(robot.T, above, _UP))
     robot.stand()

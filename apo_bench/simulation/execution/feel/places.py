@@ -3,7 +3,7 @@
 Known from the plan alone: believed poses of what stands, and shapes.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from shapely import Point
 from apo_bench.assembly import Plan
 from apo_bench.geometry import Array, Box, Face, face_area, own_shape, plane_frame, pose
 from apo_bench.insertion.macros import UP
+from apo_bench.simulation.execution.beside import STAND_OFF_M, upright_walls
 from apo_bench.simulation.execution.flush import LEVEL
 from apo_bench.simulation.execution.grasping import gripper_depth, obstacles
 from apo_bench.simulation.frames import frame
@@ -22,8 +23,6 @@ from apo_bench.simulation.scene.scene import Scene
 
 OPENING_M = 0.004
 """Of each finger while the hand touches: as good as closed, and the pads do not push on each other."""
-STAND_OFF_M = 0.004
-"""A touch begins so far before it is expected."""
 _ROOM_M = 0.003
 """Everything else stays so far away."""
 _RADII_M = (0.08, 0.1, 0.06, 0.12, 0.14, 0.16, 0.18)
@@ -97,7 +96,10 @@ def floor_places(plan: Plan, scene: Scene) -> tuple[TouchPlace, ...]:
 def wall_places(plan: Plan, scene: Scene) -> tuple[TouchPlace, ...]:
     """One place on each wall of what is fixed that tells where something will be fitted in."""
     around = obstacles(plan.assembly.solids, plan.start, ())
-    places = [_at_wall(scene, face, plan.start[part], np.array([0.0, 1.0])) for part, face in _walls(plan)]
+    places = [
+        _at_wall(scene, face, plan.start[part], np.array([0.0, 1.0]))
+        for part, face in upright_walls(plan.assembly, plan.start)
+    ]
     return tuple(place for place in places if _free(scene, place.T_world_tip, around))
 
 
@@ -107,7 +109,7 @@ def opposite_places(plan: Plan, scene: Scene) -> tuple[TouchPlace, ...]:
     There the fingers give way, on both sides alike: only the difference of the two tells something.
     """
     around = obstacles(plan.assembly.solids, plan.start, ())
-    for part, face in _walls(plan):
+    for part, face in upright_walls(plan.assembly, plan.start):
         both = [_at_wall(scene, face, plan.start[part], np.array([sign, 0.0])) for sign in (1.0, -1.0)]
         if all(_free(scene, place.T_world_tip, around) for place in both):
             return tuple(both)
@@ -123,24 +125,6 @@ def _floor(plan: Plan) -> tuple[str, Face] | None:
         if plan.start[part][2, :3] @ face.normal > LEVEL
     ]
     return max(up, key=lambda each: face_area(each[1]), default=None)
-
-
-def _walls(plan: Plan) -> Iterator[tuple[str, Face]]:
-    """Upright flat faces that something is fitted to, and those around a bore that something is fitted into."""
-    done = set[tuple[str, str]]()
-    for operation in plan.assembly.operations:
-        for contact in operation.contacts:
-            for of in contact:
-                if of.part not in plan.assembly.fixed:
-                    continue
-                solid = plan.assembly.solids[of.part]
-                named = [of.face] if of.face in solid.faces else list(solid.faces)
-                for name in named:
-                    face = solid.faces[name]
-                    upright = abs(float(plan.start[of.part][2, :3] @ face.normal)) < np.sqrt(1.0 - LEVEL**2)
-                    if upright and (of.part, name) not in done:
-                        done.add((of.part, name))
-                        yield of.part, face
 
 
 def _at_wall(scene: Scene, face: Face, T: Array, ahead: Array) -> TouchPlace:

@@ -2,10 +2,10 @@
 
 from apo_bench.assembly import Touch
 from apo_bench.geometry import Array
+from apo_bench.simulation.execution.beside import STAND_OFF_M
 from apo_bench.simulation.execution.feel.feeling import Feeling
 from apo_bench.simulation.execution.feel.places import (
     OPENING_M,
-    STAND_OFF_M,
     TouchPlace,
     floor_places,
     opposite_places,
