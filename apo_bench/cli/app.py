@@ -25,6 +25,7 @@ from apo_bench.cli import (
     replay_trial,
     report,
     scenario,
+    score,
     show,
     sweep,
 )
@@ -113,6 +114,8 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "sweep": sweep.sweep_command,
     "report": report.report_command,
     "compare": report.compare_command,
+    "score": score.score_command,
+    "leaderboard": score.leaderboard_command,
     "view": show.view_command,
     "scene": plan.scene_command,
     "replay": replay_trial.run_replay,

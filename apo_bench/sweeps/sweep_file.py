@@ -43,18 +43,21 @@ def is_sweep_file(text: str) -> bool:
     return "scenarios" in keys or not {"parts", "operations"} & set(keys)
 
 
-def read_sweep(path: str | Path, overrides: Mapping[str, Any] | None = None) -> tuple[SweepSettings, ...]:
+def read_sweep(
+    path: str | Path, overrides: Mapping[str, Any] | None = None, besides: Sequence[str] = ()
+) -> tuple[SweepSettings, ...]:
     """The grids of a sweep file: the top one, and one for each `[[also]]`.
 
     Args:
         overrides: Key of the file -> what to take instead, in every grid.
+        besides: Keys of the file that are read elsewhere.
 
     Raises:
         InputError: Anything in the file that is not as described.
     """
-    top = read_toml(path, "sweep file").fields(("scenarios",), (*SWEEP_KEYS[1:], *_ALONE, "also"))
+    top = read_toml(path, "sweep file").fields(("scenarios",), (*SWEEP_KEYS[1:], *_ALONE, *besides, "also"))
     tables = [entry.fields((), SWEEP_KEYS) for entry in _tables(top["also"])] if "also" in top else []
-    first = {key: _value(key, node) for key, node in top.items() if key != "also"}
+    first = {key: _value(key, node) for key, node in top.items() if key not in ("also", *besides)}
     grids = {str(path): first} | {
         f"{path}, also {i}": first | {key: _value(key, node) for key, node in table.items()}
         for i, table in enumerate(tables, start=1)

@@ -29,7 +29,17 @@ from apo_bench.resources import folder
 from apo_bench.scenario import Scenario, scenario_names
 
 _SCHEMAS = (ROW, OBSERVATION_SCHEMA, PLAN_SCHEMA)
-ROOMS_WITHOUT_TRIALS = ("cli", "drafting", "envs", "report", "show", "statistics", "sweeps/local", "sweeps/ray")
+ROOMS_WITHOUT_TRIALS = (
+    "cli",
+    "drafting",
+    "envs",
+    "report",
+    "scoring",
+    "show",
+    "statistics",
+    "sweeps/local",
+    "sweeps/ray",
+)
 """Commands, how work is spread, and all that is made of rows afterwards."""
 
 

@@ -1,0 +1,130 @@
+"""Two commands: `apo-bench score`, one number for a method, and `apo-bench leaderboard`, a table of such numbers."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from apo_bench.cli.arguments import check_writable, cores, path_given
+from apo_bench.cli.printing import print_json
+from apo_bench.cli.setting_options import AsJson, CorrectorLimit, completion
+from apo_bench.cli.sweep import interrupted
+from apo_bench.errors import InputError, require
+from apo_bench.records import CORRECTOR_LIMIT_S
+
+
+def score_command(
+    method: Annotated[
+        str | None,
+        typer.Argument(
+            help="A method, or package.module:name; none with --command, --answers or --export.",
+            autocompletion=completion("method"),
+        ),
+    ] = None,
+    *,
+    track: Annotated[
+        list[str] | None, typer.Option(help="A track, by name or file; may be said again; default: all.")
+    ] = None,
+    out: Annotated[
+        Path | None,
+        typer.Option(parser=path_given, metavar="<path>", help="The entry: .json; rows lie in a folder beside it."),
+    ] = None,
+    command: Annotated[
+        str | None, typer.Option(metavar="PROGRAM", help="A program that reads a request, a line of JSON, and answers.")
+    ] = None,
+    answers: Annotated[
+        Path | None,
+        typer.Option(parser=path_given, metavar="<path>", help="Goals made elsewhere for the requests of --export."),
+    ] = None,
+    export: Annotated[
+        Path | None,
+        typer.Option(parser=path_given, metavar="<path>", help="Write all requests into this file, .jsonl; no score."),
+    ] = None,
+    name: Annotated[str | None, typer.Option(help="What tables call the entry; default: its method.")] = None,
+    quick: Annotated[bool, typer.Option("--quick", help="A few seeds of each cell: whether it works.")] = False,
+    salt_file: Annotated[
+        Path | None,
+        typer.Option(parser=path_given, metavar="<path>", help="Draw trials that nobody can draw without this file."),
+    ] = None,
+    workers: Annotated[int | None, typer.Option(help="Processes; default: the cores there are.")] = None,
+    corrector_limit: CorrectorLimit = CORRECTOR_LIMIT_S,
+    backend: Annotated[str, typer.Option(help="local, or ray for a cluster.")] = "local",
+    address: Annotated[str | None, typer.Option(help="Of the Ray cluster, host:port.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Run a method over tracks of fixed trials, resumed where they were left: one number for each, and one over all."""
+    from apo_bench.scoring.entrants import entrant, exported
+    from apo_bench.scoring.entry import form_of, write_entry
+    from apo_bench.scoring.score import score
+    from apo_bench.scoring.track import Track, read_tracks
+    from apo_bench.show.score_text import entry_lines
+
+    given = [x for x in (method, command, answers, export) if x is not None]
+    require(
+        len(given) == 1,
+        f"{len(given)} entrants were given; give one: a method, --command, --answers, or --export for none.",
+    )
+    tracks = read_tracks(track or [])
+    how = {
+        "workers": cores() if workers is None and backend == "local" else workers,
+        "backend": backend,
+        "address": address,
+        "corrector_limit_s": corrector_limit,
+        "salt_file": salt_file,
+    }
+    if export is not None:
+        check_writable(export, "--export", (".jsonl",))
+        count = exported(tracks, export, quick=quick, **how)
+        typer.echo(f"{count} requests in {export}; answer each, and give the answers to --answers.")
+        return
+    if out is None:
+        raise InputError("no --out was given; name the file of the entry, such as entry.json.")
+    check_writable(out, "--out", (".json",))
+    rows = out.with_suffix("")
+
+    def said(track: Track) -> None:
+        if not as_json:
+            typer.echo(f"{track.name}: {track.title}", err=True)
+
+    try:
+        with entrant(method, command, answers, rows) as found:
+            entry = score(
+                found,
+                tracks,
+                rows,
+                name=name or command or (None if answers is None else answers.name),
+                quick=quick,
+                command=shlex.join(["apo-bench", *sys.argv[1:]]),
+                said=said,
+                **how,
+            )
+    except KeyboardInterrupt as error:
+        raise interrupted(error, "; what had ended is kept, and the same command continues") from error
+    write_entry(entry, out)
+    if as_json:
+        print_json(form_of(entry))
+    else:
+        typer.echo("\n".join(entry_lines(entry)))
+        typer.echo(f"Entry: {out}")
+
+
+def leaderboard_command(
+    folder: Annotated[Path, typer.Argument(parser=path_given, metavar="FOLDER", help="Entries, .json files.")],
+    out: Annotated[
+        Path, typer.Option(parser=path_given, metavar="<path>", help="The page, .md; its figure lies beside it.")
+    ] = Path("leaderboard.md"),
+    salt: Annotated[
+        list[str] | None,
+        typer.Option(help="Hash of a salt that you drew trials with: entries of it are verified; may be said again."),
+    ] = None,
+) -> None:
+    """Write a table of entries, with paired differences and one figure of all tracks."""
+    from apo_bench.scoring.leaderboard import write_leaderboard
+
+    check_writable(out, "--out", (".md",))
+    count = write_leaderboard(folder, out, frozenset(salt or ()))
+    typer.echo(f"{count} entries in {out}")

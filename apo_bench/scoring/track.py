@@ -1,0 +1,103 @@
+"""Tracks: scenarios, seeds and settings that are fixed, each in a file, so that all scores are of the same trials.
+
+A track is a sweep file without methods, and a table of its own:
+
+    [track]
+    schema = "apo-bench/track/1"
+    title = "Poses of a camera that errs by a millimetre or so"
+    overall = true        # whether it counts in the score over all tracks
+    quick_trials = 1      # seeds of each cell with --quick
+    arms = ["six_axis"]   # one sweep for each; without it, the usual arm
+"""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import final
+
+from apo_bench.errors import require, unknown
+from apo_bench.io.documents import read_toml
+from apo_bench.io.ordinary_files import read_bytes
+from apo_bench.records import TrialSettings
+from apo_bench.resources import folder
+from apo_bench.sweeps.grid import SweepSettings
+from apo_bench.sweeps.sweep_file import read_sweep
+
+SCHEMA = "apo-bench/track/1"
+TABLE = "track"
+_HEX = 16
+
+
+@final
+@dataclass(frozen=True)
+class Track:
+    """Trials of one kind."""
+
+    name: str
+    title: str
+    overall: bool
+    """Whether it counts in the score over all tracks; the others are there for regression tests."""
+    quick_trials: int
+    arms: tuple[str, ...]
+    hash: str
+    """16 hexadecimal digits over the bytes of the file."""
+    grids: tuple[SweepSettings, ...]
+    """Their methods mean nothing."""
+
+    def of(self, method: str, arm: str, quick: bool = False) -> tuple[SweepSettings, ...]:
+        """The trials of a method on one of the arms."""
+        return tuple(
+            replace(
+                grid, methods=(method,), arm=arm, trials=min(grid.trials, self.quick_trials) if quick else grid.trials
+            )
+            for grid in self.grids
+        )
+
+
+def track_names() -> tuple[str, ...]:
+    """The tracks that come with the package, in the order of the alphabet."""
+    return tuple(sorted(path.stem for path in (folder("scenarios") / "tracks").glob("*.toml")))
+
+
+def read_track(given: str | Path) -> Track:
+    """A track by name, or out of a file.
+
+    Raises:
+        InputError: No such track, or anything in its file that is not as described.
+    """
+    text = str(given)
+    if not text.endswith(".toml"):
+        require(text in track_names(), unknown("track", text, track_names()) + " Or give a track file (.toml).")
+        given = folder("scenarios") / "tracks" / f"{text}.toml"
+    path = Path(given)
+    top = read_toml(path, "track file")
+    top.require(isinstance(top.value, dict) and TABLE in top.value, f"a table [{TABLE}] is needed")
+    top.require("methods" not in top.value, "no methods are needed, they are those who enter")
+    said = top.child(top.value[TABLE], TABLE).fields_of(SCHEMA, ("title",), ("overall", "quick_trials", "arms"))
+    quick = said["quick_trials"].integer() if "quick_trials" in said else 1
+    require(quick >= 1, f"{path}, {TABLE}, quick_trials: a whole number from 1 is needed, {quick} was given.")
+    arms = [arm.text() for arm in said["arms"].items("arm")] if "arms" in said else [TrialSettings.arm]
+    require(arms, f"{path}, {TABLE}, arms: at least one is needed; leave the key out for the usual one.")
+    return Track(
+        name=path.stem,
+        title=said["title"].text(),
+        overall=said["overall"].flag() if "overall" in said else True,
+        quick_trials=quick,
+        arms=tuple(arms),
+        hash=hashlib.sha256(read_bytes(path, "track file")).hexdigest()[:_HEX],
+        grids=read_sweep(path, besides=(TABLE,)),
+    )
+
+
+def read_tracks(names: Sequence[str]) -> tuple[Track, ...]:
+    """Tracks by name or file; all that come with the package if none is named.
+
+    Raises:
+        InputError: As `read_track`, or two have one name.
+    """
+    tracks = tuple(read_track(name) for name in names or track_names())
+    called = [track.name for track in tracks]
+    for name in called:
+        require(called.count(name) == 1, f"the track {name} was given twice; name every track once.")
+    return tracks
