@@ -115,8 +115,9 @@ def score_command(
 def leaderboard_command(
     folder: Annotated[Path, typer.Argument(parser=path_given, metavar="FOLDER", help="Entries, .json files.")],
     out: Annotated[
-        Path, typer.Option(parser=path_given, metavar="<path>", help="The page, .md; its figure lies beside it.")
-    ] = Path("leaderboard.md"),
+        Path,
+        typer.Option(parser=path_given, metavar="<path>", help="The page, .md; its figure lies beside it."),
+    ],
     salt: Annotated[
         list[str] | None,
         typer.Option(help="Hash of a salt that you drew trials with: entries of it are verified; may be said again."),
