@@ -49,6 +49,7 @@ PARSED_ONLY: Mapping[str, str] = {
     r"part import ": "needs a CAD file; tests/cad runs it",
     r"scenario new .*\.step ": "needs the extra cad; tests/cad runs it",
     r"scenario check ": "trials of seconds each; tests/drafting runs it without",
+    r"(score|leaderboard) ": "minutes: many trials; tests/scoring runs small ones",
     r"noise card ": "1000 observations; tests/observation/test_plain.py prints cards",
     r"replay stick_in_tower --level 1 --seed 7 --method (none|contact)$": "seconds each; replays of other pages run",
 }
@@ -171,7 +172,7 @@ def test_printed_numbers_are_compared_to_rounding_and_words_exactly(printed: str
 
 
 def test_pages_and_notebooks_use_what_the_package_exports() -> None:
-    """But for quantiles of two estimators' noise, tools that make part files, dm_env, touches, and tests of one's own code."""
+    """But for quantiles of two estimators' noise, the tools that make part files, dm_env, touches, and own tests."""
     code = {page: [block.text for block in blocks(page) if block.language == "python"] for page in PAGES}
     for path in (ROOT / "notebooks").glob("*.ipynb"):
         cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
