@@ -30,6 +30,7 @@ def recording_import(
 ) -> None:
     """Turn the log of a pose tracker into an observation: frames, rests, the order of operations."""
     from apo_bench.recording.formats import read_log
+    from apo_bench.recording.hands import hands_of
     from apo_bench.recording.setup_files import part_tracks, read_camera, read_objects
     from apo_bench.recording.show.text import reading_lines
 
@@ -42,8 +43,9 @@ def recording_import(
     stated = read_camera(camera)
     named = read_objects(objects)
     read = read_log(log, form, stated.conventions)
-    tracks = part_tracks(read, named)
-    print_lines(reading_lines(read, named))
+    hands = hands_of(read, named)
+    tracks = part_tracks(read, named, hands)
+    print_lines(reading_lines(read, named, hands))
     if scenario is None:
         _import_unplanned(read, named, stated, tracks, out, picture)
     else:

@@ -1,6 +1,6 @@
 """What rests give: the camera's pose, where parts start, the order of operations, and how well all of it fits."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import NamedTuple, final
@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Poses
 from apo_bench.errors import InputError, unknown
-from apo_bench.geometry import Array, frozen, pose
+from apo_bench.geometry import Array, extent, frozen, pose
 from apo_bench.recording.averaging import Mean
 from apo_bench.recording.ordering import (
     ContactFit,
@@ -22,7 +22,7 @@ from apo_bench.recording.ordering import (
     world_poses,
 )
 from apo_bench.recording.setup_files import CameraFile
-from apo_bench.recording.stays import Stays
+from apo_bench.recording.stays import Stay, Stays
 
 _HIGH_M = 0.01
 _TILTED_DEG = 10.0
@@ -63,9 +63,11 @@ class Arrangement(NamedTuple):
     start: Poses
     """Of all parts, world, [m]."""
     whence: Mapping[str, str]
-    """Part -> where its start is from: `known`, `seen`, `scenario`, `otherwise`."""
+    """Part -> where its start is from: `known`, `seen`, `scenario`, `otherwise`, `in the hand` (as in the scenario)."""
     fits: Mapping[int, ContactFit]
     """Operation that was seen, counted from 0 -> its worst contact."""
+    stays: Stays
+    """From where each part stood at the start."""
 
     @property
     def fit(self) -> ContactFit:
@@ -91,9 +93,13 @@ def arrangement_of(stays: Stays, camera: CameraFile, assembly: Assembly, planned
         NoOrder: The moves are not the operations.
         InputError: Nothing says where the camera stands.
     """
-    solved = camera_pose(stays, camera, planned)
+    solved = camera_pose(stays, camera, planned, assembly.fixed)
     X = solved.T_world_camera
-    start, whence = start_poses({part: X @ known[0].rests[0].T for part, known in stays.items()}, camera, planned)
+    standing = {part: _since_it_stands(known, assembly, planned[part], X) for part, known in stays.items()}
+    begun = {part: X @ known[0].rests[0].T for part, known in standing.items() if known}
+    start, whence = start_poses(begun, camera, planned)
+    held = {part: "in the hand" for part in standing if part not in begun and whence[part] == "scenario"}
+    stays = {part: standing[part] or known for part, known in stays.items()}
     order = (
         stated_order(assembly, stays, stated.ends)
         if stated.ends
@@ -104,15 +110,21 @@ def arrangement_of(stays: Stays, camera: CameraFile, assembly: Assembly, planned
         for k, stay in enumerate(order.stays)
         if stay is not None
     }
-    return Arrangement(solved, order, start, whence, fits)
+    return Arrangement(solved, order, start, {**whence, **held}, fits, stays)
 
 
-def camera_pose(stays: Stays, camera: CameraFile, planned: Poses) -> CameraPose:
+def camera_pose(stays: Stays, camera: CameraFile, planned: Poses, fixed: Collection[str]) -> CameraPose:
     """Where the camera stands: as stated, or solved from the first rests of parts on known places.
 
+    Args:
+        fixed: Parts that nobody moves: their places may be known though they are not tracked.
+
     Raises:
-        InputError: Neither is stated, or a known part is not tracked.
+        InputError: Neither is stated, or a known part that may move is not tracked.
     """
+    for part in camera.known:
+        if part not in stays and part not in fixed:
+            raise InputError(f"the camera file, known: {unknown('tracked part', part, stays)}")
     if camera.T_world_camera is not None:
         return CameraPose(camera.T_world_camera)
     if not camera.known:
@@ -120,10 +132,10 @@ def camera_pose(stays: Stays, camera: CameraFile, planned: Poses) -> CameraPose:
             "the camera file states neither where the camera stands nor a part on a known place; add a table [pose], "
             'or [known] with parts such as castle1 = "start".'
         )
-    for part in camera.known:
-        if part not in stays:
-            raise InputError(f"the camera file, known: {unknown('tracked part', part, stays)}")
-    return solved_camera(stays, camera, camera.places(planned))
+    places = {part: T for part, T in camera.places(planned).items() if part in stays}
+    if not places:
+        raise InputError("the camera file states no place of a part that is tracked; add one, or a table [pose].")
+    return solved_camera(stays, camera, places)
 
 
 def solved_camera(stays: Stays, camera: CameraFile, places: Poses) -> CameraPose:
@@ -176,6 +188,27 @@ def staying(camera: CameraFile, mean: Mean) -> Array:
     return mean.scatter if camera.stays is None else np.diag(np.repeat(camera.stays, 3) ** 2)
 
 
+def _since_it_stands(known: Sequence[Stay], assembly: Assembly, planned: Array, X: Array) -> tuple[Stay, ...]:
+    """The stays of a part from its start on; none if a hand held it in the air from the first frame until its goal.
+
+    A first stay in the air is a pause of the hand, which then put the part down: where as many stays follow as there
+    are operations that move the part.
+
+    Args:
+        planned: Where the scenario starts it, world, [m].
+        X: The camera.
+    """
+    part = known[0].part
+    pieces = assembly.solids[part].pieces
+    lowest = planned[2, 3] + extent(pieces, planned[2, :3])[0]
+    moves = sum(operation.main == part for operation in assembly.operations)
+    for i in range(max(1, len(known) - moves)):
+        T = X @ known[i].rests[0].T
+        if part in assembly.fixed or T[2, 3] + extent(pieces, T[2, :3])[0] <= lowest + _HIGH_M:
+            return tuple(known[i:])
+    return ()
+
+
 def start_poses(seen: Poses, camera: CameraFile, planned: Poses) -> tuple[Poses, Mapping[str, str]]:
     """Where every part starts, and whence that is known: `known`, `seen`, `otherwise` or `scenario`.
 
@@ -183,7 +216,7 @@ def start_poses(seen: Poses, camera: CameraFile, planned: Poses) -> tuple[Poses,
         seen: Of tracked parts, world, [m].
         planned: Of all parts.
     """
-    known = {part: T for part, T in camera.places(planned).items() if part in seen}
+    known = camera.places(planned)
     standing = {part: _standing(planned[part], T) for part, T in seen.items() if part not in known}
     stood = {part: T for part, T in standing.items() if T is not None}
     whence = {

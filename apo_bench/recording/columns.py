@@ -1,6 +1,7 @@
 """Columns of numbers become poses: positions, quaternions, rotation vectors, Euler angles, matrices."""
 
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -56,17 +57,35 @@ def column(name: str) -> LogColumn | None:
     return LogColumn(meaning, unit) if meaning in _KNOWN else None
 
 
-def row_times(cells: Mapping[str, Array], units: Mapping[str, str], how: Conventions, file: str) -> Array:
-    """The time of every row, (n,), [s]."""
+def row_times(
+    cells: Mapping[str, Array], units: Mapping[str, str], how: Conventions, file: str, ids: Sequence[str]
+) -> Array:
+    """The time of every row, (n,), [s]; of rows without a time and a number of their image by the rate of images."""
     if "t" in cells:
         return cells["t"] * TIME_UNITS[units["t"] or how.time]
+    if how.rate_hz is not None:
+        return (cells["frame"] if "frame" in cells else counted_images(ids)) / how.rate_hz
     if "frame" in cells:
-        if how.rate_hz is None:
-            raise InputError(f"{file}: images are numbered and have no time; state `rate_hz` in the camera file.")
-        return cells["frame"] / how.rate_hz
+        raise InputError(f"{file}: images are numbered and have no time; state `rate_hz` in the camera file.")
     raise InputError(
-        f"{file}: the column of the time is missing, such as t_s; name it in `columns` of the camera file."
+        f"{file}: the column of the time is missing, such as t_s; name it in `columns` of the camera file, or state "
+        "`rate_hz` there if every image has one row of each id."
     )
+
+
+def counted_images(ids: Sequence[str]) -> Array:
+    """The number of the image of every row, (n,), from 0: a new one begins where an id stands again.
+
+    Of rows that are sorted by id each id counts its own.
+    """
+    blocks = [name for name, _ in groupby(ids)]
+    images = np.zeros(len(ids))
+    there: set[str] = set()
+    for i, name in enumerate(ids):
+        new_block = len(blocks) == len(set(blocks)) and i > 0 and name != ids[i - 1]
+        images[i] = 0.0 if i == 0 or new_block else images[i - 1] + (name in there)
+        there = {name} if name in there else there | {name}
+    return images
 
 
 def poses(

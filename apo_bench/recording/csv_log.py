@@ -46,7 +46,7 @@ def read_csv_log(path: Path, how: Conventions) -> LogRows:
     """The rows of a file whose columns name what they are; without a column of ids, its name is the id of all."""
     cells, units, ids, places = read_numbers(path, column, how.columns)
     T, notes = poses(cells, units, how, str(path), places)
-    return LogRows(ids, row_times(cells, units, how, str(path)), T, places, notes)
+    return LogRows(ids, row_times(cells, units, how, str(path), ids), T, places, notes)
 
 
 def read_ros_csv(path: Path, how: Conventions) -> LogRows:

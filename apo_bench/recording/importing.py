@@ -90,7 +90,7 @@ def import_recording(
         slow = f" At this rate of frames a rest is seen from {least:.1f} s on." if least > _SLOW_S else ""
         raise InputError(f"{file}: {error}{slow}") from error
     check_arrangement(arrangement, arrange, stays, models or {}, camera, file)
-    solved, order, start, whence, _ = arrangement
+    solved, order, start, whence, _, stays = arrangement
     X = solved.T_world_camera
     operations = tuple(seen_operation(tracks, stays, order.stays, assembly, X, k) for k in range(len(assembly)))
     seen = np.array([operation.rest is not None for operation in operations])

@@ -37,7 +37,7 @@ class Conventions:
     euler: str | None = None
     """Axes as SciPy spells them: `xyz` about fixed axes, `XYZ` about moving ones."""
     rate_hz: float | None = None
-    """Of images that have a number and no time."""
+    """Of images that have no time."""
     scene: int | None = None
     """Of BOP results, which may hold several."""
     inverted: bool = False
@@ -77,8 +77,6 @@ def read_camera(path: str | Path) -> CameraFile:
         InputError: Anything that is not as described, naming file and key.
     """
     top = read_toml(path, "camera file").fields_of(_CAMERA, (), ("log", "pose", "known", "noise"))
-    if "pose" in top and "known" in top:
-        refuse(top["known"], "the pose of the camera is stated too; state one of the two")
     return CameraFile(
         conventions=_conventions(top["log"]) if "log" in top else Conventions(),
         T_world_camera=read_any_pose(top["pose"]) if "pose" in top else None,
@@ -192,14 +190,17 @@ def read_objects(path: str | Path) -> ObjectsFile:
     return ObjectsFile(str(path), parts, ignored)
 
 
-def part_tracks(log: Log, objects: ObjectsFile) -> Mapping[str, PoseTrack]:
+def part_tracks(log: Log, objects: ObjectsFile, hands: Collection[str] = ()) -> Mapping[str, PoseTrack]:
     """The tracks of parts, camera from part.
+
+    Args:
+        hands: Ids of hands and grippers, which are no parts.
 
     Raises:
         InputError: An id of the log is no part, or a part is not in the log.
     """
     known = {tracked.id for tracked in objects.parts.values()} | objects.ignored
-    strange = [name for name in log.tracks if name not in known]
+    strange = [name for name in log.tracks if name not in known and name not in hands]
     if strange:
         quoted = ", ".join(f"'{one_line(name, 60)}'" for name in strange[:_MOST_IDS])
         quoted += ", ..." if len(strange) > _MOST_IDS else ""

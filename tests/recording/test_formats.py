@@ -181,3 +181,23 @@ def test_images_of_bop_are_counted_by_the_rate_and_the_best_estimate_counts(tmp_
     assert np.allclose(track.t * RATE_HZ, [0, 1, 2])
     with pytest.raises(InputError, match="state `rate_hz` in the camera file"):
         read_log(tmp_path / "log.csv", "bop", Conventions())
+
+
+@pytest.mark.parametrize("sorted_by_id", [False, True])
+def test_rows_without_a_time_are_counted_by_the_rate_of_images(sorted_by_id: bool, tmp_path: Path) -> None:
+    names = [name for name in "ab" for _ in range(3)] if sorted_by_id else list("ab" * 3)
+    rows = "".join(f"{name},{i},0,900,1,0,0,0\n" for i, name in enumerate(names))
+    (tmp_path / "log.csv").write_text("id,x_mm,y_mm,z_mm,qw,qx,qy,qz\n" + rows, encoding="utf-8")
+    log = read_log(tmp_path / "log.csv", "csv", Conventions(rate_hz=10.0))
+    for name in "ab":
+        assert log.tracks[name].t == pytest.approx([0.0, 0.1, 0.2])
+    with pytest.raises(InputError, match="or state `rate_hz` there"):
+        read_log(tmp_path / "log.csv", "csv", Conventions())
+
+
+def test_an_id_that_is_missing_in_an_image_leaves_the_others_in_time(tmp_path: Path) -> None:
+    rows = "".join(f"{name},0,0,900,1,0,0,0\n" for name in "abbabab")
+    (tmp_path / "log.csv").write_text("id,x_mm,y_mm,z_mm,qw,qx,qy,qz\n" + rows, encoding="utf-8")
+    log = read_log(tmp_path / "log.csv", "csv", Conventions(rate_hz=1.0))
+    assert log.tracks["a"].t.tolist() == [0.0, 1.0, 2.0]
+    assert log.tracks["b"].t.tolist() == [0.0, 1.0, 2.0, 3.0]

@@ -18,7 +18,7 @@ from apo_bench.recording.ordering import Stated
 from apo_bench.recording.setup_files import CameraFile, Conventions
 from apo_bench.recording.without_scenario import unplanned_recording
 from apo_bench.scenario.layout import layout_at
-from tests.recorded import CAMERA, motion, seen
+from tests.recorded import CAMERA, RATE_HZ, motion, seen
 
 NOTHING = Stated()
 GIVEN = CameraFile(Conventions(), CAMERA, {}, None)
@@ -230,3 +230,52 @@ def test_the_recording_is_what_it_says() -> None:
     t, T = motion(NAME)
     assert np.array_equal(T["stick"][-1], goals(NAME)[2])
     assert (np.diff(t) > 0).all()
+
+
+def test_a_part_that_a_hand_held_from_the_first_frame_starts_as_in_the_scenario() -> None:
+    tracks = seen(NAME, 0.3)
+    t, T = tracks["stick"]
+    held = T.copy()
+    first = t < 0.6
+    lifted = pose.at((0.0, 0.0, 0.11), (45.0, 0.0, 0.0))
+    start = CAMERA @ T[0]
+    up = pose.at(tuple(start[:3, 3])) @ lifted @ pose.at(tuple(-start[:3, 3]))
+    held[first] = pose.inverse(CAMERA) @ up @ CAMERA @ T[first]
+    whole = imported({**tracks, "stick": PoseTrack(t, held)})
+    # it is put down at 0.6 s, and taken from there
+    assert whole.stood["stick"] == "seen"
+    assert (
+        abs(whole.observation.start["stick"][2, 3] - layout_at(load_scenario(NAME), 0.1, 0.0, 0.3).start["stick"][2, 3])
+        < 1e-3
+    )
+    held[t < _taken(T)] = pose.inverse(CAMERA) @ up @ CAMERA @ T[t < _taken(T)]
+    never = imported({**tracks, "stick": PoseTrack(t, held)})
+    assert never.stood["stick"] == "in the hand"
+    planned = load_scenario(NAME)
+    assert np.allclose(
+        never.observation.start["stick"], layout_at(planned, 0, 0, 0, clearance_mm=planned.clearance_mm).start["stick"]
+    )
+
+
+def _taken(T: np.ndarray) -> float:
+    """When a part was first moved."""
+    moved = np.linalg.norm(T[:, :3, 3] - T[0, :3, 3], axis=1) > 0.01
+    return float(np.argmax(moved)) / RATE_HZ
+
+
+def test_a_fixed_part_is_where_it_was_seen_or_stated_though_the_assembly_stands_elsewhere() -> None:
+    name = "peg_in_hole"
+    scenario = load_scenario(name)
+    base = layout_at(scenario, 0.1, 0.0, 0.3, clearance_mm=scenario.clearance_mm).start["base"]
+    tracks = seen(name, 0.3)
+    with pytest.raises(InputError, match="no contact fits"):
+        imported(tracks, name=name)
+    stated = imported(tracks, replace(GIVEN, known={"base": base}), name)
+    assert stated.stood["base"] == "known"
+    assert np.allclose(stated.observation.start["base"], base)
+    still = PoseTrack(tracks["peg"].t, np.tile(pose.inverse(CAMERA) @ base, (len(tracks["peg"].t), 1, 1)))
+    tracked = imported({**tracks, "base": still}, name=name)
+    assert tracked.stood["base"] == "seen"
+    assert np.abs(tracked.observation.start["base"] - base).max() < 1e-6
+    with pytest.raises(InputError, match="tracked part"):
+        imported(tracks, replace(GIVEN, known={"plate2": base}), name)

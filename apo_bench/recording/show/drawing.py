@@ -84,7 +84,7 @@ def unfit_drawing(
     planned = planned_starts(scenario)
     X = None
     with suppress(InputError, LookupError, np.linalg.LinAlgError):
-        X = camera_pose(stays, camera, planned).T_world_camera
+        X = camera_pose(stays, camera, planned, scenario.assembly.fixed).T_world_camera
     return RecordingDrawing(
         title=f"{_title(log, scenario)}; it does not fit",
         tracks=tracks,

@@ -36,8 +36,8 @@ _POSE_UNITS = frozen([1e3, 1e3, 1e3, 1.0, 1.0, 1.0, 1.0], 7)
 """mm for m of a packed pose."""
 
 
-def reading_lines(log: Log, objects: ObjectsFile) -> list[tuple[str, str]]:
-    """Frames, units and orders, before anything is trusted."""
+def reading_lines(log: Log, objects: ObjectsFile, hands: Mapping[str, str]) -> list[tuple[str, str]]:
+    """Frames, units and orders, before anything is trusted; and ids that are taken for hands -> a part they moved."""
     times = [track.t for track in log.tracks.values()]
     seconds = max(float(t[-1]) for t in times)
     return [
@@ -50,6 +50,7 @@ def reading_lines(log: Log, objects: ObjectsFile) -> list[tuple[str, str]]:
             )
             for part, tracked in objects.parts.items()
         ),
+        *(("hand", f"id {name} takes {part} along and leaves it: no part") for name, part in hands.items()),
     ]
 
 
@@ -69,6 +70,7 @@ def imported_lines(recording: ImportedRecording) -> list[tuple[str, str]]:
         "known": "on known places",
         "seen": "where they were seen, standing as in the scenario",
         "scenario": "as in the scenario",
+        "in the hand": "in the hand from the first frame, so as in the scenario",
     }
     # Which parts start where, by how that is known; those that stood otherwise are unclear, and stand there.
     stood = {whence: [part for part, each in recording.stood.items() if each == whence] for whence in how}
