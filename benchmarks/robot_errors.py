@@ -1,7 +1,8 @@
-"""What errors of the robot itself cost: `python benchmarks/robot_errors.py FOLDER [FOLDER ...]`.
+"""What errors of the robot itself cost: `python benchmarks/robot_errors.py FOLDER [FOLDER ...] [--acts FILE]`.
 
 Takes sweeps of benchmarks/robot_errors.toml, whole or not, and writes docs/results/robot-errors.md: successes of every
-robot error, method and scenario, with Wilson's 95 % interval over the scenarios.
+robot error, method and scenario, with Wilson's 95 % interval over the scenarios. With the lines of
+`python -m benchmarks.feel_acts --out FILE` the page also says what each act of a robot that feels is worth.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from apo_bench.records import Row, TrialSettings
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.statistics import Cell, tally, wilson
+from benchmarks.feel_acts import Line, lines_of, table
 from benchmarks.made_with import mujoco_of, with_mujoco
 
 PAGE = Path(__file__).parents[1] / "docs" / "results" / "robot-errors.md"
@@ -45,6 +47,13 @@ OTHERS = """
 
 The sensor is that of the wrist (`--wrench`), and stated is how wrong the robot was said to be (`--stated-error`).
 """
+ACTS = """
+## Each act left out
+
+Errors of all kinds together, as in the last line of the first table, by `python -m benchmarks.feel_acts`. Without
+`touch` nothing fixed is touched, without `search` a motion that is stopped is not tried again elsewhere. Lost, won: how
+many trials only the robot with all acts got right, and how many only this one.
+"""
 SCENARIOS = ("peg_in_hole", "stick_in_tower", "carried_bridge")
 USUAL = {"arm": "six_axis", "wrench": TrialSettings.wrench, "stated_error": TrialSettings.stated_error}
 OTHER_KEYS = ("robot_error", *USUAL)
@@ -57,13 +66,17 @@ Contacts repair the eye's error, not the robot's own: with one, `oracle`, which 
 def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("folders", nargs="+", type=Path)
-    folders = asked.parse_args().folders
+    asked.add_argument("--acts", type=Path, metavar="FILE", help="of benchmarks/feel_acts.py")
+    given = asked.parse_args()
+    folders = given.folders
     rows = [row for folder in folders for row in read_rows(folder)]
-    PAGE.write_text(with_mujoco(page(rows), mujoco_of(folders)), encoding="utf-8")
+    acts = [] if given.acts is None else lines_of(given.acts)
+    simulated = {*mujoco_of(folders), *(line["mujoco"] for line in acts)}
+    PAGE.write_text(with_mujoco(page(rows, acts), sorted(simulated)), encoding="utf-8")
     print(f"Wrote {PAGE}")
 
 
-def page(every: Iterable[Row]) -> str:
+def page(every: Iterable[Row], acts: Sequence[Line] = ()) -> str:
     every = list(every)
     rows = [row for row in every if row["scenario"] in SCENARIOS and all(row[k] == v for k, v in USUAL.items())]
     others = [row for row in every if row not in rows]
@@ -88,6 +101,7 @@ def page(every: Iterable[Row]) -> str:
         + COST
         + _table("method", scenarios, methods, cost)
         + (OTHERS + _others(others) if others else "")
+        + (ACTS + "\n" + table(acts) if acts else "")
         + TAUGHT
     )
 
