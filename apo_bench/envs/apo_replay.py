@@ -23,6 +23,7 @@ from apo_bench.records import (
     Predicted,
     TrialSettings,
     check,
+    check_squares,
     level_pair,
     refuse_noise,
 )
@@ -147,6 +148,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         check("abstain", abstain)
         self._abstain = abstain
         self._robot = RobotSettings(robot_error, feels, wrench, stated_error).checked()
+        check_squares(self._robot.feels, grasp)
         self.render_mode = render_mode
         if eye == RANGE and noise is not None:
             refuse_noise(noise)

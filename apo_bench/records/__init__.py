@@ -14,7 +14,7 @@ from apo_bench.records.method import (
     parsed,
     with_simulated,
 )
-from apo_bench.records.outcomes import CODES, STAGES, sentence
+from apo_bench.records.outcomes import CODES, STAGES, sentence, touching_sentence
 from apo_bench.records.relations import GIVEN, RECOGNISED, SHIFT_MM, WRONG, relations_name
 from apo_bench.records.robot_error import (
     NO_ROBOT_ERROR,
@@ -49,6 +49,7 @@ from apo_bench.records.settings import (
     Name,
     TrialSettings,
     check,
+    check_squares,
     check_together,
     level_pair,
     refuse_noise,
@@ -117,6 +118,7 @@ __all__ = (
     "as_seen",
     "check",
     "check_same_salt",
+    "check_squares",
     "check_together",
     "checked_robot_error",
     "checked_stated_error",
@@ -142,6 +144,7 @@ __all__ = (
     "setting_columns",
     "settings_of",
     "told_error",
+    "touching_sentence",
     "trial_key",
     "with_salt",
     "with_simulated",

@@ -7,8 +7,8 @@ trial or its corrector) are filled in where the outcome is made; no other words 
 from types import MappingProxyType
 
 STAGES = (
-    *("demonstrate", "observe", "correct", "promise", "plan", "pick", "lift", "carry", "attach", "release"),
-    *("depart", "judge", "worker"),
+    *("demonstrate", "observe", "correct", "promise", "plan", "touch", "pick", "lift", "carry", "attach"),
+    *("release", "depart", "judge", "worker"),
 )
 """Where a trial can fail, in the order of a trial, and last the process that runs it; `done` is where one that did not
 fail ends."""
@@ -32,7 +32,7 @@ CODES = MappingProxyType(
         "unreachable": "the arm cannot reach the goal of operation {operation} ({part})",
         "unreachable_start": "the arm cannot reach {part} where operation {operation} picks it up",
         "unstable_goal": "at the goal of operation {operation} the centre of mass of {part} lies beside its support",
-        # pick .. depart
+        # touch .. depart
         "lost_grasp": "{part} was lost from the gripper in operation {operation}",
         "force_stop": "the motion of operation {operation} ({part}) was stopped by contact force before its goal",
         "collision": "the arm struck {part} in operation {operation}",
@@ -50,6 +50,20 @@ CODES = MappingProxyType(
         "time_limit": "the {what} took longer than its limit",
     }
 )
+
+_TOUCHING = MappingProxyType(
+    {
+        "collision": "the arm struck {part} while it touched what is fixed, before the first operation",
+        "unreachable": "the arm cannot reach a place where it would touch what is fixed",
+        "unstable_simulation": "the simulation became unstable while the arm touched what is fixed",
+    }
+)
+"""The same of a robot that feels, before it takes a part."""
+
+
+def touching_sentence(code: str, *, part: str = "") -> str:
+    """The sentence of a code of the stage `touch`, which is of no operation."""
+    return _TOUCHING[code].format(part=part)
 
 
 def sentence(code: str, *, part: str = "", operation: int = 0, what: str = "trial") -> str:

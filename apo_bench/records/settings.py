@@ -14,7 +14,7 @@ import numpy as np
 from msgspec import Meta
 
 from apo_bench.errors import InputError
-from apo_bench.records.method import checked_method, is_own, parsed
+from apo_bench.records.method import checked_method, feels, is_own, parsed
 from apo_bench.records.relations import checked_relations
 from apo_bench.records.robot_error import DRAWN, NO_ROBOT_ERROR, checked_robot_error, checked_stated_error
 from apo_bench.records.salt import Salt
@@ -272,6 +272,7 @@ class TrialSettings:
             if info.spelled is not None:
                 object.__setattr__(self, info.name, info.spelled(getattr(self, info.name)))
         check_together(self.fidelity, self.grasp)
+        check_squares(feels(self.method), self.grasp)
         check_asks(self.method, self.looks)
         if self.eye == RANGE:
             if self.noise not in (USUAL, RANGE):
@@ -311,6 +312,15 @@ def check_together(fidelity: str, *grasps: str) -> None:
         raise InputError(
             "the fidelity 'contact' was given together with the grasp 'weld', with which its verdicts differ; "
             "use the grasp friction, or full."
+        )
+
+
+def check_squares(feels: bool, *grasps: str) -> None:
+    """Raise an `InputError` if a robot that feels, which squares parts between its pads, has none that close."""
+    if feels and "weld" in grasps:
+        raise InputError(
+            "the grasp 'weld' was given for a robot that feels, which squares parts between pads that close; use the "
+            "grasp friction, or a robot that does not feel."
         )
 
 

@@ -33,7 +33,8 @@ _PRESETS = MappingProxyType(
     }
 )
 _N_PER_NM = 20.0
-_LARGEST = WrenchNoise(50.0, 5.0)
+_LARGEST = WrenchNoise(10.0, 5.0)
+"""A touch ends by six standard deviations of what is felt, 13.5 N with such a sensor: with 14 N it was a collision."""
 
 
 def wrench_noise(name: str) -> WrenchNoise:
@@ -55,7 +56,8 @@ def wrench_noise(name: str) -> WrenchNoise:
     if not (0.0 <= force <= _LARGEST.force_n and 0.0 <= torque <= _LARGEST.torque_nm):
         raise InputError(
             f"the wrench sensor '{name}' was given; standard deviations from 0 to {_LARGEST.force_n:g} N and from 0 to "
-            f"{_LARGEST.torque_nm:g} Nm are allowed, 0.1/0.005, or a name: {', '.join(_PRESETS)}."
+            f"{_LARGEST.torque_nm:g} Nm are allowed (with more N a touch is a collision before it is felt): 0.1/0.005, "
+            f"or a name: {', '.join(_PRESETS)}."
         )
     return WrenchNoise(force, torque)
 

@@ -53,7 +53,7 @@ def acts_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> dic
             "guard_n": round(guard, 6),
             "speed_mm_s": _mm(touching.SPEED),
             "expected_after_mm": _mm(STAND_OFF_M),
-            "at_most_mm": _mm(STAND_OFF_M + touching.BEYOND_M),
+            "at_most_mm": _mm(2.0 * STAND_OFF_M + touching.BEYOND_M),
             "sigma_mm": _mm(TOUCH_SIGMA_M),
             **{name: [_touch(place, frames) for place in places(plan, scene)] for name, places in touches.items()},
         },

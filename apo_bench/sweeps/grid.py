@@ -17,6 +17,7 @@ from apo_bench.records import (
     Salt,
     TrialSettings,
     check,
+    check_squares,
     check_together,
     feels,
     knows_relations,
@@ -114,6 +115,7 @@ class SweepSettings:
                         f"the name {value!r} was given, which has control characters or half letters; use another one."
                     )
         check_together(self.fidelity, *self.grasps)
+        check_squares(any(map(feels, self.methods)), *self.grasps)
 
 
 def check_grids(grids: Sequence[SweepSettings]) -> None:

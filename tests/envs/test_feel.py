@@ -69,3 +69,8 @@ def test_whether_it_feels_is_true_or_false() -> None:
         APOReplay(SCENARIO, feels="no")  # type: ignore[arg-type]
     with pytest.raises(InputError, match="None was given as wrench sensor"):
         APOReplay(SCENARIO, wrench=None)  # type: ignore[arg-type]
+
+
+def test_pads_that_do_not_close_square_nothing() -> None:
+    with pytest.raises(InputError, match="the grasp 'weld' was given for a robot that feels"):
+        APOReplay(SCENARIO, feels=True, grasp="weld")

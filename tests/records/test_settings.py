@@ -80,6 +80,10 @@ def test_settings_of_a_row_are_those_that_it_was_made_with() -> None:
         ({"stated_error": "drawnn"}, "unknown stated error 'drawnn'; did you mean 'drawn'?"),
         ({"wrench": None}, "None was given as wrench sensor; a name is needed, a str."),
         ({"stated_error": 1.0}, "a float was given as stated error; a name is needed, a str."),
+        (
+            {"grasp": "weld", "method": "oracle+feel"},
+            "the grasp 'weld' was given for a robot that feels, which squares parts between pads that close;",
+        ),
         ({"robot_error": None}, "None was given as robot error;"),
         ({"method": None}, "None was given as method;"),
         ({"relations": 1}, "an int was given as relations;"),

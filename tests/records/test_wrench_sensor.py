@@ -39,11 +39,11 @@ def test_the_usual_sensor_is_a_good_one_between_arm_and_hand() -> None:
         ),
         ("", "unknown wrench sensor ''. Known: cobot, external, external-coarse, ideal. Or give its noise in N and Nm"),
         ("nan", "unknown wrench sensor 'nan'"),
-        ("-1", "the wrench sensor '-1' was given; standard deviations from 0 to 50 N and from 0 to 5 Nm are allowed"),
+        ("-1", "the wrench sensor '-1' was given; standard deviations from 0 to 10 N and from 0 to 5 Nm are allowed"),
         ("0.1/0.005/1", "the wrench sensor '0.1/0.005/1' was given;"),
         ("0.1/nan", "the wrench sensor '0.1/nan' was given;"),
         ("0.1N", "the wrench sensor '0.1N' was given;"),
-        ("51/1", "the wrench sensor '51/1' was given;"),
+        ("10.5/1", "the wrench sensor '10.5/1' was given;"),
         ("1e400", "the wrench sensor '1e400' was given;"),
     ],
 )

@@ -1,20 +1,24 @@
 """A robot that feels: where it touches, what lying flat tells, and that it knows nothing but what it touched."""
 
-from functools import cache
+from dataclasses import replace
+from functools import cache, partial
 
 import numpy as np
 import pytest
 
 from apo_bench import Plan, build_scene, load_scenario
 from apo_bench.geometry import extent, pose
-from apo_bench.simulation.execution.feel.feeling import ACTS, Feeling
+from apo_bench.records import wrench_noise
+from apo_bench.simulation.execution.controller import replay
+from apo_bench.simulation.execution.feel.feeling import ACTS, Feeling, touch_guard
 from apo_bench.simulation.execution.feel.laying import _Laying, averaged_s
 from apo_bench.simulation.execution.feel.places import floor_places, opposite_places, wall_places
-from apo_bench.simulation.execution.feel.touching import find_out
+from apo_bench.simulation.execution.feel.touching import _stand_off, find_out
 from apo_bench.simulation.execution.flush import Flush
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.robot_error import RobotError
+from apo_bench.simulation.robot.wrist import felt_noise, low_pass_part
 from apo_bench.trial.feeling import feels_of
 from apo_bench.trial.stages import replay_and_judge, robot_error_of, simulate_demonstration
 
@@ -59,6 +63,45 @@ def test_the_floor_is_touched_at_three_places_around_the_goals(name):
     for place in places:
         touched = pose.apply(place.T_world_tip, place.patch).mean(axis=0)
         assert place.normal @ touched - place.offset == pytest.approx(0.004, abs=1e-9)
+
+
+def test_a_robot_that_may_be_far_off_begins_farther_away():
+    def begins(stated):
+        robot = Robot(scene("peg_in_hole"), plan("peg_in_hole").start, None, "contact")
+        feels = feels_of(plan("peg_in_hole"), scene("peg_in_hole"), stated, (5,), "ideal")
+        stand_off = partial(_stand_off, robot, Feeling(feels, plan("peg_in_hole"), scene("peg_in_hole"), None))
+        found = (places(plan("peg_in_hole"), scene("peg_in_hole"), stand_off) for places in (floor_places, wall_places))
+        return [[place.stand_off for place in each] for each in found]
+
+    assert begins(STATED) == [[0.004] * 3, [0.004] * 4]
+    floor, walls = begins("tool:5")
+    assert floor == pytest.approx([0.015] * 3)
+    assert all(place == pytest.approx(0.015) or place == 0.004 for place in walls)  # as far as there is room
+    assert len(walls) == 4
+
+
+def test_a_robot_that_is_as_far_off_as_it_was_told_feels_the_floor():
+    error = drawn("stick_in_tower", "tool:5")
+    belief = found_out("stick_in_tower", error, stated="tool:5")
+    assert len(belief.touches) == 3
+    assert belief.tool[2] == pytest.approx(error.tool[2, 3], abs=2e-4)
+
+
+def test_a_robot_that_is_farther_off_than_it_was_told_strikes_the_floor_before_any_operation():
+    name = "stick_in_tower"
+    error = replace(drawn(name, "tool:0"), tool=pose.at((0.0, 0.0, 0.009)))
+    feels = feels_of(plan(name), scene(name), "tool:1.2", (5,), "ideal")
+    outcome = replay(plan(name), scene(name), fidelity="contact", error=error, feels=feels).outcome
+    assert (outcome.stage, outcome.code, outcome.operation) == ("touch", "collision", None)
+    assert outcome.sentence == (
+        "the arm struck table while it touched what is fixed, before the first operation: it began 4.0 mm before what "
+        "it would touch, with 3 mm of room aside, and may be off by 3.6 mm"
+    )
+
+
+def test_the_noisiest_sensor_ends_a_touch_before_it_is_a_collision():
+    felt = felt_noise(wrench_noise("10/5"), low_pass_part())
+    assert 10.0 < touch_guard(felt.force_n) < 0.7 * 20.0
 
 
 def test_walls_that_recede_are_expected_where_they_are():

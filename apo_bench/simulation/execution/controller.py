@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.assembly import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot, Step, goals_in_force
 from apo_bench.prediction.stability import first_unstable
-from apo_bench.records import sentence
+from apo_bench.records import sentence, touching_sentence
 from apo_bench.simulation.execution.carry_out import bring, take
 from apo_bench.simulation.execution.feel.feeling import Feeling, Feels
 from apo_bench.simulation.execution.feel.laying import lay as lay_down
@@ -69,13 +69,14 @@ def replay(
         feels: How a robot finds out what is wrong with it, by what it touches; None: it does not.
     """
     feeling = None if feels is None else Feeling(feels, plan, scene, error)
-    searches = searches or (feels is not None and "search" in feels.acts)
+    acts = () if feels is None else feels.acts
+    prepared = partial(_todo, plan, scene, searches or "search" in acts, acts)
     start = plan.start if parts_at is None else parts_at
     if len(plan.schedule) * _SHORTEST_STEP_S > most_s:
         todo: tuple[Move, ...] = ()
         refused: Outcome | None = _outcome(plan, "plan", "time_limit", plan.schedule[0].operation)
     else:
-        todo = _todo(plan, scene, searches, error, () if feels is None else feels.acts)
+        todo = prepared(error)
         refused = _refusal(plan, scene, todo)
     cache = ReplayCache() if cache is None or watch is not None or feeling is not None else cache
     keys = cache_keys(scene, start, fidelity, todo, error)
@@ -87,7 +88,7 @@ def replay(
     robot = Robot(scene, start, hooks, fidelity, error)
     progress = Progress([None] * len(plan.assembly), [])
     with sleeping(scene.work, scene.grasp == "friction"), left_out(scene.work):
-        outcome = refused or _run_schedule(plan, robot, todo, progress, cache, keys, most_s, feeling)
+        outcome = refused or _run_schedule(plan, robot, todo, progress, cache, keys, most_s, feeling, prepared)
         final = _settled(robot, plan) if outcome.code != "unstable_simulation" else None
     result = ReplayResult(
         reached=Reached(after=tuple(progress.after), final=final),
@@ -104,7 +105,7 @@ def replay(
 
 
 def _todo(
-    plan: Plan, scene: Scene, searches: bool, error: RobotError | None, acts: tuple[str, ...]
+    plan: Plan, scene: Scene, searches: bool, acts: tuple[str, ...], error: RobotError | None
 ) -> tuple[Move, ...]:
     """The transfers of a plan, as a robot carries them out whose base and tool are not where it believes them."""
     if error is None:
@@ -134,17 +135,24 @@ def _run_schedule(
     keys: list[bytes],
     most_s: float,
     feeling: Feeling | None,
+    prepared: Callable[[RobotError | None], tuple[Move, ...]],
 ) -> Outcome:
-    """One step of the schedule after the other, from the furthest state that the cache has."""
+    """One step of the schedule after the other, from the furthest state that the cache has.
+
+    Args:
+        prepared: What to do, by what is wrong with the robot and not made up for.
+    """
     kept_states, grip = cache.resume(keys, robot, progress)
     if not kept_states:
         try:
             robot.wait(_AT_FIRST_S)
             if feeling is not None:
                 find_out(robot, feeling)
-                searches = "search" in feeling.acts
-                todo = _todo(plan, robot.scene, searches, feeling.residual, feeling.acts)
+                todo = prepared(feeling.residual)
         except Halt as halt:
+            if halt.stage == "touch":
+                why = f": {halt.why}" if halt.why else ""
+                return Outcome("touch", halt.code, None, touching_sentence(halt.code, part=halt.part) + why)
             return _outcome(plan, "pick", halt.code, plan.schedule[0].operation, halt.part)
     for i, (step, transfer) in list(enumerate(todo))[kept_states // 2 :]:
         if robot.data.time > most_s:

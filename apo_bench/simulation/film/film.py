@@ -185,7 +185,7 @@ def operation_words(assembly: Assembly, moment: FilmMoment) -> str:
     """`operation 2 of 3, castle2: pick`."""
     k = moment.doing.operation
     if k is None:
-        return "at the start"
+        return "the closed hand touches what is fixed" if moment.doing.macro == "touch" else "at the start"
     operation = assembly.operations[k]
     carried = f" with {', '.join(operation.carries)}" if operation.carries else ""
     undone = " undone" * moment.doing.undoes

@@ -42,6 +42,8 @@ class Halt(Exception):
         self.code = code
         self.part = part
         """Which part it is about, if not the one that is moved."""
+        self.why = ""
+        """What is known of the cause."""
 
 
 class Robot:

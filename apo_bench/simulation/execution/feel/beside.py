@@ -38,7 +38,7 @@ def touch_beside(
     # Nothing sleeps meanwhile: what the arm strikes is noticed, whatever rests.
     with sleeping(robot.scene.work, False), reading(robot, feeling.wrist):
         feeling.wrist.hold(*part_loads(robot.scene, {t.part: held}))
-        end = shifted(robot.T, place.way, STAND_OFF_M + BEYOND_M)
+        end = shifted(robot.T, place.way, 2.0 * STAND_OFF_M + BEYOND_M)
         left = press(robot, steady(robot.T, end, SPEED), place.way, feeling.touch_n, feeling.wrist)
         if left is not None:
             n, d = feeling.as_seen(place.normal, place.edge)

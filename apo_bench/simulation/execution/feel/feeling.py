@@ -36,6 +36,7 @@ _CORNERS = 3
 _FLAT_M = 1e-5
 """Which corner of the hand touched is asked so often, as what is believed changes; a patch that lies within the second
 touched with its middle."""
+_OFF_SIGMAS = 3.0
 _TOUCH_N = 2.0
 _SIGMAS = 6.0
 """A touch ends by this force, or by so many standard deviations of what the wrist feels."""
@@ -83,6 +84,10 @@ class Belief(Protocol):
 
     def command(self, T_world_tip: Array, jacobian: Array | None) -> Array:
         """The inverse of `real`."""
+        ...
+
+    def covariance_of(self, T_world_tip: Array, jacobian: Array | None) -> Array:
+        """How uncertain is where the tip really is, (6, 6), of its body twist."""
         ...
 
     def held(self, grasp: int, T_tip_part: Array) -> Array:
@@ -137,6 +142,12 @@ class Feeling:
     def touch_n(self) -> float:
         """The force that ends a touch, [N]: well above what the sensor shows of nothing."""
         return touch_guard(self.wrist.sigma[0])
+
+    def off_m(self, robot: Robot, T_world_tip: Array, way: Array) -> float:
+        """How far the tip may be off along a direction, (3,) world, [m]: three standard deviations of its belief."""
+        covariance = self.belief.covariance_of(T_world_tip, self.jacobian(robot))[:3, :3]
+        way = T_world_tip[:3, :3].T @ way
+        return _OFF_SIGMAS * float(np.sqrt(way @ covariance @ way))
 
     def as_seen(self, normal: Array, point: Array) -> tuple[Array, float]:
         """Normal and offset of a plane, (3,) and [m], in the world as the eye has it, from where the arm takes it."""

@@ -3,7 +3,7 @@
 Known from the plan alone: believed poses of what stands, and shapes.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,7 +23,7 @@ from apo_bench.simulation.scene.scene import Scene
 
 OPENING_M = 0.004
 """Of each finger while the hand touches: as good as closed, and the pads do not push on each other."""
-_ROOM_M = 0.003
+ROOM_M = 0.003
 """Everything else stays so far away."""
 _RADII_M = (0.08, 0.1, 0.06, 0.12, 0.14, 0.16, 0.18)
 _ANGLES = 24
@@ -39,6 +39,10 @@ _LOOKS_M = 0.004
 """The hand comes straight down from so far above; it is looked at so often."""
 
 
+StandOff = Callable[[Array, Array], float]
+"""How far before a face a touch shall begin, [m], by the pose of the tip there, (4, 4), and the normal of the face."""
+
+
 class TouchPlace(NamedTuple):
     """One guarded motion of the empty hand, and what it will touch."""
 
@@ -52,9 +56,16 @@ class TouchPlace(NamedTuple):
     """Of the face, outwards, (3,), world."""
     offset: float
     """normal . x = offset on it, [m]."""
+    stand_off: float
+    """So far before the face the motion begins, [m]."""
 
 
-def floor_places(plan: Plan, scene: Scene) -> tuple[TouchPlace, ...]:
+def usual_stand_off(T_world_tip: Array, normal: Array) -> float:
+    """That of a robot that is nearly right."""
+    return STAND_OFF_M
+
+
+def floor_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off) -> tuple[TouchPlace, ...]:
     """Up to three places of what carries everything, around the goals; none where the hand has no room."""
     found = _floor(plan)
     if found is None:
@@ -74,10 +85,12 @@ def floor_places(plan: Plan, scene: Scene) -> tuple[TouchPlace, ...]:
         angle = 2.0 * np.pi * (k % _ANGLES) / _ANGLES
         x, y = middle + radius * np.array([np.cos(angle), np.sin(angle)])
         touched = np.array([x, y, (d - n[0] * x - n[1] * y) / n[2]])
-        begins = frame(rest, touched + STAND_OFF_M * n - rest @ point)
+        there = frame(rest, touched - rest @ point)
+        away = stand_off(there, n)
+        begins = shifted(there, n, away)
         if not own_shape(face).contains(Point(pose.apply(to_face, touched[None])[0, :2]).buffer(_PATCH_M)):
             return None
-        return TouchPlace(begins, -n, patch, n, d) if _free(scene, begins, around) else None
+        return TouchPlace(begins, -n, patch, n, d, away) if _free(scene, begins, around) else None
 
     best: list[TouchPlace] = []
     for radius in _RADII_M:
@@ -93,25 +106,31 @@ def floor_places(plan: Plan, scene: Scene) -> tuple[TouchPlace, ...]:
     return tuple(best)
 
 
-def wall_places(plan: Plan, scene: Scene) -> tuple[TouchPlace, ...]:
+def wall_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off) -> tuple[TouchPlace, ...]:
     """One place on each wall of what is fixed that tells where something will be fitted in."""
+    ahead = np.array([0.0, 1.0])
     around = obstacles(plan.assembly.solids, plan.start, ())
     places = [
-        _at_wall(scene, face, plan.start[part], np.array([0.0, 1.0]))
+        _with_room(scene, around, face, plan.start[part], ahead, stand_off)
         for part, face in upright_walls(plan.assembly, plan.start)
     ]
-    return tuple(place for place in places if _free(scene, place.T_world_tip, around))
+    return tuple(place for place in places if place is not None)
 
 
-def opposite_places(plan: Plan, scene: Scene) -> tuple[TouchPlace, ...]:
+def opposite_places(plan: Plan, scene: Scene, stand_off: StandOff = usual_stand_off) -> tuple[TouchPlace, ...]:
     """One wall touched by either side of the fingers along which they close, the hand turned by half; none without.
 
     There the fingers give way, on both sides alike: only the difference of the two tells something.
     """
     around = obstacles(plan.assembly.solids, plan.start, ())
     for part, face in upright_walls(plan.assembly, plan.start):
-        both = [_at_wall(scene, face, plan.start[part], np.array([sign, 0.0])) for sign in (1.0, -1.0)]
-        if all(_free(scene, place.T_world_tip, around) for place in both):
+        both = [
+            place
+            for sign in (1.0, -1.0)
+            for place in [_with_room(scene, around, face, plan.start[part], np.array([sign, 0.0]), stand_off)]
+            if place is not None
+        ]
+        if len(both) == 2:
             return tuple(both)
     return ()
 
@@ -127,7 +146,18 @@ def _floor(plan: Plan) -> tuple[str, Face] | None:
     return max(up, key=lambda each: face_area(each[1]), default=None)
 
 
-def _at_wall(scene: Scene, face: Face, T: Array, ahead: Array) -> TouchPlace:
+def _with_room(
+    scene: Scene, around: Sequence[Obstacle], face: Face, T: Array, ahead: Array, stand_off: StandOff
+) -> TouchPlace | None:
+    """The middle of a wall, from as far as wanted, else from as near as is usual; None where there is no room."""
+    for way_off in dict.fromkeys((stand_off, usual_stand_off)):
+        place = _at_wall(scene, face, T, ahead, way_off)
+        if _free(scene, place.T_world_tip, around):
+            return place
+    return None
+
+
+def _at_wall(scene: Scene, face: Face, T: Array, ahead: Array, stand_off: StandOff) -> TouchPlace:
     """The middle of a wall, touched low by a side of the fingers.
 
     Args:
@@ -156,8 +186,9 @@ def _at_wall(scene: Scene, face: Face, T: Array, ahead: Array) -> TouchPlace:
     patch = np.array([(*xy, z) for xy in level for z in (reach - common, reach)])
     touched = np.append(corners[:, :2].mean(axis=0), foot + common / 2)
     touched += (d - n @ touched) * n
-    begins = frame(R, touched + STAND_OFF_M * n - R @ patch.mean(axis=0))
-    return TouchPlace(begins, -n, patch, n, d)
+    there = frame(R, touched - R @ patch.mean(axis=0))
+    away = stand_off(there, n)
+    return TouchPlace(shifted(there, n, away), -n, patch, n, d, away)
 
 
 def _boxes(scene: Scene) -> tuple[Box, ...]:
@@ -176,7 +207,7 @@ def _lowest(boxes: Sequence[Box]) -> Array:
 def _free(scene: Scene, T: Array, around: Sequence[Obstacle]) -> bool:
     """Whether the hand can come straight down to a pose that the arm reaches."""
     lifts = np.arange(0.0, _LIFT_M, _LOOKS_M)[:, None] * UP
-    if gripper_depth(scene, OPENING_M, T[:3, :3], T[:3, 3] + lifts, around, _ROOM_M).max() > 0.0:
+    if gripper_depth(scene, OPENING_M, T[:3, :3], T[:3, 3] + lifts, around, ROOM_M).max() > 0.0:
         return False
     above = scene.kinematics.inverse(shifted(T, UP, _LIFT_M), np.array(scene.arm.home))
     return above is not None and scene.kinematics.inverse(T, above) is not None

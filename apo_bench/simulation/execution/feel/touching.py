@@ -1,11 +1,16 @@
 """Touching what is fixed with the closed, empty hand: down on the floor around the goals, and against walls."""
 
+from functools import partial
+
+import numpy as np
+
 from apo_bench.assembly import Touch
 from apo_bench.geometry import Array
 from apo_bench.simulation.execution.beside import STAND_OFF_M
 from apo_bench.simulation.execution.feel.feeling import Feeling
 from apo_bench.simulation.execution.feel.places import (
     OPENING_M,
+    ROOM_M,
     TouchPlace,
     floor_places,
     opposite_places,
@@ -13,13 +18,13 @@ from apo_bench.simulation.execution.feel.places import (
 )
 from apo_bench.simulation.robot.by_wrist import press, reading
 from apo_bench.simulation.robot.paths import shifted, smooth, steady, turn_from, with_height
-from apo_bench.simulation.robot.robot import Robot
+from apo_bench.simulation.robot.robot import Halt, Robot
 from apo_bench.simulation.scene.world import sleeping
 
 SPEED = 0.0025
 """Steady speed of a touch, [m/s]: a stiff hand four times as fast strikes harder than an arm may."""
-BEYOND_M = 0.005
-"""So far beyond where it is expected the floor or a wall is felt for."""
+BEYOND_M = 0.001
+"""The floor or a wall is felt for so much farther beyond where it is expected than before."""
 _DOWN = 0.4
 _OVER = 0.8
 _BACK = 0.3
@@ -36,14 +41,34 @@ def find_out(robot: Robot, feeling: Feeling) -> None:
     Raises:
         Halt: The hand struck something, or a place is out of reach.
     """
-    robot.stage = "pick"
+    robot.stage = "touch"
     feeling.begin(robot)
     if "touch" not in feeling.acts:
         return
     robot.fingers(OPENING_M)
     for places in (floor_places, wall_places, opposite_places):
-        felt = [each for place in places(feeling.plan, robot.scene) for each in _touched(robot, feeling, place)]
+        those = places(feeling.plan, robot.scene, partial(_stand_off, robot, feeling))
+        felt = list[tuple[Touch, Array]]()
+        for place in those:
+            try:
+                felt += _touched(robot, feeling, place)
+            except Halt as halt:
+                halt.why = _room(robot, feeling, place)
+                raise
         feeling.learn(robot, felt, differ=places is opposite_places)
+
+
+def _stand_off(robot: Robot, feeling: Feeling, T: Array, normal: Array) -> float:
+    return max(STAND_OFF_M, feeling.off_m(robot, T, normal))
+
+
+def _room(robot: Robot, feeling: Feeling, place: TouchPlace) -> str:
+    """What to say where something was struck: nothing if the robot had room for what it may be off."""
+    far = max(feeling.off_m(robot, place.T_world_tip, way) for way in np.eye(3))
+    if far <= ROOM_M:
+        return ""
+    before = f"it began {1e3 * place.stand_off:.1f} mm before what it would touch, with {1e3 * ROOM_M:g} mm of room"
+    return f"{before} aside, and may be off by {1e3 * far:.1f} mm"
 
 
 def _touched(robot: Robot, feeling: Feeling, place: TouchPlace) -> list[tuple[Touch, Array]]:
@@ -61,7 +86,7 @@ def _touched(robot: Robot, feeling: Feeling, place: TouchPlace) -> list[tuple[To
     robot.stand()
     # Nothing sleeps meanwhile: what the arm strikes is noticed, whatever rests.
     with sleeping(robot.scene.work, False), reading(robot, feeling.wrist):
-        end = shifted(robot.T, way, STAND_OFF_M + BEYOND_M)
+        end = shifted(robot.T, way, 2.0 * place.stand_off + BEYOND_M)
         left = press(robot, steady(robot.T, end, SPEED), way, feeling.touch_n, feeling.wrist)
         middle = place.patch.mean(axis=0)
         touched = feeling.touch(robot, place.normal, place.offset, middle)
