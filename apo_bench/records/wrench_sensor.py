@@ -1,12 +1,13 @@
 """How noisy the force and torque sensor at the wrist is, by the names that rows use.
 
 `ideal`             no noise
-`external`          0.1 N, 5 mNm: a good sensor between arm and hand (Robotiq FT 300-S: signal noise 0.1 N, 5 mNm)
-`external-coarse`   0.2 N, 10 mNm: OnRobot HEX-E, noise-free resolution 0.2 N, 10 mNm across its axis
-`cobot`             3.5 N, 0.2 Nm: an arm's own (Universal Robots UR5e, precision of its force sensing at the flange)
+`external`          0.1 N, 5 mNm: a good sensor between arm and hand, as of a Robotiq FT 300-S
+`external-coarse`   0.2 N, 10 mNm: a less good one, as of an OnRobot HEX-E
+`cobot`             3.5 N, 0.2 Nm: an arm's own, what is given as the precision of a Universal Robots UR5e
 `0.5/0.02`          N and Nm; without the second one, 0.05 Nm to each N, as the external ones have
 
-Each is the standard deviation of the white noise of one reading, per axis, at 1,000 readings a second.
+Each is the standard deviation of the white noise of one reading, per axis, at 1,000 readings a second. What of these
+numbers could be checked is said in docs/guide/real-robot.md.
 """
 
 import math
