@@ -9,6 +9,8 @@ from apo_bench.assembly import Plan, Step
 TICK_S = 0.02
 """How often the arm looks for trouble and a film takes a picture."""
 BY_HAND = "by hand"
+TOUCHING = "touch"
+"""What is done by hands, and by a robot that feels before it takes anything: nothing is in its hand."""
 
 
 class Doing(NamedTuple):

@@ -5,7 +5,7 @@ import numpy as np
 from apo_bench import Plan, build_scene, demonstrate, draw_layout, load_scenario, replay
 from apo_bench.simulation.film.film import ABOVE_PX, BELOW_PX, Caption, captioned, frames, operation_words, sampled
 from apo_bench.simulation.film.still import Chapter, FilmMoment, FilmTrack
-from apo_bench.simulation.hooks import BY_HAND, Doing
+from apo_bench.simulation.hooks import BY_HAND, TOUCHING, Doing
 
 
 def moments(*forces: float) -> list[FilmMoment]:
@@ -34,6 +34,10 @@ def test_a_trial_is_told_operation_by_operation_and_shown() -> None:
     landed = [m.doing for m in track.moments if m.doing.macro == "move-to-contact"]
     assert max(doing.force_n for doing in landed) > 1.0
     assert operation_words(assembly, track.moments[-1]).startswith("operation 2 of 2")
+    first = track.moments[0]
+    assert operation_words(assembly, first) == "at the start"
+    touching = first._replace(doing=Doing(None, TOUCHING, 0.0))
+    assert operation_words(assembly, touching) == "the closed hand touches what is fixed"
 
     demonstrate(scene, layout, 0.0, np.random.default_rng(1), hands.hooks)
     assert {m.doing for m in hands.moments} == {Doing(k, BY_HAND, 0.0) for k in (None, 0, 1)}

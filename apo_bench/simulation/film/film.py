@@ -16,7 +16,7 @@ from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import Array, world_bounds
 from apo_bench.io.figures import load_matplotlib
 from apo_bench.simulation.film.still import Chapter, FilmMoment
-from apo_bench.simulation.hooks import BY_HAND
+from apo_bench.simulation.hooks import BY_HAND, TOUCHING
 from apo_bench.simulation.scene.graphics import renderer
 from apo_bench.simulation.scene.render import camera_view, place_for_picture, save_film
 from apo_bench.simulation.scene.world import initial_state
@@ -154,7 +154,7 @@ def _chapter(
             return captioned(pictures[0], pictures[1], caption)
 
         for moment, force_n, most_n in sampled(chapter.moments, speed / fps):
-            force = "" if moment.doing.macro == BY_HAND else f"force {force_n:.1f} N, most {most_n:.1f} N"
+            force = "" if moment.doing.macro in (BY_HAND, TOUCHING) else f"force {force_n:.1f} N, most {most_n:.1f} N"
             yield drawn(moment, Caption(chapter.title, pace, _lines(assembly, moment), force)), 1.0 / fps
         yield (
             drawn(chapter.moments[-1], Caption(chapter.title, pace, ending_lines(chapter.ending), "", chapter.good)),
@@ -185,7 +185,7 @@ def operation_words(assembly: Assembly, moment: FilmMoment) -> str:
     """`operation 2 of 3, castle2: pick`."""
     k = moment.doing.operation
     if k is None:
-        return "the closed hand touches what is fixed" if moment.doing.macro == "touch" else "at the start"
+        return "the closed hand touches what is fixed" if moment.doing.macro == TOUCHING else "at the start"
     operation = assembly.operations[k]
     carried = f" with {', '.join(operation.carries)}" if operation.carries else ""
     undone = " undone" * moment.doing.undoes

@@ -16,6 +16,7 @@ from apo_bench.simulation.execution.feel.places import (
     opposite_places,
     wall_places,
 )
+from apo_bench.simulation.hooks import TOUCHING
 from apo_bench.simulation.robot.by_wrist import press, reading
 from apo_bench.simulation.robot.paths import shifted, smooth, steady, turn_from, with_height
 from apo_bench.simulation.robot.robot import Halt, Robot
@@ -41,7 +42,7 @@ def find_out(robot: Robot, feeling: Feeling) -> None:
     Raises:
         Halt: The hand struck something, or a place is out of reach.
     """
-    robot.stage = "touch"
+    robot.stage = TOUCHING
     feeling.begin(robot)
     if "touch" not in feeling.acts:
         return
