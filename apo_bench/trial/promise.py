@@ -25,7 +25,7 @@ from apo_bench.geometry import Array, pose
 from apo_bench.judging.rules import least_overlaps
 from apo_bench.prediction.arm import ArmMove
 from apo_bench.prediction.measures import Measure, measures
-from apo_bench.records import NO_ROBOT_ERROR, sentence
+from apo_bench.records import NO_ROBOT_ERROR, robot_sigmas, sentence
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.free_directions import FreeSpace, free_space
 from apo_bench.trial.promise_table import RATES, SCORES
@@ -102,11 +102,10 @@ def promised_success(
         where: What the plan is to be carried out in. Of a scenario, everything counts as in reach.
         robot_error: The errors that are stated of the robot, as in rows; of a scenario they are not asked for.
         searches: The robot feels for a hole where a motion into it is stopped, as one with `+feel` does too.
-        feels: The robot touches first, and makes up for its errors: it counts as one that has none.
+        feels: The robot touches first, and makes up for its errors: what is left is how parts slip in its hand.
     """
     explained = explanations(correction, believed, plan.goals)
-    wrong = NO_ROBOT_ERROR if feels else robot_error
-    score = plan_score(plan, believed.assembly, explained, where, wrong, searches)
+    score = plan_score(plan, believed.assembly, explained, where, robot_error, searches, feels)
     return float(np.interp(score, SCORES, RATES))
 
 
@@ -130,14 +129,15 @@ def plan_score(
     where: Scene | Scenario,
     robot_error: str = NO_ROBOT_ERROR,
     searches: bool = False,
+    feels: bool = False,
 ) -> float:
     """How near to certain it is that a plan fits, from 0 to 1: what the table turns into a probability.
 
     Args:
         told: The assembly with the contacts that the planner was told.
-        where, robot_error, searches: As in `promised_success`.
+        where, robot_error, searches, feels: As in `promised_success`.
     """
-    ends, arm = ((), ()) if isinstance(where, Scenario) else _by_arm(plan, where, robot_error, searches)
+    ends, arm = ((), ()) if isinstance(where, Scenario) else _by_arm(plan, where, robot_error, searches, feels)
     if any(move.refused is not None for move in arm):
         return 0.0
     rng = np.random.default_rng(_STREAM)
@@ -153,17 +153,21 @@ def plan_score(
 
 
 def _by_arm(
-    plan: Plan, scene: Scene, robot_error: str, searches: bool
+    plan: Plan, scene: Scene, robot_error: str, searches: bool, feels: bool
 ) -> tuple[list[tuple[Poses, ...]], tuple[ArmMove, ...]]:
     """Where robots with errors that were drawn bring the parts, and what the arm makes of the plan."""
     from apo_bench.simulation.arm_checks.plan_check import arm_moves
-    from apo_bench.trial.robot_draws import brought
+    from apo_bench.trial.robot_draws import brought, left_after_feeling
     from apo_bench.trial.stages import robot_error_of
 
     arm = arm_moves(plan, scene, searches)
-    if robot_error == NO_ROBOT_ERROR or any(move.refused is not None for move in arm):
+    slip = robot_sigmas(robot_error).in_hand
+    right = not any(slip) if feels else robot_error == NO_ROBOT_ERROR
+    if right or any(move.refused is not None for move in arm):
         return [], arm
-    errors = (robot_error_of(robot_error, scene, partial(_robot_draw, draw)) for draw in range(ROBOTS))
+    errors = [robot_error_of(robot_error, scene, partial(_robot_draw, draw)) for draw in range(ROBOTS)]
+    if feels:
+        errors = [left_after_feeling(plan, scene, error, slip[1]) for error in errors]
     return [brought(plan, scene, error, searches) for error in errors], arm
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, pose
 from apo_bench.prediction.resting import resting_poses
+from apo_bench.simulation.execution.feel.feeling import ACTS, TOUCH_SIGMA_M
 from apo_bench.simulation.execution.prepare import key_angles, moves
 from apo_bench.simulation.execution.transfer import Grip, after_transfer
 from apo_bench.simulation.robot.robot_error import RobotError
@@ -57,6 +58,27 @@ def brought(plan: Plan, scene: Scene, error: RobotError, searches: bool = False)
             centred = tip @ _held(grip, tip, resting[t.part]) @ pose.inverse(grip.T_part_tip)
             resting = resting_poses(alone, operation, after_transfer(operation, centred, resting))
     return tuple(states)
+
+
+def left_after_feeling(plan: Plan, scene: Scene, error: RobotError, slip_deg: float) -> RobotError:
+    """What is left of errors once a robot has felt: how parts slipped in its hand, but for what laying and search tell.
+
+    Args:
+        slip_deg: Standard deviation of how a part turns in the hand.
+    """
+    left = np.array(error.in_hand)
+    for move in moves(plan, scene, True, ACTS):
+        t = move.transfer
+        slip = pose.log(left[move.step.operation])
+        if t.flush is not None:
+            lever = float(np.linalg.norm(t.flush.feet - t.flush.feet.mean(axis=0), axis=1).max())
+            told = TOUCH_SIGMA_M / lever
+            slip[2:4] *= 0.0, told / np.hypot(told, np.radians(slip_deg))
+        if t.front is not None:
+            slip[1] = 0.0
+        left[move.step.operation] = pose.exp(slip)
+    none = np.eye(4)
+    return RobotError(none, np.zeros_like(error.joints), none, left)
 
 
 def _held(grip: Grip, tip: Array, T_part: Array) -> Array:

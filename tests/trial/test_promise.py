@@ -20,7 +20,7 @@ from apo_bench.trial import trial
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.promise import Explanation, abstained, drawn_truths, promised_success
 from apo_bench.trial.promise_table import RATES, SCORES
-from apo_bench.trial.robot_draws import brought
+from apo_bench.trial.robot_draws import brought, left_after_feeling
 from apo_bench.trial.stages import (
     SimulatedDemonstration,
     draw_robot_error,
@@ -98,6 +98,40 @@ def test_a_robot_that_is_further_off_promises_less(scene: Scene, simulated: Simu
     promised = [promised_success(planned.plan, seen, planned.correction, scene, error) for error in errors]
     assert promised == sorted(promised, reverse=True)
     assert promised[0] > promised[-1]
+
+
+def test_what_feeling_leaves_is_how_parts_slip_and_less_of_what_lies_flat(
+    scene: Scene, simulated: SimulatedDemonstration
+) -> None:
+    seen = observe_demonstration(simulated, noise_of(asked(), scene, simulated), SEED)
+    plan = correct(seen, "contact").plan(seen)
+    drawn = robot_error_of(
+        "hand_eye:1/0.2+joints:0.05+tool:0.5+in_hand:0.5/1", scene, lambda which, shape: np.ones(shape)
+    )
+    left = left_after_feeling(plan, scene, drawn, 1.0)
+    np.testing.assert_array_equal(left.hand_eye, np.eye(4))
+    np.testing.assert_array_equal(left.tool, np.eye(4))
+    assert not left.joints.any()
+    before, after = (np.array([pose.log(T) for T in error.in_hand]) for error in (drawn, left))
+    np.testing.assert_allclose(after[:2], before[:2], atol=1e-12)  # blocks that are put on others
+    assert after[2, :3] == pytest.approx(0.0, abs=1e-12), "laid flat, and searched for along the pads"
+    assert 0.0 < after[2, 3] < 0.1 * before[2, 3]
+
+
+def test_a_robot_that_feels_promises_as_a_right_one_unless_parts_slip(
+    scene: Scene, simulated: SimulatedDemonstration
+) -> None:
+    seen = observe_demonstration(simulated, noise_of(asked(), scene, simulated), SEED)
+    planned = apply_method("contact", seen, None, where=scene)
+    assert planned.plan is not None
+
+    def promised(error: str) -> float:
+        assert planned.plan is not None
+        return promised_success(planned.plan, seen, planned.correction, scene, error, True, True)
+
+    right = promised("none")
+    assert promised("hand_eye:1/0.2+tool:0.5") == right
+    assert promised("in_hand:0/20") < right
 
 
 def test_a_right_robot_brings_parts_to_their_goals_and_a_shifted_one_beside_them(
