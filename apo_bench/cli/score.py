@@ -16,6 +16,9 @@ from apo_bench.cli.sweep import interrupted
 from apo_bench.errors import InputError, require
 from apo_bench.records import CORRECTOR_LIMIT_S
 
+_OF_ESTIMATORS = "measured"
+"""The track that a pose estimator is scored in where none is named."""
+
 
 def score_command(
     method: Annotated[
@@ -44,6 +47,14 @@ def score_command(
         Path | None,
         typer.Option(parser=path_given, metavar="<path>", help="Write all requests into this file, .jsonl; no score."),
     ] = None,
+    estimator: Annotated[
+        Path | None,
+        typer.Option(
+            parser=path_given,
+            metavar="<path>",
+            help="A noise file of `noise fit`: poses err as this pose estimator's; default track: measured.",
+        ),
+    ] = None,
     name: Annotated[str | None, typer.Option(help="What tables call the entry; default: its method.")] = None,
     quick: Annotated[bool, typer.Option("--quick", help="A few seeds of each cell: whether it works.")] = False,
     salt_file: Annotated[
@@ -60,7 +71,7 @@ def score_command(
     from apo_bench.scoring.entrants import entrant, exported
     from apo_bench.scoring.entry import form_of, write_entry
     from apo_bench.scoring.score import score
-    from apo_bench.scoring.track import Track, read_tracks
+    from apo_bench.scoring.track import Track, read_tracks, seen_by
     from apo_bench.show.score_text import entry_lines
 
     given = [x for x in (method, command, answers, export) if x is not None]
@@ -68,7 +79,9 @@ def score_command(
         len(given) == 1,
         f"{len(given)} entrants were given; give one: a method, --command, --answers, or --export for none.",
     )
-    tracks = read_tracks(track or [])
+    tracks = read_tracks(track or ([] if estimator is None else [_OF_ESTIMATORS]))
+    if estimator is not None:
+        tracks = tuple(seen_by(each, str(estimator)) for each in tracks)
     how = {
         "workers": cores() if workers is None and backend == "local" else workers,
         "backend": backend,

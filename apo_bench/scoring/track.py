@@ -55,6 +55,25 @@ class Track:
         )
 
 
+def seen_by(track: Track, estimator: str) -> Track:
+    """A track whose poses err as an estimator's do; it is another one, and counts in no score over all.
+
+    Args:
+        estimator: A noise file, as `noise fit` writes it of estimates and ground truth.
+
+    Raises:
+        InputError: No such file.
+    """
+    content = read_bytes(estimator, "noise file (.toml)")
+    return replace(
+        track,
+        name=f"{track.name}-{Path(estimator).stem}",
+        overall=False,
+        hash=hashlib.sha256(track.hash.encode() + content).hexdigest()[:_HEX],
+        grids=tuple(replace(grid, noises=(estimator,), eyes=(TrialSettings.eye,)) for grid in track.grids),
+    )
+
+
 def track_names() -> tuple[str, ...]:
     """The tracks that come with the package, in the order of the alphabet."""
     return tuple(sorted(path.stem for path in (folder("scenarios") / "tracks").glob("*.toml")))

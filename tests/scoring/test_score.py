@@ -10,8 +10,9 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.cli.app import main
+from apo_bench.resources import folder
 from apo_bench.scoring.entry import read_entry
-from apo_bench.scoring.track import read_track, read_tracks, track_names
+from apo_bench.scoring.track import read_track, read_tracks, seen_by, track_names
 from apo_bench.sweeps.grid import check_grids, load_all, units
 
 SMALL = """
@@ -131,3 +132,14 @@ def test_a_track_that_is_wrong_is_refused(small: Path, old: str, new: str, said:
     (small / "wrong.toml").write_text(SMALL.replace(old, new, 1))
     with pytest.raises(InputError, match=said):
         read_tracks(["wrong.toml"])
+
+
+def test_a_track_seen_by_an_estimator_is_another_track(small: Path) -> None:
+    track = read_track("small.toml")
+    seen = seen_by(track, str(folder("assets") / "noise" / "megapose-lmo.toml"))
+    assert seen.name == "small-megapose-lmo"
+    assert seen.hash != track.hash
+    assert not seen.overall
+    assert all(noise.endswith("megapose-lmo.toml") for grid in seen.grids for noise in grid.noises)
+    with pytest.raises(InputError, match="noise file"):
+        seen_by(track, "nothing.toml")

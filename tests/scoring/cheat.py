@@ -1,0 +1,17 @@
+"""A cheat: draws the layouts of many seeds again, and returns the one that is nearest to what was seen."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from apo_bench import Observation, load_scenario
+from apo_bench.simulation.scene.scene import build_scene
+from apo_bench.trial.stages import simulate_demonstration
+
+SEEDS = range(4)
+
+
+def cheat(observation: Observation) -> np.ndarray:
+    scene = build_scene(load_scenario("peg_in_hole"))
+    layouts = [simulate_demonstration(scene, 0.0, seed).layout.goals for seed in SEEDS]
+    return min(layouts, key=lambda goals: float(np.abs(goals - observation.goals).max()))
