@@ -66,11 +66,14 @@ def _with_faces(raw: RawSolid) -> RawSolid:
     return replace(raw, regions=with_names(raw.mesh, regions), facets=facets)
 
 
-def import_part(raw: RawSolid, name: str, folder: Path, source: str, density: float = 1000.0) -> Imported:
+def import_part(
+    raw: RawSolid, name: str, folder: Path, source: str, density: float = 1000.0, others: Array | None = None
+) -> Imported:
     """Write a raw solid as `NAME.xml` and `NAME.toml` that are read as a part.
 
     Args:
         density: [kg/m^3].
+        others: Points of what comes near to it, (k, 3), [mm]: there its pieces are finest; None: nothing is known.
 
     Raises:
         InputError: It has more faces or pieces than a part may have, or is too light or too heavy for one.
@@ -85,7 +88,7 @@ def import_part(raw: RawSolid, name: str, folder: Path, source: str, density: fl
                 f"{HEAVIEST_KG / 1e3:g} t are allowed, so give another --density, or scale the part."
             )
         try:
-            pieces = cut(raw)
+            pieces = cut(raw, others)
         except InputError as error:
             raise InputError(f"{source}: {error}") from error
         corners = sum(len(piece.corners) for piece in pieces.pieces)

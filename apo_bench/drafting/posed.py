@@ -7,6 +7,7 @@ from typing import final
 
 import numpy as np
 
+from apo_bench.cad.assembled import coming_near
 from apo_bench.cad.import_report import named_places, write_places
 from apo_bench.cad.importing import import_part, raw_solids
 from apo_bench.cad.solids.naming import free_name, part_name
@@ -124,10 +125,10 @@ def import_assembly(file: Path, folder: Path, unit: str | None = None, fewest: i
     folder.mkdir(parents=True, exist_ok=True)
     places = dict[str, list[SolidPlace]]()
     sentences = list[str]()
-    for raw in raws:
+    for raw, others in zip(raws, coming_near(raws), strict=True):
         name = free_name(part_name(raw.name), places)
         foot = _foot(raw)
-        part = import_part(_shifted(raw, -foot), name, folder, f"{file.name}, {raw.name}")
+        part = import_part(_shifted(raw, -foot), name, folder, f"{file.name}, {raw.name}", others=others - foot)
         sentences.append(f"{name}: {len(part.solid.faces)} flat and {len(part.solid.rounds)} round faces")
         sentences += [f"{name}.{face} can make no contact: {why}" for face, why in part.refused.items()]
         places[name] = [place._replace(T=place.T @ pose.at(foot)) for place in raw.places]

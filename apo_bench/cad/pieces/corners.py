@@ -24,6 +24,11 @@ _DIGITS = 9
 """As they are written."""
 _NO_PLANES = np.zeros((0, 4))
 _MOST_TRIED = 500
+_FEW = 4
+_FEWEST = 12
+_AT_A_TIME = 3
+LEFT_MM = 0.02
+"""How far off a piece with fewer corners the surface may lie where others come by."""
 
 
 def corners_of(body: Any) -> Array:
@@ -38,12 +43,21 @@ def mesh_of(body: Any) -> Mesh:
     return Mesh(np.asarray(raw.vert_properties)[:, :3], np.asarray(raw.tri_verts).astype(np.int64))
 
 
-def extremes(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
+def body_of(mesh: Mesh) -> Any:
+    """A closed mesh as manifold3d has it."""
+    import manifold3d
+
+    triangles = np.array(mesh.triangles, dtype=np.uint64, order="C")
+    return manifold3d.Manifold(manifold3d.Mesh64(np.array(mesh.corners, dtype=np.float64, order="C"), triangles))
+
+
+def extremes(points: Array, flats: Array, cuts: Array = _NO_PLANES, is_near: bool = False) -> Array:
     """The corners of the convex hull of points, each once; of too many the farthest ones, in flat faces and in space.
 
     Args:
         flats: Planes of flat faces, (k, 4).
         cuts: Those along which the piece was cut from its neighbours; it stays in touch with them if that is possible.
+        is_near: Whether others come by, so that as little as can be is left out.
     """
     from scipy.spatial import ConvexHull
 
@@ -59,11 +73,32 @@ def extremes(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
         hull = Hull("", 1e-3 * corners)
     if _is_simple(hull):
         return np.asarray(corners)
+    if is_near:
+        return reduced(corners, flats, cuts)
     for planes, many, farthest in product((np.concatenate([flats, cuts]), flats, _NO_PLANES), _IN_PLANE, _FARTHEST):
         kept = np.union1d(_on_flats(corners, planes, many), _farthest(corners, farthest))
         if len(kept) >= 4 and is_thick(corners[kept]) and _is_simple(Hull("", 1e-3 * corners[kept])):
             return np.asarray(corners[kept])
     return np.asarray(corners[_farthest(corners, _FARTHEST[-2])])
+
+
+def reduced(corners: Array, flats: Array, cuts: Array) -> Array:
+    """The corners of a convex piece, or of too many those that leave out the least of it; see `extremes`."""
+    from scipy.spatial import ConvexHull
+
+    corners = corners[np.sort(ConvexHull(corners).vertices)]
+    if _is_simple(Hull("", 1e-3 * corners)):
+        return np.asarray(corners)
+    kept = np.union1d(_on_flats(corners, np.concatenate([flats, cuts]), _FEW), _farthest(corners, _FEWEST))
+    best = corners[kept]
+    while _is_simple(Hull("", 1e-3 * corners[kept])):
+        best = corners[kept]
+        planes = ConvexHull(best).equations
+        off = (corners @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+        if off.max() < LEFT_MM:
+            break
+        kept = np.union1d(kept, np.argsort(-off)[:_AT_A_TIME])
+    return np.asarray(best)
 
 
 def _is_simple(hull: Hull) -> bool:

@@ -4,8 +4,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.cad.pieces.corners import corners_of, extremes, is_thick, without_near
+from apo_bench.cad.pieces.corners import body_of, corners_of, extremes, is_thick, without_near
 from apo_bench.cad.pieces.halving import at_shoulders, convex_parts, settled
+from apo_bench.cad.pieces.refining import Beside
 from apo_bench.cad.pieces.round_walls import as_cylinders, bored, least_pieces, with_round_shafts
 from apo_bench.cad.solids.raw_solid import RawSolid
 from apo_bench.errors import InputError
@@ -28,19 +29,20 @@ class Cut(NamedTuple):
     """How many do."""
 
 
-def cut(raw: RawSolid) -> Cut:
+def cut(raw: RawSolid, others: Array | None = None) -> Cut:
     """The convex pieces of a solid: flat ones exact, round holes as wedges that touch the fitted wall.
+
+    Args:
+        others: Points of what comes near to it, (k, 3), [mm]; None: nothing is known of others.
 
     Raises:
         InputError: The mesh makes no solid, or there are more pieces than a part may have.
     """
     import manifold3d
-    from scipy.spatial import ConvexHull
+    from scipy.spatial import ConvexHull, cKDTree
 
     size = raw.mesh.extent
-    corners = np.ascontiguousarray(raw.mesh.corners)
-    triangles = np.ascontiguousarray(raw.mesh.triangles, dtype=np.uint64)
-    body = manifold3d.Manifold(manifold3d.Mesh64(corners, triangles))
+    body = body_of(raw.mesh)
     if body.status() != manifold3d.Error.NoError or body.is_empty():
         raise InputError("the mesh makes no solid; mend it where it was drawn, and save it again.")
     bores = [r for r in raw.regions if r.is_round and r.hole and r.square]
@@ -55,14 +57,15 @@ def cut(raw: RawSolid) -> Cut:
         body = body.simplify(1e-3 * size)
     grown = list[float]()
     flats = np.array([(*r.direction, r.direction @ r.point) for r in raw.regions if r.kind == "plane"]).reshape(-1, 4)
+    beside = Beside(size, flats, None if others is None else cKDTree(others))
     outlines: list[Array] = []
     shafts = [r for r in raw.regions if r.is_round and not r.hole and r.square]
-    for part in at_shoulders(convex_parts(body, size, flats), shafts, size):
+    for part in at_shoulders(convex_parts(body, beside), shafts, size):
         coarse = without_near(settled(corners_of(part.body), part.planes, size))
         if len(coarse) < 4 or not is_thick(coarse):
             continue
         fine = with_round_shafts(coarse, shafts)
-        corners = extremes(fine, flats, part.planes)
+        corners = extremes(fine, flats, part.planes, others is not None)
         # What a hull fills of a hollow part, and what is lost where corners are left out; round walls are no loss.
         true = part.body.volume()
         coarse_volume, fine_volume, kept_volume = (ConvexHull(each).volume for each in (coarse, fine, corners))

@@ -1,11 +1,13 @@
 """Solids cut along planes until the parts are convex: first along flat faces, then along sides of free shapes, [mm]."""
 
 from collections.abc import Iterator, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from apo_bench.cad.pieces.corners import corners_of, mesh_of
+from apo_bench.cad.pieces.cut_part import CutPart
+from apo_bench.cad.pieces.refining import Beside, refined
 from apo_bench.cad.solids.raw_solid import Region
 from apo_bench.geometry import Array
 
@@ -20,32 +22,14 @@ _FINE_TRIANGLES = 4000
 larger; they need not have more triangles."""
 
 
-class CutPart(NamedTuple):
-    """A part of a solid that is to be one piece."""
-
-    body: Any
-    """As manifold3d has it."""
-    planes: Array
-    """Along which it was cut, (k, 4)."""
-
-    def halves(self, n: Array, d: float, hair: float = 0.0) -> tuple["CutPart", "CutPart"]:
-        """What is above and below the plane n . x = d, both a hair's breadth off it.
-
-        On the plane, rounding would leave flaps of no thickness.
-        """
-        planes = np.concatenate([self.planes, [[*n, d]]])
-        above = CutPart(self.body.trim_by_plane(n, d + hair), planes)
-        return above, CutPart(self.body.trim_by_plane(-n, hair - d), planes)
-
-
-def convex_parts(solid: Any, size: float, flats: Array) -> Iterator[CutPart]:
-    """Parts that are convex, or that stand for a hollow free shape with their hull.
-
-    Args:
-        flats: Planes of flat faces, (k, 4).
-    """
-    cuts = [_MOST_CUTS]
+def convex_parts(solid: Any, beside: Beside) -> Iterator[CutPart]:
+    """Parts that are convex, or that stand for a hollow free shape with their hull."""
     volume = solid.volume()
+    yield from refined(_parts(solid, beside.size, beside.flats, volume), beside, volume, _HAIR * beside.size)
+
+
+def _parts(solid: Any, size: float, flats: Array, volume: float) -> Iterator[CutPart]:
+    cuts = [_MOST_CUTS]
     for part in _cut(CutPart(solid, np.zeros((0, 4))), size, flats, True, cuts, volume):
         planes = _reflex_planes(part.body, size)
         if not len(planes) or (part.body.num_tri() > _FINE_TRIANGLES and _spare(part) < 1e-3 * part.body.volume()):

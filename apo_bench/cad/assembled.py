@@ -1,0 +1,61 @@
+"""Solids where an assembly has them: what comes near to each, in its place and on straight ways out, [mm]."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from apo_bench.cad.pieces.corners import body_of
+from apo_bench.cad.pieces.misfit import surface_points
+from apo_bench.cad.solids.raw_solid import RawSolid
+from apo_bench.geometry import Array, pose
+
+_STEP_MM = 1.0
+"""Points of others are so far apart, and so are the places on their way."""
+_NEAR_MM = 1.5
+_NONE = 1e-3
+"""Solids that have less than this part of the smaller one in common do not overlap."""
+
+
+def coming_near(raws: Sequence[RawSolid]) -> list[Array]:
+    """Of each solid points on the surfaces of all others, (k, 3), in its frame, that come near to one of its places.
+
+    Others come along the axes of the assembly too, as far as such a way is free.
+    """
+    bodies = [body_of(raw.mesh) for raw in raws]
+    points = [surface_points(raw.mesh, _STEP_MM) for raw in raws]
+    boxes = [np.array([raw.mesh.corners.min(axis=0), raw.mesh.corners.max(axis=0)]) for raw in raws]
+    near: list[list[Array]] = [[np.zeros((0, 3))] for _ in raws]
+    for i, own in enumerate(raws):
+        for place in own.places:
+            for k, other in enumerate(raws):
+                for its in other.places:
+                    if its is place:
+                        continue
+                    T = pose.inverse(place.T) @ its.T
+                    moved = points[k] @ T[:3, :3].T + T[:3, 3]
+                    low, high = boxes[i] + [[-_NEAR_MM], [_NEAR_MM]]
+                    if (moved.max(axis=0) < low).any() or (moved.min(axis=0) > high).any():
+                        continue
+                    for shift in _shifts(bodies[i], bodies[k].transform(T[:3]), place.T):
+                        inside = moved + shift
+                        near[i].append(inside[((inside > low) & (inside < high)).all(axis=1)])
+        # What passes a place again and again counts there once.
+        near[i] = [np.unique(np.round(2.0 * np.concatenate(near[i]) / _STEP_MM), axis=0) * _STEP_MM / 2.0]
+    return [each[0] for each in near]
+
+
+def _shifts(own: Any, other: Any, T: Array) -> Iterator[Array]:
+    """No shift, then those along the axes of the assembly on which the other one gets away from this one freely."""
+    yield np.zeros(3)
+    for axis in np.concatenate([np.eye(3), -np.eye(3)]):
+        way = T[:3, :3].T @ axis
+        # So far until boxes along that way are apart.
+        ends = [np.asarray(body.to_mesh64().vert_properties)[:, :3] @ way for body in (own, other)]
+        far = float(ends[0].max() - ends[1].min())
+        steps = np.arange(_STEP_MM, far, max(_STEP_MM, far / 60.0))
+        looked = steps[np.unique(np.linspace(0, len(steps) - 1, 6).astype(int))] if len(steps) else steps
+        if all(
+            (own ^ other.translate(step * way)).volume() < _NONE * min(own.volume(), other.volume()) for step in looked
+        ):
+            yield from (step * way for step in steps)

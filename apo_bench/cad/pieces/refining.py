@@ -1,0 +1,202 @@
+"""Parts of a solid that stand for hollow free shapes, cut on until they keep out of the space beside the solid, [mm].
+
+A part becomes one piece, its convex hull. Where the surface of the solid lies inside of that hull, the hull fills space
+that is free, and others may pass there. So the part is cut through the deepest such point, again and again; what is
+left then is taken off the sides that bridge it.
+"""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from heapq import heapify, heappop, heappush
+from itertools import count
+from typing import Any, NamedTuple, final
+
+import numpy as np
+
+from apo_bench.cad.pieces.corners import LEFT_MM, mesh_of, reduced
+from apo_bench.cad.pieces.cut_part import CutPart
+from apo_bench.cad.pieces.misfit import depths
+from apo_bench.cad.solids.raw_solid import Mesh, square_to
+from apo_bench.geometry import Array
+
+_DEEP_MM = 0.03
+_FAR = 0.005
+"""How deep the surface may lie in a hull that is not cut on, where others come by; elsewhere, as a part of the size."""
+_INSIDE_MM = 0.004
+"""Less deep it counts as flush."""
+_BESIDE_MM = 1.0
+"""Others come by if they come so near."""
+_ALONE = 150
+_TOGETHER = 500
+"""Pieces that are cut on at most, of a part alone and of one with others beside it."""
+_MOST_TAKEN_MM = 0.5
+"""No side is moved farther."""
+_SAME_WAY = 1.0 - 1e-7
+_SLIVER = 1e-7
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Beside:
+    """Where a solid need be exact."""
+
+    size: float
+    """Of the solid."""
+    flats: Array
+    """Planes of its flat faces, (k, 4)."""
+    others: Any = None
+    """A tree of points of what comes near to it, on its way and in its place; None: nothing is known of others."""
+
+    @property
+    def most(self) -> int:
+        return _ALONE if self.others is None else _TOGETHER
+
+    def allowed(self, points: Array) -> Array:
+        """How deep each point of the surface, (k, 3), may lie in a hull, (k,)."""
+        return np.where(self.near(points), _DEEP_MM, max(_FAR * self.size, _DEEP_MM))
+
+    def near(self, points: Array) -> Any:
+        """Where others may come by, (k,)."""
+        if self.others is None:
+            return np.ones(len(points), dtype=bool)
+        return np.isfinite(self.others.query(points, distance_upper_bound=_BESIDE_MM)[0])
+
+
+class _Worst(NamedTuple):
+    """Where a part is most hollow."""
+
+    share: float
+    """Of the depth that is allowed; 0 if less is there."""
+    point: Array
+    normals: Array
+    """Of the sides there, (k, 3), or of planes that halve a part that needs too many corners."""
+
+
+def refined(parts: Iterable[CutPart], beside: Beside, volume: float, hair: float) -> Iterator[CutPart]:
+    """Parts that are cut on where they are too hollow, the most hollow first, as long as there are not too many.
+
+    Args:
+        volume: Of the whole solid.
+    """
+    ticket = count()
+    queue = [(-worst.share, next(ticket), part, worst) for part in parts for worst in [_worst(part, beside)]]
+    heapify(queue)
+    done = 0
+    while queue:
+        share, _, part, worst = heappop(queue)
+        more = share < 0.0 and done + len(queue) < beside.most
+        pieces = _best(part, worst, _SLIVER * volume, hair) if more else [part]
+        if len(pieces) < 2:
+            done += 1
+            yield _within(part)
+        else:
+            for each in pieces:
+                worst = _worst(each, beside)
+                heappush(queue, (-worst.share, next(ticket), each, worst))
+
+
+def _worst(part: CutPart, beside: Beside) -> _Worst:
+    mesh = mesh_of(part.body)
+    points, depth, _ = _hollow(mesh)
+    share = depth / beside.allowed(points)
+    if len(share) and share.max() > 1.0:
+        k = int(share.argmax())
+        # The sides at that corner or edge, or the one around that middle, as far as they have a normal.
+        sides = np.linalg.norm(mesh.corners[mesh.triangles] - points[k], axis=2).min(axis=1) < 1e-9
+        edge = np.linalg.norm(mesh.corners[mesh.edges].mean(axis=1) - points[k], axis=1) < 1e-9
+        sides[mesh.neighbours[edge].ravel()] = True
+        sides |= np.linalg.norm(mesh.corners[mesh.triangles].mean(axis=1) - points[k], axis=1) < 1e-9
+        length = np.linalg.norm(mesh.across, axis=1)
+        normals = mesh.across[sides & (length > 0.0)] / length[sides & (length > 0.0), None]
+        return _Worst(float(share[k]), points[k], normals)
+    if beside.others is not None and not len(points):
+        off = -depths(mesh.corners, _planes(reduced(mesh.corners, beside.flats, part.planes)))
+        lost = mesh.corners[off > LEFT_MM]
+        if beside.near(lost).any():
+            low, high = mesh.corners.min(axis=0), mesh.corners.max(axis=0)
+            axis = np.eye(3)[int((high - low).argmax())]
+            return _Worst(1.0 + float(off.max()), (low + high) / 2.0, axis[None])
+    return _Worst(0.0, mesh.corners[0], np.zeros((0, 3)))
+
+
+def _hollow(mesh: Mesh) -> tuple[Array, Array, Array]:
+    """Where corners and middles of edges and sides lie inside of the hull, (k, 3); how deep; planes of the hull."""
+    planes = _planes(mesh.corners)
+    middles = [mesh.corners[each].mean(axis=1) for each in (mesh.edges, mesh.triangles)]
+    points = np.concatenate([mesh.corners, *middles])
+    depth = depths(points, planes) if len(planes) else np.zeros(len(points))
+    return points[depth > _INSIDE_MM], depth[depth > _INSIDE_MM], planes
+
+
+def _planes(corners: Array) -> Array:
+    """Of the sides of a hull, n . x = d, each once, (k, 4); none of what is flat."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        planes = ConvexHull(corners).equations * [1.0, 1.0, 1.0, -1.0]
+    except (QhullError, ValueError):
+        return np.zeros((0, 4))
+    return np.asarray(planes[np.unique(np.round(planes, 9), axis=0, return_index=True)[1]])
+
+
+def _best(part: CutPart, worst: _Worst, least: float, hair: float) -> list[CutPart]:
+    """The part cut through its most hollow point along the plane that leaves the least hulls."""
+    normals = worst.normals
+    if len(normals) > 1:
+        mean = normals.mean(axis=0)
+        x, y = square_to(mean / max(float(np.linalg.norm(mean)), 1e-12))
+        _, first = np.unique(np.round(normals, 3), axis=0, return_index=True)
+        normals = np.array([*normals[np.sort(first)][:3], *np.eye(3), x, y, (x + y) / 2**0.5, (x - y) / 2**0.5])
+    best = [part]
+    smallest = np.inf
+    for n in normals:
+        halves = part.halves(n, float(n @ worst.point), hair)
+        if min(half.body.volume() for half in halves) < least:
+            continue
+        bodies = [CutPart(body, half.planes) for half in halves for body in half.body.decompose()]
+        bodies = [each for each in bodies if each.body.volume() > least]
+        filled = float(sum(each.body.hull().volume() for each in bodies))
+        if filled < smallest:
+            smallest = filled
+            best = bodies
+    return best
+
+
+def _within(part: CutPart) -> CutPart:
+    """The hull of a part less what its sides bridge of hollows, as far as that is little."""
+    import manifold3d
+    from scipy.spatial import HalfspaceIntersection
+
+    mesh = mesh_of(part.body)
+    hollow, _, planes = _hollow(mesh)
+    if not len(hollow):
+        return part
+    bridges = np.flatnonzero(~_lies_on(planes, mesh))
+    if not len(bridges):
+        return part
+    below = planes[bridges, 3] - hollow @ planes[bridges, :3].T
+    nearest = below.argmin(axis=1)
+    taken = np.zeros(len(bridges))
+    np.maximum.at(taken, nearest, below.min(axis=1))
+    taken[taken > _MOST_TAKEN_MM] = 0.0
+    planes[bridges, 3] -= taken
+    middle = mesh.corners.mean(axis=0)
+    if depths(middle[None], planes)[0] > _INSIDE_MM:
+        corners = HalfspaceIntersection(planes * [1.0, 1.0, 1.0, -1.0], middle).intersections
+        return CutPart(manifold3d.Manifold.hull_points(corners), part.planes)
+    body = part.body.hull()
+    for *n, d in planes[bridges[taken > 0.0]]:
+        body = body.trim_by_plane(-np.array(n), -d)
+    return CutPart(body, part.planes)
+
+
+def _lies_on(planes: Array, mesh: Mesh) -> Any:
+    """Which sides of a hull, (k, 4), are sides of the mesh too, (k,)."""
+    from scipy.spatial import cKDTree
+
+    length = np.linalg.norm(mesh.across, axis=1)
+    sides = mesh.across[length > 0.0] / length[length > 0.0, None]
+    heights = (sides * mesh.corners[mesh.triangles[length > 0.0, 0]]).sum(axis=1)
+    # Normals within an angle, and heights within as much in mm.
+    off, _ = cKDTree(np.column_stack([sides, heights])).query(planes, distance_upper_bound=1e-3)
+    return np.isfinite(off)
