@@ -7,7 +7,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.cad.assembled import coming_near
+from apo_bench.cad.assembled import coming_near, in_common
 from apo_bench.cad.import_report import named_places, write_places
 from apo_bench.cad.importing import import_part, raw_solids
 from apo_bench.cad.solids.naming import free_name, part_name
@@ -132,7 +132,13 @@ def import_assembly(file: Path, folder: Path, unit: str | None = None, fewest: i
         sentences.append(f"{name}: {len(part.solid.faces)} flat and {len(part.solid.rounds)} round faces")
         sentences += [f"{name}.{face} can make no contact: {why}" for face, why in part.refused.items()]
         places[name] = [place._replace(T=place.T @ pose.at(foot)) for place in raw.places]
-    return write_places(named_places(places), folder, file.name), tuple(sentences)
+    copies = named_places(places)
+    drawn = [(raw, place) for raw in raws for place in raw.places]
+    sentences += [
+        f"{copies[i][1]} and {copies[k][1]} have {size:.3g} mm^3 in common as they are drawn"
+        for i, k, size in in_common(*zip(*drawn, strict=True))
+    ]
+    return write_places(copies, folder, file.name), tuple(sentences)
 
 
 def _foot(raw: RawSolid) -> Array:

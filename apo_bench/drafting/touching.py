@@ -63,7 +63,8 @@ def clashes(solids: Mapping[str, Solid], poses: Poses, clearance_mm: float) -> l
         deep = intrusion(solids[a], poses[a], solids[b], poses[b])
         inside = (
             f"'{a}' and '{b}' are {1e3 * deep:.3g} mm inside each other, and parts are rigid here: a press fit, a "
-            "thread, or a pose that is wrong; give them room in the CAD file"
+            "thread, or a pose that is wrong; give them room in the CAD file. Where the import names nothing that they "
+            "have in common, pieces of a free shape are coarser than their play: draw it simpler, or with more play"
         )
         tight = next(_tight(solids, poses, a, b, clearance_mm), inside if deep > _DEEP_M else "")
         sentences += [tight] if tight else []

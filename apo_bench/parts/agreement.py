@@ -115,7 +115,7 @@ def supported(face: Face, pieces: tuple[Piece, ...]) -> tuple[Face, float] | Non
     lying = stated.intersection(shapely.unary_union(_below(face, pieces, to_plane), grid_size=_SNAP_M))
     for by in (-_BESIDE_M, 1.5 * _BESIDE_M, -0.5 * _BESIDE_M):
         lying = lying.buffer(by, join_style="mitre")
-    lying = shapely.set_precision(lying.simplify(_ROUNDED_M), _WRITTEN_M)
+    lying = shapely.set_precision(shapely.make_valid(lying.simplify(_ROUNDED_M)), _WRITTEN_M)
     if lying.geom_type != "Polygon" or lying.is_empty:
         return None
     off = (face.normal @ face.outline[0]) * face.normal

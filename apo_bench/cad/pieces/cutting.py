@@ -54,7 +54,7 @@ def cut(raw: RawSolid, others: Array | None = None) -> Cut:
     for bore in bores:  # is filled with what was taken away, as the mesh has it
         body = body + manifold3d.Manifold.hull_points(raw.mesh.corners[np.unique(raw.mesh.triangles[bore.triangles])])
     if body.num_tri() > _MOST_TRIANGLES:
-        body = body.simplify(1e-3 * size)
+        body = body.simplify(min(1e-3 * size, 0.01))
     grown = list[float]()
     flats = np.array([(*r.direction, r.direction @ r.point) for r in raw.regions if r.kind == "plane"]).reshape(-1, 4)
     beside = Beside(size, flats, None if others is None else cKDTree(others))

@@ -94,7 +94,7 @@ def _spare(part: CutPart) -> float:
 
 def _halved(part: CutPart, size: float, volume: float) -> list[CutPart]:
     """A hollow free shape, halved where that brings its hulls nearest to it."""
-    body = part.body.simplify(1e-3 * size) if part.body.num_tri() > _FINE_TRIANGLES else part.body
+    body = part.body.simplify(min(1e-3 * size, 0.01)) if part.body.num_tri() > _FINE_TRIANGLES else part.body
     parts = [CutPart(each, part.planes) for each in body.decompose()]
     spare = [_spare(each) for each in parts]
     while parts and len(parts) < _MOST_BISECTED and max(spare) > _ROUGH * volume / len(parts):

@@ -19,7 +19,7 @@ from apo_bench.cad.pieces.misfit import depths
 from apo_bench.cad.solids.raw_solid import Mesh, square_to
 from apo_bench.geometry import Array
 
-_DEEP_MM = 0.03
+_DEEP_MM = 0.04
 _FAR = 0.005
 """How deep the surface may lie in a hull that is not cut on, where others come by; elsewhere, as a part of the size."""
 _INSIDE_MM = 0.004
@@ -27,11 +27,13 @@ _INSIDE_MM = 0.004
 _BESIDE_MM = 1.0
 """Others come by if they come so near."""
 _ALONE = 150
-_TOGETHER = 500
+_TOGETHER = 300
 """Pieces that are cut on at most, of a part alone and of one with others beside it."""
-_MOST_TAKEN_MM = 0.5
-"""No side is moved farther."""
-_SAME_WAY = 1.0 - 1e-7
+_MOST_LOST = 0.05
+_MOST_SPARE = 4.0
+"""Of a part so much may be taken away, or so many times what its hull fills beyond it."""
+_SAME = 1e-3
+"""Planes are one if normals and offsets, [mm], differ by less."""
 _SLIVER = 1e-7
 
 
@@ -88,7 +90,7 @@ def refined(parts: Iterable[CutPart], beside: Beside, volume: float, hair: float
         pieces = _best(part, worst, _SLIVER * volume, hair) if more else [part]
         if len(pieces) < 2:
             done += 1
-            yield _within(part)
+            yield _within(part, beside)
         else:
             for each in pieces:
                 worst = _worst(each, beside)
@@ -162,41 +164,30 @@ def _best(part: CutPart, worst: _Worst, least: float, hair: float) -> list[CutPa
     return best
 
 
-def _within(part: CutPart) -> CutPart:
-    """The hull of a part less what its sides bridge of hollows, as far as that is little."""
+def _within(part: CutPart, beside: Beside) -> CutPart:
+    """The hull of a part less what its free sides bridge of hollows, unless too much of the part would go with it."""
     import manifold3d
-    from scipy.spatial import HalfspaceIntersection
+    from scipy.spatial import HalfspaceIntersection, cKDTree
 
-    mesh = mesh_of(part.body)
-    hollow, _, planes = _hollow(mesh)
-    if not len(hollow):
+    corners = mesh_of(part.body).corners
+    hollow, _, planes = _hollow(mesh_of(part.body))
+    # Flat faces and cuts stay where they are, whichever way they look.
+    known = np.concatenate([beside.flats, part.planes, -part.planes])
+    free = np.flatnonzero(np.isinf(cKDTree(known).query(planes, distance_upper_bound=_SAME)[0]))
+    if not len(hollow) or not len(free):
         return part
-    bridges = np.flatnonzero(~_lies_on(planes, mesh))
-    if not len(bridges):
-        return part
-    below = planes[bridges, 3] - hollow @ planes[bridges, :3].T
-    nearest = below.argmin(axis=1)
-    taken = np.zeros(len(bridges))
-    np.maximum.at(taken, nearest, below.min(axis=1))
-    taken[taken > _MOST_TAKEN_MM] = 0.0
-    planes[bridges, 3] -= taken
-    middle = mesh.corners.mean(axis=0)
-    if depths(middle[None], planes)[0] > _INSIDE_MM:
-        corners = HalfspaceIntersection(planes * [1.0, 1.0, 1.0, -1.0], middle).intersections
-        return CutPart(manifold3d.Manifold.hull_points(corners), part.planes)
+    below = planes[free, 3] - hollow @ planes[free, :3].T
+    taken = np.zeros(len(free))
+    np.maximum.at(taken, below.argmin(axis=1), below.min(axis=1))
+    planes[free, 3] -= taken
     body = part.body.hull()
-    for *n, d in planes[bridges[taken > 0.0]]:
-        body = body.trim_by_plane(-np.array(n), -d)
-    return CutPart(body, part.planes)
-
-
-def _lies_on(planes: Array, mesh: Mesh) -> Any:
-    """Which sides of a hull, (k, 4), are sides of the mesh too, (k,)."""
-    from scipy.spatial import cKDTree
-
-    length = np.linalg.norm(mesh.across, axis=1)
-    sides = mesh.across[length > 0.0] / length[length > 0.0, None]
-    heights = (sides * mesh.corners[mesh.triangles[length > 0.0, 0]]).sum(axis=1)
-    # Normals within an angle, and heights within as much in mm.
-    off, _ = cKDTree(np.column_stack([sides, heights])).query(planes, distance_upper_bound=1e-3)
-    return np.isfinite(off)
+    spare = body.volume() - part.body.volume()
+    middle = corners.mean(axis=0)
+    if depths(middle[None], planes)[0] > _INSIDE_MM:
+        inside = HalfspaceIntersection(planes * [1.0, 1.0, 1.0, -1.0], middle).intersections
+        body = manifold3d.Manifold.hull_points(inside)
+    else:
+        for *n, d in planes[free[taken > 0.0]]:
+            body = body.trim_by_plane(-np.array(n), -d)
+    is_much = (part.body - body).volume() > max(_MOST_LOST * part.body.volume(), _MOST_SPARE * spare)
+    return part if is_much else CutPart(body, part.planes)

@@ -110,4 +110,6 @@ def _hull_of(name: str, points: Array) -> Hull:
     sides = hull.equations[first_of_each(hull.equations[:, :3], signed=True)]
     corners = points[hull.vertices]
     on = np.abs(corners @ sides[:, :3].T + sides[:, 3]) < 1e-9
-    return Hull(name, corners[on.sum(axis=1) >= 3])
+    kept = corners[on.sum(axis=1) >= 3]
+    # Of a thin piece sides that hardly differ may be more than one.
+    return Hull(name, kept if len(kept) > 3 else corners)
