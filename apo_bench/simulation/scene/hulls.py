@@ -103,7 +103,7 @@ def _beside(a: Hull, b: Hull) -> bool:
 
 def _hull_of(name: str, points: Array) -> Hull:
     """The piece around points, with its corners alone."""
-    from scipy.spatial import ConvexHull
+    from scipy.spatial import ConvexHull, QhullError
 
     # Qhull divides sides into triangles: of each plane one is kept, and a corner is where three of these meet.
     hull = ConvexHull(points)
@@ -111,5 +111,9 @@ def _hull_of(name: str, points: Array) -> Hull:
     corners = points[hull.vertices]
     on = np.abs(corners @ sides[:, :3].T + sides[:, 3]) < 1e-9
     kept = corners[on.sum(axis=1) >= 3]
-    # Of a thin piece sides that hardly differ may be more than one.
-    return Hull(name, kept if len(kept) > 3 else corners)
+    # Of a small piece sides that hardly differ may be more than one, and corners of it more than these.
+    try:
+        is_whole = len(kept) == len(corners) or ConvexHull(kept).volume > (1.0 - _SAME_VOLUME) * hull.volume
+    except (QhullError, ValueError):
+        is_whole = False
+    return Hull(name, kept if is_whole else corners)

@@ -33,6 +33,8 @@ _THICK_M = 1e-3
 _SECTORS = 4
 """What is behind the walls of a hole becomes at least so many pieces."""
 _THINNEST_M = 5e-5
+_SMALLEST_M3 = 1e-12
+"""What is behind a wall and smaller is left out: MuJoCo takes no such mesh."""
 _LOST = 0.05
 """Of two walls no more than this part is cut away where they become one."""
 
@@ -85,7 +87,8 @@ def _cut(solid: Solid, pieces: tuple[Piece, ...], clearance_m: float) -> Mapping
     for name, wall in walls.items():
         cut[name] = () if wall is None else (stood_back(wall, flats, SAGITTA_M),)
     for hull in behind:
-        cut[hull.name] += (stood_back(Hull(f"{hull.name}_behind", hull.corners), carried, SAGITTA_M),)
+        back = stood_back(Hull(f"{hull.name}_behind", hull.corners), carried, SAGITTA_M)
+        cut[hull.name] += (back,) if volume(back) > _SMALLEST_M3 else ()
     return cut
 
 
