@@ -14,6 +14,7 @@ from apo_bench.cad.from_regions import contact_faces, solid_moments
 from apo_bench.cad.meshes.mesh_file import CadFile, read_meshes
 from apo_bench.cad.meshes.shells import closed_solids
 from apo_bench.cad.pieces.cutting import Cut, cut
+from apo_bench.cad.solids.drawn import keep_drawn
 from apo_bench.cad.solids.naming import with_names
 from apo_bench.cad.solids.raw_solid import RawSolid, without_copies
 from apo_bench.cad.step.step_file import STEP_SUFFIXES, read_step
@@ -123,6 +124,7 @@ def import_part(
             return write_part(name, body, folder, density=density, source=source, licence="as that file", **color)
 
         path, solid = _as_read(write, body, refused, source)
+        keep_drawn(raw.mesh, path)
         free = {wall.name: 1e3 * _free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
         return Imported(path, raw, solid, pieces, refused, shares, free)
 

@@ -67,7 +67,10 @@ def scenario_new(
         typer.Option(help="A CAD file of several solids, in place of --parts and --poses.", parser=path_given),
     ] = None,
     unit: Annotated[str | None, typer.Option(help="Of --assembly, as in `part import`.")] = None,
-    up: Annotated[str, typer.Option(help="Which axis of the poses looks up: x, y, z, -x, -y or -z.")] = "z",
+    up: Annotated[
+        str | None,
+        typer.Option(help="Which axis of the poses looks up: x, y, z, -x, -y or -z. Default: z, or what works better."),
+    ] = None,
     fixed: Annotated[
         list[str] | None,
         typer.Option(help="A part that is never moved; may be given again. Default: the largest of the lowest."),
@@ -76,15 +79,15 @@ def scenario_new(
     overwrite: Annotated[bool, typer.Option(help="Make --out and its parts anew where they are.")] = False,
 ) -> None:
     """Make a scenario of parts at their final poses: contacts, an order, starts, grasps, a comment for each choice."""
-    from apo_bench.drafting.draft import draft
-    from apo_bench.drafting.posed import UPS, import_assembly, on_the_table, read_posed
+    from apo_bench.drafting.posed import UPS, import_assembly, read_posed
+    from apo_bench.drafting.upright import drafted
     from apo_bench.drafting.writing import draft_lines, scenario_text
     from apo_bench.scenario.file import load_scenario
 
     check_writable(out, "--out", (".toml",))
     if out.exists() and not overwrite:
         raise InputError(f"--out {out} is there already, maybe with changes by hand; name another, or add --overwrite.")
-    if up not in UPS:
+    if up is not None and up not in UPS:
         raise InputError(f"--up {up} was given; {', '.join(UPS)} are allowed.")
     if not 0.0 <= clearance <= 5.0:
         raise InputError(f"--clearance {clearance:g} was given; 0 to 5 mm are allowed.")
@@ -96,10 +99,10 @@ def scenario_new(
         typer.echo("\n".join([*lines, f"Wrote {poses} and its parts"]))
     elif poses is None:
         raise InputError("neither --assembly nor --poses was given; say where the parts are in the end.")
-    drafted = draft(on_the_table(read_posed(poses, named), up), fixed or (), clearance)
+    made = drafted(read_posed(poses, named), up, fixed or (), clearance)
     source = str((assembly or poses).name)
-    out.write_text(scenario_text(drafted, f"Assembly of {out.stem}", source, out.parent), encoding="utf-8")
-    typer.echo("\n".join(draft_lines(drafted)))
+    out.write_text(scenario_text(made, f"Assembly of {out.stem}", source, out.parent), encoding="utf-8")
+    typer.echo("\n".join(draft_lines(made)))
     load_scenario(out)
     typer.echo(f"Wrote {out}; look at it with: apo-bench scenario check {shlex.quote(str(out))}")
 

@@ -49,6 +49,14 @@ class Draft:
     clearance_mm: float
     notes: tuple[str, ...]
     """What a person should know, one sentence each."""
+    unfit: tuple[str, ...]
+    """Those of them that say why the robot cannot do a part: it does not stand, or there is no place to hold it."""
+    up: str = "z"
+    """Which axis of the poses that were given looks up, and why, in words."""
+
+
+class NoOrder(RuntimeError):
+    """Parts cannot be put together one after the other, with this side up."""
 
 
 def draft(parts: Sequence[PosedPart], fixed: Sequence[str] = (), clearance_mm: float = 0.25) -> Draft:
@@ -60,7 +68,8 @@ def draft(parts: Sequence[PosedPart], fixed: Sequence[str] = (), clearance_mm: f
 
     Raises:
         InputError: No part has that name, or there is no room on the table.
-        RuntimeError: Parts are inside each other, or there is no order in which they can be put together.
+        RuntimeError: Parts are inside each other.
+        NoOrder: There is no order in which they can be put together.
     """
     solids = {each.name: each.solid for each in parts} | {TABLE: load_part(TABLE)}
     poses: Poses = {each.name: each.T for each in parts} | {TABLE: np.eye(4)}
@@ -68,7 +77,7 @@ def draft(parts: Sequence[PosedPart], fixed: Sequence[str] = (), clearance_mm: f
         if name not in solids or name == TABLE:
             raise InputError(unknown("part", name, [each.name for each in parts]))
     base, why_fixed = (tuple(fixed), "as asked") if fixed else (_base(parts), "the largest of those that lie lowest")
-    wrong = clashes(solids, poses, clearance_mm)
+    wrong = clashes(solids, poses, clearance_mm, {each.name: each.file for each in parts})
     if wrong:
         raise RuntimeError("; ".join(wrong) + ".")
     poses, contacts, dropped = closed(solids, poses, found_contacts(solids, poses), (TABLE, *base))
@@ -85,8 +94,8 @@ def draft(parts: Sequence[PosedPart], fixed: Sequence[str] = (), clearance_mm: f
     search = OrderSearch(solids, poses, contacts, aside)
     order = search.order(frozenset(base))
     if order is None:
-        stuck = [why for part, why in search.stuck.items() if part not in base]
-        raise RuntimeError("; ".join(["there is no order in which these parts can be put together", *stuck]) + ".")
+        stuck = [why() for why in search.stuck.values()]
+        raise NoOrder("; ".join(["there is no order in which these parts can be put together", *stuck]) + ".")
     # Where assemblies may stand is kept free: the assembly, and a sub-assembly that is put together beside it.
     is_beside = any(np.linalg.norm(placing.at - poses[placing.moves[0]]) > _LOW_M for placing in order)
     site = site_of(reach, is_beside)
@@ -98,6 +107,8 @@ def draft(parts: Sequence[PosedPart], fixed: Sequence[str] = (), clearance_mm: f
     for part, at in laid_out(solids, turns, keep_free).items():
         starts[part][:3, 3] = (*at, stances[part].height_m)
     grasps, crowded = _holds(solids, poses, order, base)
+    unfit = (*crowded, *_unfit(solids, turns, stances, grasps))
+    rolling = [f"'{part}' lies on a round wall at its start and may roll" for part, it in stances.items() if it.rolls]
     return Draft(
         tuple(replace(each, T=poses[each.name]) for each in parts),
         base,
@@ -108,7 +119,8 @@ def draft(parts: Sequence[PosedPart], fixed: Sequence[str] = (), clearance_mm: f
         grasps,
         site,
         clearance_mm,
-        (*notes, *crowded, *_notes(solids, turns, stances, grasps)),
+        (*notes, *unfit, *rolling),
+        unfit,
     )
 
 
@@ -167,18 +179,16 @@ def _struck(
     return any(intrusion_depths(fingers, R, at, solids[part].pieces, poses[part])[0] > 0.0 for part in others)
 
 
-def _notes(
+def _unfit(
     solids: Mapping[str, Solid],
     turns: Mapping[str, Array],
     stances: Mapping[str, Stance],
     grasps: Mapping[str, PadPlace | None],
 ) -> Iterator[str]:
-    """What is to be said of parts that do not stand, roll, or cannot be held."""
+    """What is to be said of parts that do not stand, or cannot be held."""
     for part, R in turns.items():
         if not stances[part].stands:
             yield f"'{part}' needs turning over: it does not stand on the table as it is in the assembly"
-        elif stances[part].rolls:
-            yield f"'{part}' lies on a round wall at its start and may roll"
         if grasps[part] is None:
             size = " x ".join(f"{1e3 * np.ptp(extent(solids[part].pieces, R[i])):.4g}" for i in range(3))
             yield (

@@ -5,8 +5,9 @@ would rest on what is left. Where no part can go alone, parts that hold together
 beside the assembly first, on the table.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import chain, combinations
 from typing import NamedTuple, final
 
@@ -15,9 +16,10 @@ import numpy as np
 from apo_bench.assembly import Assembly, Contact, Operation, Poses
 from apo_bench.drafting.posed import TABLE
 from apo_bench.drafting.touching import found_contacts
-from apo_bench.drafting.waiting import stance
-from apo_bench.geometry import Array, Solid, drop, extent, pose
-from apo_bench.insertion.arrival import arrive
+from apo_bench.drafting.waiting import Stance, stance
+from apo_bench.geometry import TOUCH_M, Array, Solid, drop, extent, intrusion_depths, pose
+from apo_bench.insertion.arrival import CLEAR_M, Arrival, arrive
+from apo_bench.insertion.macros import UP
 from apo_bench.prediction.stability import BALANCED, imbalance
 
 _FALLS_M = 7e-4
@@ -25,6 +27,17 @@ _FALLS_M = 7e-4
 _MOST_LOOKS = 4000
 """Sets of parts that are looked at before the search ends."""
 _LARGEST_GROUP = 4
+_STEP_M = 5e-4
+_DEEP_M = 5e-5
+"""Places on a way are so far apart where it is asked what is on it, and what is so deep is; less is a touch."""
+_NEAR_M = 5e-3
+"""A part that is farther away is not beside another one."""
+_BESIDE = {"above": UP, "below": -UP} | {
+    f"from it along {sign}{'xyz'[i]}": float(f"{sign}1") * np.eye(3)[i] for i in (0, 1) for sign in "+-"
+}
+
+Why = Callable[[], str]
+"""Says why a part cannot go; only asked where nothing can."""
 
 
 class Placing(NamedTuple):
@@ -52,8 +65,10 @@ class OrderSearch:
     aside: Array
     """(3,): where a sub-assembly is put together, from its place in the assembly, level, [m]."""
     failed: set[frozenset[str]] = field(default_factory=set)
-    stuck: dict[str, str] = field(default_factory=dict)
-    """Part -> why it could not go, the last time that was asked."""
+    stuck: Mapping[str, Why] = field(default_factory=dict)
+    """Part -> why it cannot go, where the fewest parts were left of which none can."""
+    fewest: float = np.inf
+    """How many these were."""
     looks: int = 0
 
     def order(self, fixed: frozenset[str]) -> tuple[Placing, ...] | None:
@@ -78,15 +93,25 @@ class OrderSearch:
     def _leaving(self, there: frozenset[str], base: frozenset[str]) -> Iterator[Placing]:
         """What can be taken off, what comes straight up from the top first; groups only where no part can."""
         free = [part for part in self.solids if part in there - base]
-        single = [placing for part in free if (placing := self._leaves((part,), there)) is not None]
+        tried = {part: self._leaves((part,), there) for part in free}
+        single = [placing for placing in tried.values() if isinstance(placing, Placing)]
         yield from sorted(single, key=self._late)
         if single:
             return
+        stuck: dict[str, Why] = {part: why for part, why in tried.items() if not isinstance(why, Placing)}
         large_first = sorted(free, key=lambda part: -self.solids[part].volume)
         for group in chain.from_iterable(combinations(large_first, size) for size in range(2, _LARGEST_GROUP + 1)):
             placing = self._leaves(group, there) if self._hangs_together(group) else None
-            if placing is not None and self._beside(group) is not None:
+            if not isinstance(placing, Placing):
+                continue
+            if self._beside(group) is not None:
                 yield placing
+            elif not _is_steady(stance(self.solids[group[0]], self.poses[group[0]][:3, :3])):
+                words = f"'{group[0]}' does not stand alone, so nothing can be put into it beside the assembly"
+                stuck[group[0]] = partial(str, words)
+        if len(there) < self.fewest:
+            self.fewest = len(there)
+            self.stuck = stuck
 
     def _late(self, placing: Placing) -> tuple[float, ...]:
         """What is put in last: from above before from the side, the highest first."""
@@ -98,8 +123,8 @@ class OrderSearch:
             self.solids[part].volume,
         )
 
-    def _leaves(self, moves: Sequence[str], there: frozenset[str]) -> Placing | None:
-        """How parts come to their places last of all that are there; None if they cannot."""
+    def _leaves(self, moves: Sequence[str], there: frozenset[str]) -> Placing | Why:
+        """How parts come to their places last of all that are there, or why they cannot."""
         rest = [part for part in self.solids if part in there and part not in moves]
         main = moves[0]
         # Contacts of what moves with what rests, the face of what moves first.
@@ -111,26 +136,77 @@ class OrderSearch:
         # A part that is put back must rest: something is below it, and its weight is over what carries it. It must come
         # along a straight way, which the macros of its contacts give, with nothing in the way.
         if not closes:
-            self.stuck[main] = f"'{main}' touches nothing that would be there before it"
-        elif min(drop(self.solids[m], poses[m], self.solids[r], poses[r]) for m in moves for r in rest) > _FALLS_M:
-            self.stuck[main] = f"nothing is below '{main}' that would carry it"
-        elif imbalance(assembly, Operation(main, closes, tuple(moves[1:])), poses) > BALANCED:
-            self.stuck[main] = f"'{main}' would not keep its balance on what is there before it"
-        elif not (arrival := arrive(assembly, moves, closes, poses)).free:
-            self.stuck[main] = f"no straight way leads '{main}' out of {others}"
-        else:
-            way = poses[main][:3, :3] @ arrival.line.direction
-            along = f"along ({', '.join(f'{x:.3g}' for x in np.round(way, 3) + 0.0)})"
-            words = "from above" if way[2] < -0.9 else "from below" if way[2] > 0.9 else along
-            return Placing(tuple(moves), closes, poses[main], f"comes {words}, onto {others}")
-        return None
+            return partial(self._apart, main, rest)
+        if min(drop(self.solids[m], poses[m], self.solids[r], poses[r]) for m in moves for r in rest) > _FALLS_M:
+            return partial(self._carried, main, rest)
+        if imbalance(assembly, Operation(main, closes, tuple(moves[1:])), poses) > BALANCED:
+            return partial(str, f"'{main}' would not keep its balance on {others}, which would be there before it")
+        arrival = arrive(assembly, moves, closes, poses)
+        if not arrival.free:
+            return partial(self._blocked, arrival, moves, rest, others)
+        way = poses[main][:3, :3] @ arrival.line.direction
+        along = f"along ({', '.join(f'{x:.3g}' for x in np.round(way, 3) + 0.0)})"
+        words = "from above" if way[2] < -0.9 else "from below" if way[2] > 0.9 else along
+        return Placing(tuple(moves), closes, poses[main], f"comes {words}, onto {others}")
+
+    def _apart(self, main: str, rest: Sequence[str]) -> str:
+        """That nothing touches a part, and what is nearest."""
+        ways = np.arange(0.0, _NEAR_M, _NEAR_M / 100)
+        near = [
+            (float(ways[max(0, int(met.argmax()) - 1)]), other, words)
+            for other in rest
+            for words, way in _BESIDE.items()
+            if (met := self._depths(main, np.outer(ways, way), other) > TOUCH_M).any()
+        ]
+        gap_m, other, words = min(near, default=(np.inf, "", ""))
+        nearest = (
+            f"no flat or round face of '{other}', {1e3 * gap_m:.2g} mm {words}, lies on one of its own"
+            if near
+            else f"all of {', '.join(rest)} is more than {1e3 * _NEAR_M:g} mm away"
+        )
+        return f"'{main}' touches nothing that would be there before it: {nearest}"
+
+    def _carried(self, main: str, rest: Sequence[str]) -> str:
+        """That nothing carries a part, and how far it would fall."""
+        falls = min((drop(self.solids[main], self.poses[main], self.solids[r], self.poses[r]), r) for r in rest)
+        return (
+            f"nothing is below '{main}' that would carry it: it would fall {1e3 * falls[0]:.3g} mm, onto '{falls[1]}'"
+        )
+
+    def _blocked(self, arrival: Arrival, moves: Sequence[str], rest: Sequence[str], others: str) -> str:
+        """What is in the way of parts along the best of the straight lines out of their contacts, or above its end."""
+        main = moves[0]
+        out = np.round(-(self.poses[main][:3, :3] @ arrival.line.direction), 3) + 0.0
+        if arrival.chain.locked:
+            return f"its contacts with {others} hold '{main}' in every direction"
+        along = np.outer(np.arange(_STEP_M, arrival.line.travel_m + _STEP_M, _STEP_M), out)
+        above = along[-1] + np.outer(np.arange(_STEP_M, CLEAR_M, _STEP_M), UP)
+        for ways, words in (
+            (along, f"along ({', '.join(f'{x:.3g}' for x in out)})"),
+            (above, f"up from {1e3 * np.linalg.norm(along[-1]):.3g} mm beside its place"),
+        ):
+            deep = np.array([np.max([self._depths(m, ways, r) for m in moves], axis=0) for r in rest])
+            if deep.max() > _DEEP_M:
+                first = int((deep.max(axis=0) > _DEEP_M).argmax())
+                by = int(deep[:, first].argmax())
+                return (
+                    f"'{main}' cannot leave {words}: from {1e3 * _STEP_M * (first + 1):.3g} mm on it would be inside "
+                    f"'{rest[by]}', {1e3 * deep[by].max():.2g} mm deep"
+                )
+        return f"no straight way leads '{main}' out of {others}"
+
+    def _depths(self, part: str, shifts: Array, other: str) -> Array:
+        """How deep a part is in another one after each of some shifts, (k, 3), (k,), [m]."""
+        T, other_T = self.poses[part], self.poses[other]
+        return intrusion_depths(
+            self.solids[part].pieces, T[:3, :3], T[:3, 3] + shifts, self.solids[other].pieces, other_T
+        )
 
     def _beside(self, group: tuple[str, ...]) -> tuple[Placing, ...] | None:
         """How a group is put together beside the assembly, its main part on the table."""
         main = group[0]
         stands = stance(self.solids[main], self.poses[main][:3, :3])
-        if not stands.stands or stands.rolls:
-            self.stuck[main] = f"'{main}' does not stand alone, so nothing can be put into it beside the assembly"
+        if not _is_steady(stands):
             return None
         # The same search for the group alone, on the table, each part at its place in the group.
         shift = pose.at(self.aside + np.array([0.0, 0.0, stands.height_m - float(self.poses[main][2, 3])]))
@@ -138,8 +214,10 @@ class OrderSearch:
         solids = {part: self.solids[part] for part in (*group, TABLE)}
         inner = OrderSearch(solids, poses, found_contacts(solids, poses), self.aside)
         first = inner._leaves((main,), frozenset((main, TABLE)))
-        rest = inner._without(frozenset(solids), frozenset((main, TABLE))) if first else None
-        return None if first is None or rest is None else (first, *rest)
+        if not isinstance(first, Placing):
+            return None
+        rest = inner._without(frozenset(solids), frozenset((main, TABLE)))
+        return None if rest is None else (first, *rest)
 
     def _hangs_together(self, group: Sequence[str]) -> bool:
         """Whether each part of a group is reached from the first by contacts within the group."""
@@ -149,3 +227,7 @@ class OrderSearch:
                 if {a.part, b.part} <= set(group) and known & {a.part, b.part}:
                     known |= {a.part, b.part}
         return known == set(group)
+
+
+def _is_steady(stands: Stance) -> bool:
+    return stands.stands and not stands.rolls

@@ -6,11 +6,14 @@ Poses are exact but for the digits of a file and of a fit, so a face touches whe
 
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import combinations, product
+from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Facing, PartFace, Poses, contact_kind, geometric_play, play_mm
 from apo_bench.assembly.facing import facing
+from apo_bench.cad.solids.drawn import drawn_mesh, overlap
 from apo_bench.geometry import Array, Solid, intrusion, mate, pose
 
 _NEAR_M = 5e-5
@@ -56,19 +59,42 @@ def closed(
         dropped.append(kept.pop(int(np.argmax(off))))
 
 
-def clashes(solids: Mapping[str, Solid], poses: Poses, clearance_mm: float) -> list[str]:
-    """Press fits, threads, and other parts that are inside each other, one sentence each."""
+def clashes(
+    solids: Mapping[str, Solid], poses: Poses, clearance_mm: float, files: Mapping[str, Path] = MappingProxyType({})
+) -> list[str]:
+    """Press fits, threads, and other parts that are inside each other, one sentence each.
+
+    Args:
+        files: Part files; overlaps are those of the solids as drawn where an import kept these beside them.
+    """
     sentences = list[str]()
     for a, b in combinations(solids, 2):
         deep = intrusion(solids[a], poses[a], solids[b], poses[b])
-        inside = (
-            f"'{a}' and '{b}' are {1e3 * deep:.3g} mm inside each other, and parts are rigid here: a press fit, a "
-            "thread, or a pose that is wrong; give them room in the CAD file. Where the import names nothing that they "
-            "have in common, pieces of a free shape are coarser than their play: draw it simpler, or with more play"
-        )
-        tight = next(_tight(solids, poses, a, b, clearance_mm), inside if deep > _DEEP_M else "")
-        sentences += [tight] if tight else []
+        tight = next(_tight(solids, poses, a, b, clearance_mm), "")
+        if tight or deep > _DEEP_M:
+            sentences.append(tight or _inside(poses, a, b, deep, files))
     return sentences
+
+
+def _inside(poses: Poses, a: str, b: str, deep_m: float, files: Mapping[str, Path]) -> str:
+    """What is wrong with two parts whose pieces are so deep in each other."""
+    meshes = [drawn_mesh(files[part]) if part in files else None for part in (a, b)]
+    drawn = overlap(meshes[0], poses[a], meshes[1], poses[b]) if meshes[0] and meshes[1] else None
+    if drawn is not None and drawn.depth_m <= _DEEP_M:
+        return (
+            f"'{a}' and '{b}' are {1e3 * drawn.depth_m:.3g} mm inside each other as drawn, but the convex pieces that "
+            f"stand for them are so by {1e3 * deep_m:.3g} mm: an error of the import, not of the file; draw what is "
+            "there simpler, or leave one of them out"
+        )
+    where = ""
+    if drawn is not None:
+        deep_m = drawn.depth_m
+        at = pose.apply(np.linalg.inv(poses[a]), drawn.at[None])[0]
+        where = f" as drawn, deepest at ({', '.join(f'{round(1e3 * x, 3) + 0.0:g}' for x in at)}) mm of '{a}'"
+    return (
+        f"'{a}' and '{b}' are {1e3 * deep_m:.3g} mm inside each other{where}, and parts are rigid here: a press fit, a "
+        "thread, or a pose that is wrong; give them room in the CAD file"
+    )
 
 
 def walls_without_play(

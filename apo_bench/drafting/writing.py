@@ -42,6 +42,7 @@ def scenario_text(draft: Draft, title: str, source: str, folder: Path) -> str:
         f"# Written by `apo-bench scenario new` from {source}. Every choice may be changed; `scenario check` says what",
         "# of it human and robot can do. Lengths in mm, angles in degrees. A goal is the pose of the moved part in the",
         "# frame of the assembly, which [site] puts somewhere on the table; a start is a pose in the world.",
+        f"# Up: {draft.up}.",
         *(f"# NOTE: {note}." for note in draft.notes),
         "schema = 1",
         f"title = {json.dumps(title, ensure_ascii=False)}",
@@ -73,6 +74,7 @@ def scenario_text(draft: Draft, title: str, source: str, folder: Path) -> str:
 
 def draft_lines(draft: Draft) -> Iterator[str]:
     """The choices that were made, and what is to be known."""
+    yield f"up: {draft.up}"
     yield f"fixed: {', '.join(draft.fixed)} ({draft.why_fixed})"
     for k, placing in enumerate(draft.order, start=1):
         carried = f" with {', '.join(placing.moves[1:])}" if placing.moves[1:] else ""

@@ -16,7 +16,7 @@ _ROOM_M = 0.02
 """A part begins its way in so far outside of what it goes into."""
 _TRAVEL_M = 0.03
 """How far before its goal the line begins at least."""
-_CLEAR_M = 0.3
+CLEAR_M = 0.3
 """A part comes from above to where its way in begins: so much above that place must be free."""
 _LIFTED = 0.1
 """A contact opens when the part is lifted if the sine of its normal to the level is above this."""
@@ -99,7 +99,7 @@ def arrive(
     def clear(way: Array, length_m: float) -> bool:
         begin = [Posed(posed.pieces, _shifted(posed.T, length_m * way)) for posed in moving]
         others = list(resting.values())
-        return is_way_free(moving, way, length_m, others) and is_way_free(begin, UP, _CLEAR_M, others)
+        return is_way_free(moving, way, length_m, others) and is_way_free(begin, UP, CLEAR_M, others)
 
     def reach(exit_m: float) -> float:
         # For a part that is free after a way the line is as long as that and some room, in whole millimetres.

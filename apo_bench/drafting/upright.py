@@ -1,0 +1,43 @@
+"""Which way up an assembly is put together: as asked, or the first way of six that leaves least to be said."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from apo_bench.drafting.draft import Draft, NoOrder, draft
+from apo_bench.drafting.posed import PosedPart, on_the_table
+from apo_bench.errors import InputError
+
+_FIRST = ("z", "-z", "x", "-x", "y", "-y")
+
+
+def drafted(
+    parts: Sequence[PosedPart], up: str | None = None, fixed: Sequence[str] = (), clearance_mm: float = 0.25
+) -> Draft:
+    """The draft of an assembly, with an axis of its poses up.
+
+    Args:
+        up: An axis of `posed.UPS`; None: z, unless parts then find no order, do not stand, or cannot be held, and
+            another axis is better.
+
+    Raises:
+        InputError: No part has that name, or there is no room on the table.
+        RuntimeError: Parts are inside each other, or there is no order in which they can be put together.
+    """
+    tried: dict[str, Draft] = {}
+    failed: dict[str, NoOrder | InputError] = {}
+    for axis in (up,) if up else _FIRST:
+        try:
+            tried[axis] = draft(on_the_table(parts, axis), fixed, clearance_mm)
+        except (NoOrder, InputError) as error:
+            failed[axis] = error
+        else:
+            if not tried[axis].unfit:
+                break
+    if not tried:
+        first = next(iter(failed.values()))
+        raise first if up else type(first)(f"{str(first).rstrip('.')}; nor is there one with another axis up.")
+    best = min(tried, key=lambda axis: len(tried[axis].unfit))
+    if up or best == "z":
+        return replace(tried[best], up=f"{best}, as asked" if up else best)
+    why = str(failed["z"]).rstrip(".") if "z" in failed else "; ".join(tried["z"].unfit)
+    return replace(tried[best], up=f"{best}, as with z up {why}")

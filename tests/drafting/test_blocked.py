@@ -1,0 +1,90 @@
+"""Why parts do not go together: the pair that blocks, its depth and direction; and which side of them goes up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from apo_bench.cad.solids.drawn import keep_drawn
+from apo_bench.cad.solids.raw_solid import Mesh
+from apo_bench.drafting.draft import NoOrder
+from apo_bench.drafting.posed import PosedPart
+from apo_bench.drafting.touching import clashes
+from apo_bench.drafting.upright import drafted
+from apo_bench.drafting.writing import scenario_text
+from apo_bench.geometry import pose
+from apo_bench.parts import load_part
+from apo_bench.parts.making import Body, extrude, join, rectangle, write_part
+
+
+def made(folder: Path, **bodies: tuple[Body, tuple[float, float, float]]) -> tuple[PosedPart, ...]:
+    for name, (body, _) in bodies.items():
+        write_part(name, body, folder, density=700, source="a test", licence="CC0-1.0")
+    files = {name: folder / f"{name}.xml" for name in bodies}
+    return tuple(
+        PosedPart(name, files[name], load_part(files[name]), pose.at(1e-3 * np.array(at)))
+        for name, (_, at) in bodies.items()
+    )
+
+
+def turned(parts: tuple[PosedPart, ...], *turn: float) -> tuple[PosedPart, ...]:
+    T = pose.at(np.zeros(3), turn)
+    return tuple(PosedPart(part.name, part.file, part.solid, T @ part.T) for part in parts)
+
+
+def box(low: float, high: float) -> Body:
+    """Walls of 10 mm around a room of 30 x 30 mm."""
+    sides = [rectangle(50, 10, (0, 20 * s)) for s in (-1, 1)] + [rectangle(10, 30, (20 * s, 0)) for s in (-1, 1)]
+    return join(*(extrude(side, low, high) for side in sides))
+
+
+FLOOR = extrude(rectangle(50, 50), 0, 10, bottom="bottom", top="top")
+CORE = extrude(rectangle(20, 20), 0, 15, bottom="foot", top="head")
+
+
+def test_what_is_shut_in_is_said_with_what_is_in_its_way(tmp_path: Path) -> None:
+    shut = join(FLOOR, box(10, 40), extrude(rectangle(50, 50), 40, 48))
+    with pytest.raises(NoOrder) as said:
+        drafted(made(tmp_path, shut=(shut, (0, 0, 0)), core=(CORE, (0, 0, 10))), "z")
+    # 15 mm are free above it; the roof is 8 mm thick: from its middle the core is out after (15 + 8) / 2 mm.
+    assert "'core' cannot leave along (0, 0, 1): from 15.5 mm on it would be inside 'shut', 11 mm deep" in str(
+        said.value
+    )
+
+
+def test_what_touches_nothing_is_said_with_what_is_nearest(tmp_path: Path) -> None:
+    parts = made(tmp_path, plate=(FLOOR, (0, 0, 0)), core=(CORE, (0, 0, 10.4)))
+    with pytest.raises(NoOrder, match=r"'core' touches nothing .* 'plate', 0\.4 mm below"):
+        drafted(parts, "z")
+
+
+def test_overlaps_are_those_of_the_solids_as_drawn(tmp_path: Path) -> None:
+    a, b = made(tmp_path, a=(CORE, (0, 0, 0)), b=(CORE, (0, 0, 14)))
+    solids, poses = {"a": a.solid, "b": b.solid}, {"a": a.T, "b": b.T}
+    files = {"a": a.file, "b": b.file}
+    (plain,) = clashes(solids, poses, 0.25, files)
+    assert plain.startswith("'a' and 'b' are 1 mm inside each other, and parts are rigid")
+    corners = np.array([[x, y, z] for x in (-10, 10) for y in (-10, 10) for z in (0, 15)], float)
+    triangles = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    faces = np.array([[q[0], *q[i : i + 2]] for q in triangles for i in (1, 2)])
+    for low, said in ((0.3, "0.7 mm inside each other as drawn, deepest at ("), (1.0, "an error of the import")):
+        keep_drawn(Mesh(corners, faces), a.file)
+        keep_drawn(Mesh(np.maximum(corners, (-99, -99, low)), faces), b.file)
+        (sentence,) = clashes(solids, poses, 0.25, files)
+        assert said in sentence
+
+
+def test_another_side_goes_up_where_there_is_no_order_with_z(tmp_path: Path) -> None:
+    cup = join(FLOOR, box(10, 14))
+    parts = made(tmp_path, cup=(cup, (0, 0, 0)), core=(CORE, (0, 0, 10)))
+    assert drafted(parts).up == "z"
+    over = turned(parts, 180, 0, 0)
+    with pytest.raises(NoOrder, match="'core' cannot leave along"):
+        drafted(over, "z", ("cup",))
+    found = drafted(over, fixed=("cup",))
+    assert found.up.startswith("-z, as with z up there is no order")
+    assert drafted(over, "-z", ("cup",)).up == "-z, as asked"
+    assert "# Up: -z, as with z up" in scenario_text(found, "own", "a test", tmp_path)
+    assert [placing.moves for placing in found.order] == [("core",)]
