@@ -1,120 +1,247 @@
-"""What becomes of assemblies that others drew: `python benchmarks/foreign.py FOLDER [--out OUT] [--seeds 5]`.
+"""What becomes of assemblies that others drew: `python benchmarks/foreign.py benchmarks/foreign.json FOLDER`.
 
-Imports every pair `NAME_plug` and `NAME_socket` (STL, OBJ or 3MF, or STEP where that is installed, in one frame) and
-every other CAD file of the folder as an assembly, writes scenarios, checks them, runs `oracle`, `none` and `contact`
-at 1 mm and 1 degree, and prints a table; every refusal with its sentence. It ships no foreign file.
+FOLDER holds the repositories of the list as git has them, each at OWNER+NAME/repo, OWNER+NAME or OWNER/NAME; nothing is
+loaded from elsewhere, and every file must have the hash of the list. Each assembly has a process of its own: its files
+are imported, a scenario is drafted from the poses without a hand and checked, and `oracle`, `contact`, `snap` and
+`none` are run at 1 mm and 1 degree. Lines are kept in --out; what is there is not done again. The table is printed.
 """
 
 from __future__ import annotations
 
 import argparse
+import hashlib
+import json
+import multiprocessing
 import re
+import resource
+import subprocess
 import sys
-from collections import Counter
-from collections.abc import Iterator
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+import numpy as np
+
 from apo_bench.assembly import contact_kind
+from apo_bench.cad.solids.naming import free_name
 from apo_bench.drafting.checking import check_file
-from apo_bench.drafting.draft import draft
-from apo_bench.drafting.posed import PosedPart, import_assembly, on_the_table, read_posed
+from apo_bench.drafting.posed import PosedPart, import_assembly, read_posed
+from apo_bench.drafting.upright import drafted
 from apo_bench.drafting.writing import scenario_text
 from apo_bench.errors import InputError
+from apo_bench.geometry import pose
+from apo_bench.records import TrialSettings
 from apo_bench.scenario.file import load_scenario
-from benchmarks.generated import rate
+from apo_bench.trial.stages import scene_of
+from apo_bench.trial.trial import run_trial
+from benchmarks.foreign_table import METHODS, came_to, table
 
-_ENDINGS = (".stl", ".obj", ".3mf", ".step", ".stp")
-_PAIR = re.compile(r"(.+)_(plug|socket)", re.IGNORECASE)
-_METHODS = ("none", "contact")
+HALVES = ("open", "held out")
+
+
+class ForeignFile(NamedTuple):
+    """A file of a repository, and where the assembly has it."""
+
+    path: str
+    sha256: str
+    unit: str | None
+    places: tuple[np.ndarray, ...]
+    """(4, 4) each, of the frame of the file, [m]."""
 
 
 class Foreign(NamedTuple):
-    """One assembly in a folder."""
+    """One assembly of the list."""
 
     name: str
-    files: tuple[Path, ...]
+    repository: str
+    commit: str
+    half: str
+    files: tuple[ForeignFile, ...]
 
 
-class Became(NamedTuple):
-    """What became of it: cells of the table, and sentences of what was refused or found wrong."""
-
-    cells: tuple[str, ...]
-    said: tuple[str, ...]
-
-
-def assemblies(folder: Path) -> Iterator[Foreign]:
-    """Pairs, and files on their own, in the order of their names."""
-    files = sorted(path for path in folder.rglob("*") if path.suffix.lower() in _ENDINGS)
-    pairs: dict[str, dict[str, Path]] = {}
-    for path in files:
-        if found := _PAIR.fullmatch(path.stem):
-            pairs.setdefault(str(path.with_name(found[1])), {})[found[2].lower()] = path
-    paired = {path for pair in pairs.values() if len(pair) == 2 for path in pair.values()}
-    for pair in pairs.values():
-        if len(pair) == 2:
-            yield Foreign(pair["plug"].stem[: -len("_plug")], (pair["socket"], pair["plug"]))
-    yield from (Foreign(path.stem, (path,)) for path in files if path not in paired)
-
-
-def posed(each: Foreign, folder: Path, unit: str | None) -> tuple[PosedPart, ...]:
-    """Its parts, imported, where the files have them."""
-    found: list[PosedPart] = []
-    for path in each.files:
-        poses, _ = import_assembly(path, folder / path.stem, unit, fewest=3 - len(each.files))
-        found += read_posed(poses, fewest=3 - len(each.files))
-    return tuple(found)
+def read_list(path: Path) -> tuple[Foreign, ...]:
+    """The assemblies of a list, in its order."""
+    listed = json.loads(path.read_text(encoding="utf-8"))["assemblies"]
+    return tuple(
+        Foreign(
+            each["name"],
+            each["repository"],
+            each["commit"],
+            each["half"],
+            tuple(
+                ForeignFile(
+                    file["path"],
+                    file["sha256"],
+                    file.get("unit"),
+                    tuple(
+                        pose.unpack(np.array([*np.multiply(1e-3, place["at_mm"]), *place["quaternion_wxyz"]]))
+                        for place in file["places"]
+                    ),
+                )
+                for file in each["files"]
+            ),
+        )
+        for each in listed
+    )
 
 
-def tried(each: Foreign, folder: Path, unit: str | None, up: str, seeds: int, fidelity: str) -> Became:
-    """Import, write, check and run one assembly; where it ends, the other cells stay empty."""
-    cells = list[str]()
+def taken_out(folder: Path, each: Foreign, to: Path) -> list[Path]:
+    """Write the files of an assembly out of its repository.
+
+    Raises:
+        InputError: The repository is not there, or a file is not that of the list.
+    """
+    both = each.repository.replace("/", "+")
+    places = (folder / both / "repo", folder / both, folder / each.repository / ".git", folder / each.repository)
+    git = next((place for place in places if (place / "HEAD").exists()), None)
+    if git is None:
+        raise InputError(f"{folder}: {each.repository} is not there; put its git directory at {places[0]}.")
+    to.mkdir(parents=True, exist_ok=True)
+    paths = []
+    for file in each.files:
+        command = ["git", f"--git-dir={git}", "cat-file", "blob", f"{each.commit}:{file.path}"]
+        raw = subprocess.run(command, capture_output=True, check=False).stdout
+        if hashlib.sha256(raw).hexdigest() != file.sha256:
+            raise InputError(f"{git}: {file.path} at {each.commit} is not the file of the list.")
+        paths.append(to / re.sub(r"[^A-Za-z0-9_.]+", "_", Path(file.path).name))
+        paths[-1].write_bytes(raw)
+    return paths
+
+
+def imported(each: Foreign, paths: Sequence[Path], folder: Path) -> tuple[list[dict[str, Any]], list[PosedPart]]:
+    """What became of each file, and all parts at their places, [m]."""
+    lines: list[dict[str, Any]] = []
+    parts: list[PosedPart] = []
+    for file, path in zip(each.files, paths, strict=True):
+        begin = time.process_time()
+        line: dict[str, Any] = {"file": path.name}
+        try:
+            poses, said = import_assembly(path, folder / path.stem, file.unit, fewest=1)
+            found = read_posed(poses, fewest=1)
+        except InputError as error:
+            line["refused"] = str(error).replace(f"{path.parent}/", "")
+        except Exception as error:  # a failure of ours, and said as one
+            line["refused"] = f"{type(error).__name__}: {error}"
+        else:
+            solids = {part.file: part.solid for part in found}.values()
+            line |= {
+                "solids": len(solids),
+                "flat": sum(len(solid.faces) for solid in solids),
+                "round": sum(len(solid.rounds) for solid in solids),
+                "no_contact": sum("can make no contact" in sentence for sentence in said),
+            }
+            for T in file.places:
+                for part in found:
+                    name = free_name(part.name, {other.name for other in parts})
+                    parts.append(replace(part, name=name, T=T @ part.T))
+        lines.append(line | {"seconds": round(time.process_time() - begin, 1)})
+    return lines, parts
+
+
+def became(each: Foreign, mirror: Path, folder: Path, seeds: int) -> Iterator[dict[str, Any]]:
+    """All that is tried with one assembly, line after line, until it ends."""
+    paths = taken_out(mirror, each, folder / "files")
+    lines, parts = imported(each, paths, folder)
+    yield from lines
+    if any("refused" in line for line in lines):
+        return
+    begin = time.process_time()
+    path = folder / f"{each.name}.toml"
     try:
-        parts = posed(each, folder, unit)
-        cells.append(f"{len(parts)} parts")
-        path = folder / f"{re.sub(r'[^A-Za-z0-9_]', '_', each.name)}.toml"
-        made = draft(on_the_table(parts, up))
-        path.write_text(scenario_text(made, each.name, each.files[0].name, folder), encoding="utf-8")
+        made = drafted(parts)
+        path.write_text(scenario_text(made, each.name, each.repository, folder), encoding="utf-8")
         scenario = load_scenario(path)
     except (InputError, RuntimeError) as error:
-        return Became((*cells, *("-",) * (6 - len(cells))), (str(error),))
-    kinds = Counter(
+        yield {"draft": str(error), "seconds": round(time.process_time() - begin, 1)}
+        return
+    contacts = [
         str(contact_kind(*map(scenario.assembly.face_of, contact)))
         for operation in scenario.assembly.operations
         for contact in operation.contacts
-    )
-    cells.append(", ".join(f"{count} {kind}" for kind, count in sorted(kinds.items())))
-    found = tuple(check_file(path, 0, fidelity))
-    wrong = tuple(finding.sentence for finding in found if not finding.ok)
-    cells.append("no" if wrong else "yes")
+    ]
+    yield {
+        "draft": "",
+        "up": made.up,
+        "parts": len(parts),
+        "contacts": {kind: contacts.count(kind) for kind in sorted(set(contacts))},
+        "notes": list(made.notes),
+        "seconds": round(time.process_time() - begin, 1),
+    }
+    found = tuple(check_file(path, 0))
+    yield {"wrong": [finding.sentence for finding in found if not finding.ok]}
+    # What has no way or no grasp is not run; a part that may not stand is, so that it is known whether that is true.
     if any(finding.what in ("file", "gripper") and not finding.ok for finding in found):
-        return Became((*cells, "-", "-", "-"), (*made.notes, *wrong))
-    for method in ("oracle", *_METHODS):
-        right, counted = rate(path, method, seeds, fidelity)
-        cells.append(f"{right} of {counted}")
-    return Became(tuple(cells), (*made.notes, *wrong))
+        return
+    asked = [TrialSettings(str(path), method=method, seed=seed) for seed in range(seeds) for method in METHODS]
+    scene = scene_of(asked[0]) if asked else None
+    for settings in asked:
+        row = run_trial(settings, scene)
+        yield {
+            "method": settings.method,
+            "seed": settings.seed,
+            "success": row["success"],
+            "code": row["failure_code"],
+            "sentence": row["sentence"],
+        }
+
+
+def _alone(each: Foreign, mirror: Path, folder: Path, seeds: int, limit_s: int, out: Path) -> None:
+    resource.setrlimit(resource.RLIMIT_CPU, (limit_s, limit_s))
+    with out.open("a", encoding="utf-8") as file:
+        try:
+            for line in became(each, mirror, folder, seeds):
+                file.write(json.dumps({"assembly": each.name, **line}) + "\n")
+                file.flush()
+        except Exception as error:  # a failure of ours, and said as one
+            file.write(json.dumps({"assembly": each.name, "failed": f"{type(error).__name__}: {error}"}) + "\n")
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path)
-    parser.add_argument("--out", type=Path, default=Path("foreign"), help="for part files and scenarios")
-    parser.add_argument("--unit", help="of files that state none")
-    parser.add_argument("--up", default="z", help="the axis of the files that looks up")
-    parser.add_argument("--seeds", type=int, default=5)
-    parser.add_argument("--fidelity", default="full")
-    asked = parser.parse_args()
-    print("| assembly | imported | contacts | checked | oracle | none | contact |\n|" + "---|" * 7, flush=True)
-    said = list[str]()
-    for each in assemblies(asked.folder):
-        folder = asked.out / each.name
-        folder.mkdir(parents=True, exist_ok=True)
-        became = tried(each, folder, asked.unit, asked.up, asked.seeds, asked.fidelity)
-        print("| " + " | ".join((each.name, *became.cells)) + " |", flush=True)
-        said += [f"- {each.name}: {sentence}" for sentence in became.said]
-    print("\n" + "\n".join(said))
+    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    asked.add_argument("list", type=Path)
+    asked.add_argument("folder", type=Path, help="where the repositories are")
+    asked.add_argument("--half", choices=HALVES, help="only this half")
+    asked.add_argument("--only", nargs="*", help="only these assemblies")
+    asked.add_argument("--out", type=Path, default=Path("foreign.jsonl"), help="lines; parts and scenarios lie beside")
+    asked.add_argument("--seeds", type=int, default=5)
+    asked.add_argument("--limit", type=int, default=900, help="time of the processor of one assembly, s")
+    given = asked.parse_args()
+    chosen = [
+        each
+        for each in read_list(given.list)
+        if given.half in (None, each.half) and (not given.only or each.name in given.only)
+    ]
+    ended = {line["assembly"] for line in _lines(given.out) if line.get("ended", -1) >= given.seeds}
+    for each in chosen:
+        if each.name in ended:
+            continue
+        folder = given.out.with_suffix("") / each.name
+        # A line that ends an assembly says that those before it are whole; what was begun is begun again.
+        kept = [line for line in _lines(given.out) if line["assembly"] != each.name]
+        given.out.write_text("".join(json.dumps(line) + "\n" for line in kept), encoding="utf-8")
+        rest = (each, given.folder, folder, given.seeds, given.limit, given.out)
+        child = multiprocessing.get_context("fork").Process(target=_alone, args=rest)
+        child.start()
+        child.join()
+        with given.out.open("a", encoding="utf-8") as file:
+            if child.exitcode:
+                stopped = f"stopped after {given.limit} s of the processor" if child.exitcode < 0 else "it ended"
+                file.write(json.dumps({"assembly": each.name, "failed": stopped}) + "\n")
+            file.write(json.dumps({"assembly": each.name, "ended": given.seeds}) + "\n")
+        print(f"{each.name}: {came_to(_own(given.out, each.name))}", file=sys.stderr, flush=True)
+    print(table([(each.name, each.half, _own(given.out, each.name)) for each in chosen]))
+
+
+def _lines(path: Path) -> list[Mapping[str, Any]]:
+    return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()] if path.exists() else []
+
+
+def _own(path: Path, name: str) -> list[Mapping[str, Any]]:
+    return [line for line in _lines(path) if line["assembly"] == name]
 
 
 if __name__ == "__main__":
