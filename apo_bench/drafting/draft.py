@@ -94,8 +94,7 @@ def draft(parts: Sequence[PosedPart], fixed: Sequence[str] = (), clearance_mm: f
     search = OrderSearch(solids, poses, contacts, aside)
     order = search.order(frozenset(base))
     if order is None:
-        stuck = [why() for why in search.stuck.values()]
-        raise NoOrder("; ".join(["there is no order in which these parts can be put together", *stuck]) + ".")
+        raise NoOrder("; ".join(["there is no order in which these parts can be put together", *search.stuck()]) + ".")
     # Where assemblies may stand is kept free: the assembly, and a sub-assembly that is put together beside it.
     is_beside = any(np.linalg.norm(placing.at - poses[placing.moves[0]]) > _LOW_M for placing in order)
     site = site_of(reach, is_beside)

@@ -27,6 +27,7 @@ _FALLS_M = 7e-4
 _MOST_LOOKS = 4000
 """Sets of parts that are looked at before the search ends."""
 _LARGEST_GROUP = 4
+_TESTS = 4
 _STEP_M = 5e-4
 _DEEP_M = 5e-5
 """Places on a way are so far apart where it is asked what is on it, and what is so deep is; less is a touch."""
@@ -36,8 +37,14 @@ _BESIDE = {"above": UP, "below": -UP} | {
     f"from it along {sign}{'xyz'[i]}": float(f"{sign}1") * np.eye(3)[i] for i in (0, 1) for sign in "+-"
 }
 
-Why = Callable[[], str]
-"""Says why a part cannot go; only asked where nothing can."""
+
+class Why(NamedTuple):
+    """Why a part cannot go."""
+
+    passed: int
+    """How many of the tests of `_leaves` it passed."""
+    said: Callable[[], str]
+    """In words; only asked where nothing can go."""
 
 
 class Placing(NamedTuple):
@@ -65,10 +72,10 @@ class OrderSearch:
     aside: Array
     """(3,): where a sub-assembly is put together, from its place in the assembly, level, [m]."""
     failed: set[frozenset[str]] = field(default_factory=set)
-    stuck: Mapping[str, Why] = field(default_factory=dict)
-    """Part -> why it cannot go, where the fewest parts were left of which none can."""
-    fewest: float = np.inf
-    """How many these were."""
+    reasons: dict[str, Why] = field(default_factory=dict)
+    """Part -> why it could not go, where it passed most tests; of these, where fewest others were there."""
+    left: frozenset[str] = frozenset()
+    """The fewest parts of which none could go."""
     looks: int = 0
 
     def order(self, fixed: frozenset[str]) -> tuple[Placing, ...] | None:
@@ -95,10 +102,12 @@ class OrderSearch:
         free = [part for part in self.solids if part in there - base]
         tried = {part: self._leaves((part,), there) for part in free}
         single = [placing for placing in tried.values() if isinstance(placing, Placing)]
+        for part, why in tried.items():
+            if isinstance(why, Why) and why.passed >= self.reasons.get(part, why).passed:
+                self.reasons[part] = why
         yield from sorted(single, key=self._late)
         if single:
             return
-        stuck: dict[str, Why] = {part: why for part, why in tried.items() if not isinstance(why, Placing)}
         large_first = sorted(free, key=lambda part: -self.solids[part].volume)
         for group in chain.from_iterable(combinations(large_first, size) for size in range(2, _LARGEST_GROUP + 1)):
             placing = self._leaves(group, there) if self._hangs_together(group) else None
@@ -108,10 +117,13 @@ class OrderSearch:
                 yield placing
             elif not _is_steady(stance(self.solids[group[0]], self.poses[group[0]][:3, :3])):
                 words = f"'{group[0]}' does not stand alone, so nothing can be put into it beside the assembly"
-                stuck[group[0]] = partial(str, words)
-        if len(there) < self.fewest:
-            self.fewest = len(there)
-            self.stuck = stuck
+                self.reasons[group[0]] = Why(_TESTS, partial(str, words))
+        if not self.left or len(free) < len(self.left):
+            self.left = frozenset(free)
+
+    def stuck(self) -> list[str]:
+        """Why each of the fewest parts that are left cannot go, one sentence each."""
+        return [self.reasons[part].said() for part in self.solids if part in self.left and part in self.reasons]
 
     def _late(self, placing: Placing) -> tuple[float, ...]:
         """What is put in last: from above before from the side, the highest first."""
@@ -136,14 +148,15 @@ class OrderSearch:
         # A part that is put back must rest: something is below it, and its weight is over what carries it. It must come
         # along a straight way, which the macros of its contacts give, with nothing in the way.
         if not closes:
-            return partial(self._apart, main, rest)
+            return Why(0, partial(self._apart, main, rest))
         if min(drop(self.solids[m], poses[m], self.solids[r], poses[r]) for m in moves for r in rest) > _FALLS_M:
-            return partial(self._carried, main, rest)
+            return Why(1, partial(self._carried, main, rest))
         if imbalance(assembly, Operation(main, closes, tuple(moves[1:])), poses) > BALANCED:
-            return partial(str, f"'{main}' would not keep its balance on {others}, which would be there before it")
+            words = f"'{main}' would not keep its balance on {others}, which would be there before it"
+            return Why(2, partial(str, words))
         arrival = arrive(assembly, moves, closes, poses)
         if not arrival.free:
-            return partial(self._blocked, arrival, moves, rest, others)
+            return Why(_TESTS - 1, partial(self._blocked, arrival, moves, rest, others))
         way = poses[main][:3, :3] @ arrival.line.direction
         along = f"along ({', '.join(f'{x:.3g}' for x in np.round(way, 3) + 0.0)})"
         words = "from above" if way[2] < -0.9 else "from below" if way[2] > 0.9 else along
