@@ -76,7 +76,9 @@ def draft(parts: Sequence[PosedPart], fixed: Sequence[str] = (), clearance_mm: f
     for name in fixed:
         if name not in solids or name == TABLE:
             raise InputError(unknown("part", name, [each.name for each in parts]))
-    base, why_fixed = (tuple(fixed), "as asked") if fixed else (_base(parts), "the largest of those that lie lowest")
+    base, why_fixed = (
+        (tuple(fixed), "as asked") if fixed else (lowest(parts)[:1], "the largest of those that lie lowest")
+    )
     wrong = clashes(solids, poses, clearance_mm, {each.name: each.file for each in parts})
     if wrong:
         raise RuntimeError("; ".join(wrong) + ".")
@@ -123,11 +125,11 @@ def draft(parts: Sequence[PosedPart], fixed: Sequence[str] = (), clearance_mm: f
     )
 
 
-def _base(parts: Sequence[PosedPart]) -> tuple[str]:
-    """The largest of the parts that lie on the table."""
+def lowest(parts: Sequence[PosedPart]) -> tuple[str, ...]:
+    """The parts that lie on the table, the largest first."""
     low = {each.name: extent(each.solid.pieces, each.T[2, :3])[0] + float(each.T[2, 3]) for each in parts}
-    lowest = [each for each in parts if low[each.name] < min(low.values()) + _LOW_M]
-    return (max(lowest, key=lambda each: each.solid.volume).name,)
+    lie = [each for each in parts if low[each.name] < min(low.values()) + _LOW_M]
+    return tuple(each.name for each in sorted(lie, key=lambda each: -each.solid.volume))
 
 
 def _holds(

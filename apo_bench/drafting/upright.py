@@ -1,13 +1,15 @@
-"""Which way up an assembly is put together: as asked, or the first way of six that leaves least to be said."""
+"""Which way up an assembly is put together, and on which of its parts: as asked, or the first way that works best."""
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 
-from apo_bench.drafting.draft import Draft, NoOrder, draft
+from apo_bench.drafting.draft import Draft, NoOrder, draft, lowest
 from apo_bench.drafting.posed import PosedPart, on_the_table
 from apo_bench.errors import InputError
 
 _FIRST = ("z", "-z", "x", "-x", "y", "-y")
+_MOST_BASES = 3
 
 
 def drafted(
@@ -27,7 +29,7 @@ def drafted(
     failed: dict[str, NoOrder | InputError] = {}
     for axis in (up,) if up else _FIRST:
         try:
-            tried[axis] = draft(on_the_table(parts, axis), fixed, clearance_mm)
+            tried[axis] = _on_a_base(on_the_table(parts, axis), fixed, clearance_mm)
         except (NoOrder, InputError) as error:
             failed[axis] = error
         else:
@@ -41,3 +43,15 @@ def drafted(
         return replace(tried[best], up=f"{best}, as asked" if up else best)
     why = str(failed["z"]).rstrip(".") if "z" in failed else "; ".join(tried["z"].unfit)
     return replace(tried[best], up=f"{best}, as with z up {why}")
+
+
+def _on_a_base(parts: Sequence[PosedPart], fixed: Sequence[str], clearance_mm: float) -> Draft:
+    """The draft on what is fixed, or on the largest of the parts that lie lowest with which there is an order."""
+    try:
+        return draft(parts, fixed, clearance_mm)
+    except NoOrder:
+        for base in () if fixed else lowest(parts)[1:_MOST_BASES]:
+            with suppress(NoOrder):
+                made = draft(parts, (base,), clearance_mm)
+                return replace(made, why_fixed="it lies lowest; with larger ones that do there is no order")
+        raise

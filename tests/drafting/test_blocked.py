@@ -88,3 +88,14 @@ def test_another_side_goes_up_where_there_is_no_order_with_z(tmp_path: Path) -> 
     assert drafted(over, "-z", ("cup",)).up == "-z, as asked"
     assert "# Up: -z, as with z up" in scenario_text(found, "own", "a test", tmp_path)
     assert [placing.moves for placing in found.order] == [("core",)]
+
+
+def test_a_smaller_part_that_lies_lowest_is_fixed_where_there_is_no_order_with_the_largest(tmp_path: Path) -> None:
+    cup = join(FLOOR, box(10, 25))
+    over = turned(made(tmp_path, cup=(cup, (0, 0, 0)), core=(CORE, (0, 0, 10))), 180, 0, 0)
+    with pytest.raises(NoOrder):
+        drafted(over, "z", ("cup",))
+    found = drafted(over, "z")
+    assert found.fixed == ("core",)
+    assert found.why_fixed.startswith("it lies lowest")
+    assert [placing.moves for placing in found.order] == [("cup",)]
