@@ -88,9 +88,11 @@ def _inside(poses: Poses, a: str, b: str, deep_m: float, files: Mapping[str, Pat
         )
     where = ""
     if drawn is not None:
-        deep_m = drawn.depth_m
         at = pose.apply(np.linalg.inv(poses[a]), drawn.at[None])[0]
         where = f" as drawn, deepest at ({', '.join(f'{round(1e3 * x, 3) + 0.0:g}' for x in at)}) mm of '{a}'"
+        if deep_m > drawn.depth_m + _DEEP_M:
+            where += f" (the convex pieces that stand for them {1e3 * deep_m:.3g} mm)"
+        deep_m = drawn.depth_m
     return (
         f"'{a}' and '{b}' are {1e3 * deep_m:.3g} mm inside each other{where}, and parts are rigid here: a press fit, a "
         "thread, or a pose that is wrong; give them room in the CAD file"
