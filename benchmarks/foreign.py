@@ -197,7 +197,8 @@ def _alone(each: Foreign, mirror: Path, folder: Path, seeds: int, limit_s: int, 
                 file.write(json.dumps({"assembly": each.name, **line}) + "\n")
                 file.flush()
         except Exception as error:  # a failure of ours, and said as one
-            file.write(json.dumps({"assembly": each.name, "failed": f"{type(error).__name__}: {error}"}) + "\n")
+            said = f"{type(error).__name__}: {str(error).splitlines()[0] if str(error) else ''}"
+            file.write(json.dumps({"assembly": each.name, "failed": said}) + "\n")
 
 
 def main() -> None:
