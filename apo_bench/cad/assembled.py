@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.pieces.corners import body_of
 from apo_bench.cad.pieces.misfit import surface_points
+from apo_bench.cad.solids.bodies import body_of
 from apo_bench.cad.solids.raw_solid import RawSolid, SolidPlace
 from apo_bench.geometry import Array, pose
 

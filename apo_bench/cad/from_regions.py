@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.pieces.corners import mesh_of
 from apo_bench.cad.pieces.cutting import Cut
+from apo_bench.cad.solids.bodies import mesh_of
 from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, Region, square_to
 from apo_bench.geometry import Array, Face, RoundFace, sides_of, straightened
 from apo_bench.parts.making.moments import Moments

@@ -9,10 +9,10 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.cad.faces.regions import regions_of
+from apo_bench.cad.drawn_anew import faces_of
 from apo_bench.cad.from_regions import contact_faces, solid_moments
 from apo_bench.cad.meshes.mesh_file import CadFile, read_meshes
-from apo_bench.cad.meshes.shells import closed_solids
+from apo_bench.cad.meshes.shells import CROSSED_A_LITTLE, check_uncrossed, closed_solids
 from apo_bench.cad.pieces.cutting import Cut, cut
 from apo_bench.cad.solids.drawn import keep_drawn
 from apo_bench.cad.solids.naming import with_names
@@ -59,12 +59,15 @@ def raw_solids(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
             return read_step(path, unit)
         file, meshes = read_meshes(path, unit)
         solids = without_copies(raw for name, mesh in meshes for raw in closed_solids(path, name, mesh))
-        return file, [_with_faces(raw) for raw in solids]
+        return file, [_with_faces(path, raw) for raw in solids]
 
 
-def _with_faces(raw: RawSolid) -> RawSolid:
-    regions, facets = regions_of(raw.mesh)
-    return replace(raw, regions=with_names(raw.mesh, regions), facets=facets)
+def _with_faces(path: Path, raw: RawSolid) -> RawSolid:
+    faces = faces_of(raw.mesh)
+    if CROSSED_A_LITTLE in raw.mended and faces.mesh is raw.mesh:
+        check_uncrossed(path, raw.mesh)
+    regions = with_names(faces.mesh, faces.regions)
+    return replace(raw, mesh=faces.mesh, regions=regions, facets=faces.facets, mended=(*raw.mended, *faces.said))
 
 
 def import_part(
@@ -156,8 +159,8 @@ def _as_read(write: Callable[[Body], Path], body: Body, refused: dict[str, str],
             left = [f.name for faces in (body.flats, body.rounds) for f in faces]
             if face is None or face[1] not in left or len(left) == 1:
                 raise InputError(
-                    f"{source}: what the solid was cut into makes no part ({why.split('; ')[0].rstrip('.')}); leave "
-                    "out fillets and free surfaces."
+                    f"{source}: the import fails, by no fault of the file: the pieces that it cuts the solid into "
+                    f"make no part ({why.split('; ')[0].rstrip('.')}); leave out fillets and free surfaces."
                 ) from error
             refused[face[1]] = face[2]
             body = _without(body, refused)

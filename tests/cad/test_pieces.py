@@ -8,9 +8,9 @@ from manifold3d import CrossSection, Manifold
 
 from apo_bench.cad.assembled import coming_near
 from apo_bench.cad.faces.regions import regions_of
-from apo_bench.cad.pieces.corners import mesh_of
 from apo_bench.cad.pieces.cutting import cut
 from apo_bench.cad.pieces.misfit import Misfit, misfit, surface_points
+from apo_bench.cad.solids.bodies import mesh_of
 from apo_bench.cad.solids.naming import with_names
 from apo_bench.cad.solids.raw_solid import RawSolid, SolidPlace
 from apo_bench.geometry import Hull

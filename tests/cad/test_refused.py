@@ -62,13 +62,10 @@ def is_open(folder: Path) -> Path:
 
 
 def crossed(folder: Path) -> Path:
-    both = np.concatenate([triangles(block(20, 20, 20)), triangles(block(10, 10, 40, (3, 2, -7)))])
-    return write_triangles(both, folder / "a.stl")
-
-
-def touching(folder: Path) -> Path:
-    both = np.concatenate([triangles(block(20, 20, 20)), triangles(block(20, 20, 20, (20, 0, 0)))])
-    return write_triangles(both, folder / "a.stl")
+    """A corner of a block is drawn out through the other sides."""
+    given = triangles(block(20, 20, 20))
+    given[(given == (10, 10, 20)).all(axis=2)] = (-15, -14, -7)
+    return write_triangles(given, folder / "a.stl")
 
 
 def huge(folder: Path) -> Path:
@@ -87,7 +84,6 @@ REFUSED: dict[str, tuple[Callable[[Path], Path], str]] = {
     "pipe": (pipe, "a pipe was given"),
     "open": (is_open, "the shell is open: 3 edges"),
     "crossed": (crossed, "the surface crosses itself"),
-    "touching": (touching, "more than two triangles"),
     "huge": (huge, "states no unit, and 3e\\+04 may be"),
     "metres": (in_metres, "states no unit, and 0.03 may be 0.03 mm"),
     "missing": (lambda folder: folder / "a.stl", "cannot be read"),
@@ -125,6 +121,47 @@ def test_a_part_of_a_tenth_of_a_millimetre_is_refused(tmp_path: Path) -> None:
     path = write_stl(block(30, 30, 30), tmp_path / "a.stl", 0.1 / 30)
     with pytest.raises(InputError, match="parts of 1 mm to 2 m are allowed"):
         raw_solids(path, "mm")
+
+
+def shells(*given: Any) -> Any:
+    return np.concatenate([triangles(each) for each in given])
+
+
+def test_shells_that_go_through_each_other_are_united_and_it_is_said(tmp_path: Path) -> None:
+    path = write_triangles(shells(block(20, 20, 20), block(10, 10, 40, (3, 2, -7))), tmp_path / "a.stl")
+    _, (raw,) = raw_solids(path, None)
+    assert raw.mesh.volume == pytest.approx(8000 + 10 * 10 * 20)
+    assert raw.mended == ("2 closed shells that go through each other were united",)
+
+
+@pytest.mark.parametrize("at", [(20, 0, 0), (20, 20, 0), (20, 5, 3)])
+def test_solids_that_touch_stay_two(at: tuple[float, float, float], tmp_path: Path) -> None:
+    _, raws = raw_solids(write_triangles(shells(block(20, 20, 20), block(20, 20, 20, at)), tmp_path / "a.stl"), None)
+    assert [len(raw.places) for raw in raws] == [2]
+    assert raws[0].mesh.volume == pytest.approx(8000)
+
+
+def test_doubled_triangles_and_sheets_are_dropped(tmp_path: Path) -> None:
+    given = triangles(block(20, 20, 20))
+    sheet = np.array([[[30, 0, 0], [40, 0, 0], [40, 30, 0]], [[30, 0, 0], [40, 30, 0], [30, 30, 0]]])
+    both = np.concatenate([given, given[:3], sheet, sheet[:, ::-1]])
+    _, (raw,) = raw_solids(write_triangles(both, tmp_path / "a.stl"), None)
+    assert raw.mesh.volume == pytest.approx(8000)
+    assert raw.mended == ("7 doubled triangles were dropped",)
+
+
+def test_cracks_are_closed_within_a_width_that_is_said(tmp_path: Path) -> None:
+    """Corners that differ from triangle to triangle, and one edge with a corner on its other side only."""
+    given = triangles(block(40, 30, 10) - rod(5, 10))
+    rng = np.random.default_rng(5)
+    a, b, c = given[0]
+    m = (a + b) / 2
+    given = np.concatenate([given[1:], [[a, m, c], [m, b, c]]])
+    path = write_triangles(given + rng.uniform(-3e-5, 3e-5, given.shape), tmp_path / "a.stl")
+    _, (raw,) = raw_solids(path, None)
+    assert raw.mended[0] == "corners and cracks within 0.0004 mm were closed"
+    assert sum(region.kind == "plane" for region in raw.regions) == 6
+    assert dict(import_part(raw, "a", tmp_path, "a.stl").refused) == {}
 
 
 def test_units_are_as_asked(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ _WIDEST = 1.6
 ON_WALL = 1e-5
 """Of the size of a part: corners of a round face are this near to it."""
 _SNAP_RAD = 2e-6
+_FULL_RAD = 1e-6
 
 
 class Round(NamedTuple):
@@ -84,6 +85,8 @@ def refined(start: Round | None, points: Array, cone: bool) -> Round | None:
     slope = 0.0
     radius = float(distance.mean())
     if cone:
+        if not np.ptp(height) or not np.isfinite(height).all():
+            return None
         slope, radius = np.polyfit(height - (middle - start.point) @ start.axis, distance, 1)
 
     def moved(p: Array) -> Round:
@@ -96,7 +99,7 @@ def refined(start: Round | None, points: Array, cone: bool) -> Round | None:
         return np.asarray(moved(p).off(points) / size)
 
     first = [0.0, 0.0, 0.0, 0.0, radius / size, *([slope] if cone else [])]
-    if len(points) < len(first):
+    if len(points) < len(first) or not np.isfinite(off(np.array(first))).all():
         return None
     solved = least_squares(off, first, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=200)
     fitted = moved(solved.x)
@@ -198,6 +201,26 @@ def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: f
         turn=turn,
         square=turn == WHOLE_TURN and bool(ends.max(initial=0.0) < 2.0 * FLAT * mesh.extent + 1e-9 and on.all()),
     )
+
+
+def turn_of(mesh: Mesh, triangles: Any, wall: Round) -> float:
+    """How far around its axis a wall reaches, as its triangles lie there, [rad]."""
+    x, y = square_to(wall.axis)
+    _, distance, out = wall.polar(mesh.corners[mesh.triangles[triangles]].reshape(-1, 3))
+    angle = np.arctan2(out @ y, out @ x).reshape(-1, 3)
+    # Each triangle from its lowest to its highest angle, seen from one of its corners; one on the axis has no angle.
+    sound = (distance > 1e-6 * distance.max()).reshape(-1, 3)
+    first = angle[np.arange(len(angle)), sound.argmax(axis=1)]
+    off = np.where(sound, (angle - first[:, None] + np.pi) % WHOLE_TURN - np.pi, 0.0)
+    low = (first + off.min(axis=1)) % WHOLE_TURN
+    order = np.argsort(low)
+    high = (low + off.max(axis=1) - off.min(axis=1))[order]
+    low = low[order]
+    # Gaps between the farthest angle that was reached so far and the next lowest one, around the turn.
+    reach = np.maximum.accumulate(high)
+    gaps = np.append(low[1:], low[0] + WHOLE_TURN) - np.maximum(reach, reach[-1] - WHOLE_TURN)
+    widest = float(gaps.max())
+    return WHOLE_TURN if widest < _FULL_RAD else WHOLE_TURN - widest
 
 
 def _snapped(n: Array) -> Array:

@@ -1,19 +1,26 @@
-"""Meshes become closed solids that are the right way round: corners joined, shells told apart, none crosses itself."""
+"""Closed meshes become solids that are the right way round: shells told apart, those that cross united."""
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import NoReturn
 
 import numpy as np
 
+from apo_bench.cad.meshes.closing import closed, triangles_of_edges
+from apo_bench.cad.meshes.crossings import crossings
+from apo_bench.cad.solids.bodies import body_of, mesh_of
 from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, SolidPlace, connected, put_together
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
 
-_SAME_CORNER = 1e-7
-"""Corners are one within this part of the size."""
 _MOST_SHELLS = 200
 _PROBES = 12
+_THINNEST = 1e-6
+"""Volume over twice the area, in parts of the size: what is thinner is a sheet."""
+NO_SOLID = "the triangles make no solid; save the part as a closed mesh."
+ROUGH_MM = 0.1
+CROSSED_A_LITTLE = f"it crosses itself by less than {ROUGH_MM:g} mm"
+"""That is noise where the mesh is drawn anew, and refused elsewhere."""
 INSIDE_OUT = "it was inside out, and was turned"
 
 
@@ -21,57 +28,26 @@ def closed_solids(path: Path, name: str, mesh: Mesh) -> Iterator[RawSolid]:
     """The solids of one mesh of a file.
 
     Raises:
-        InputError: A shell is open, or crosses itself or another one.
+        InputError: A shell is open, or crosses itself.
     """
-    mesh, mended = _joined(mesh)
+    mesh, mended = closed(mesh)
     check_closed(path, mesh)
     turned = _alike(path, mesh)
     if turned is not mesh:
         mended = (*mended, "triangles that looked the other way than their neighbours were turned")
-    check_uncrossed(path, turned)
-    solids = _apart(path, turned)
+    whole, united = _united(path, turned)
+    mended = (*mended, *united)
+    solids = _apart(path, whole)
     for i, (solid, flipped) in enumerate(solids, start=1):
         own_name = name if len(solids) == 1 else f"{name}_{i}"
         yield RawSolid(own_name, solid, (SolidPlace(own_name, np.eye(4)),), (*mended, *([INSIDE_OUT] * flipped)))
 
 
-def _joined(mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
-    """With corners in one place as one, and without triangles that are none then."""
-    corners, index = np.unique(mesh.corners, axis=0, return_inverse=True)
-    exact = _without_slivers(corners, index.ravel()[mesh.triangles])
-    if _is_closed(exact):
-        return exact, ()
-    grid = max(_SAME_CORNER * mesh.extent, 1e-9)
-    rounded, index = np.unique(np.round(mesh.corners / grid), axis=0, return_inverse=True)
-    near = _without_slivers(rounded * grid, index.ravel()[mesh.triangles])
-    return (near, (f"corners within {grid:.1g} mm were joined",)) if _is_closed(near) else (exact, ())
-
-
-def _without_slivers(corners: Array, triangles: Any) -> Mesh:
-    """A mesh without triangles that have one corner twice."""
-    return Mesh(corners, triangles[has_three(triangles)])
-
-
-def has_three(triangles: Any) -> Any:
-    """Which triangles, (t, 3), have three different corners."""
-    a, b, c = triangles.T
-    return (a != b) & (b != c) & (c != a)
-
-
-def _triangles_of_edges(mesh: Mesh) -> Any:
-    """How many triangles each edge has."""
-    return np.unique(np.sort(mesh.sides, axis=1), axis=0, return_counts=True)[1]
-
-
-def _is_closed(mesh: Mesh) -> bool:
-    return bool(len(mesh.triangles)) and bool((_triangles_of_edges(mesh) == 2).all())
-
-
 def check_closed(path: Path, mesh: Mesh) -> None:
     """Raise an `InputError` unless every edge has two triangles."""
     if len(mesh.triangles) < 4:
-        raise InputError(f"{path}: the triangles make no solid; save the part as a closed mesh.")
-    counts = _triangles_of_edges(mesh)
+        raise InputError(f"{path}: {NO_SOLID}")
+    counts = triangles_of_edges(mesh)
     if (counts == 1).any():
         raise InputError(
             f"{path}: the shell is open: {(counts == 1).sum():,} edges have a triangle on one side only; close it "
@@ -90,10 +66,13 @@ def check_uncrossed(path: Path, mesh: Mesh, off: Array | None = None) -> None:
     Args:
         off: How far each triangle may be from the surface that it stands for, (t,), [mm].
     """
-    where = crossing(mesh, off)
-    if where is not None:
-        at = ", ".join(f"{x:.4g}" for x in where)
-        raise InputError(f"{path}: the surface crosses itself at ({at}) mm; mend it where it was drawn.")
+    for _, where in crossings(mesh, off):
+        _refuse_crossing(path, where[0])
+
+
+def _refuse_crossing(path: Path, where: Array) -> NoReturn:
+    at = ", ".join(f"{x:.4g}" for x in where)
+    raise InputError(f"{path}: the surface crosses itself at ({at}) mm; mend it where it was drawn.")
 
 
 def _alike(path: Path, mesh: Mesh) -> Mesh:
@@ -116,12 +95,56 @@ def _alike(path: Path, mesh: Mesh) -> Mesh:
     return Mesh(mesh.corners, np.where((as_is < turned)[:, None], mesh.triangles, mesh.triangles[:, ::-1]))
 
 
+def _united(path: Path, mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
+    """With shells that cross each other as one; and what is said of that.
+
+    Raises:
+        InputError: A shell crosses itself, or looks outwards where the one that it crosses looks inwards.
+    """
+    import manifold3d
+
+    found = [*crossings(mesh)]
+    if not found:
+        return mesh, ()
+    count, owner = connected(mesh.neighbours, len(mesh.triangles))
+    pairs = owner[np.concatenate([pair for pair, _ in found])]
+    where = np.concatenate([at for _, at in found])
+    sign = np.sign([mesh.part(np.flatnonzero(owner == shell)).volume for shell in range(count)])
+    alone = pairs[:, 0] == pairs[:, 1]
+    ambiguous = sign[pairs[:, 0]] != sign[pairs[:, 1]]
+    said = []
+    if alone.any():
+        deep = [owner[pair] for pair, _ in crossings(mesh, np.full(len(mesh.triangles), ROUGH_MM / 2.0))]
+        if any((shells == shells[:, :1]).all(axis=1).any() for shells in deep):
+            ambiguous |= alone
+        said = [CROSSED_A_LITTLE]
+    if ambiguous.any():
+        _refuse_crossing(path, where[ambiguous][0])
+    pairs = pairs[~alone]
+    if not len(pairs):
+        return mesh, tuple(said)
+    _, cluster = connected(pairs, count)
+    shells = []
+    for group in np.unique(cluster):
+        each = [mesh.part(np.flatnonzero(owner == shell)) for shell in np.flatnonzero(cluster == group)]
+        if len(each) > 1:
+            outwards = (shell if shell.volume > 0.0 else shell.flipped() for shell in each)
+            each = [mesh_of(manifold3d.Manifold.batch_boolean([body_of(s) for s in outwards], manifold3d.OpType.Add))]
+        shells += each
+    crossed = len(np.unique(pairs))
+    return put_together(shells), (*said, f"{crossed} closed shells that go through each other were united")
+
+
 def _apart(path: Path, mesh: Mesh) -> list[tuple[Mesh, bool]]:
     """Its solids, with their cavities, in the order of the file; whether each was inside out."""
     count, owner = connected(mesh.neighbours, len(mesh.triangles))
     if count > _MOST_SHELLS:
         raise InputError(f"{path}: the file holds {count} shells; {_MOST_SHELLS} are the most, so split it.")
     shells = [mesh.part(np.flatnonzero(owner == shell)) for shell in range(count)]
+    shells = [shell for shell in shells if _is_solid(shell)]
+    if not shells:
+        raise InputError(f"{path}: {NO_SOLID}")
+    count = len(shells)
     around = [{i for i, outer in enumerate(shells) if i != k and _contains(outer, shells[k])} for k in range(count)]
     # In an even number of others a shell is the outside of a solid, and looks outwards; those just inside of it are its
     # cavities, in an odd number.
@@ -131,6 +154,11 @@ def _apart(path: Path, mesh: Mesh) -> list[tuple[Mesh, bool]]:
         cavities = [right[m] for m in range(count) if k in around[m] and len(around[m]) == len(around[k]) + 1]
         solids.append((put_together([right[k], *cavities]), shells[k].volume < 0.0))
     return solids
+
+
+def _is_solid(shell: Mesh) -> bool:
+    """Whether there is room inside: a sheet of two sides has none."""
+    return abs(shell.volume) > _THINNEST * shell.extent * float(np.linalg.norm(shell.across, axis=1).sum())
 
 
 def _contains(shell: Mesh, inner: Mesh) -> bool:
@@ -151,90 +179,3 @@ def _is_inside(shell: Mesh, point: Array) -> bool:
     above = (a * np.cross(b, c)).sum(axis=1)
     below = x * y * z + (a * b).sum(axis=1) * z + (b * c).sum(axis=1) * x + (c * a).sum(axis=1) * y
     return bool(abs(np.arctan2(above, below).sum()) > np.pi)
-
-
-_AT_ONCE = 200_000
-_OF_TWO = np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
-_INSIDE = 1e-6
-"""Crossings nearer to an edge than this part of a triangle are touches."""
-
-
-def crossing(mesh: Mesh, off: Array | None = None) -> Array | None:
-    """A point, (3,), at which two triangles without a common corner cross; None if none do.
-
-    Args:
-        off: How far each triangle may be from the surface that it stands for, (t,): triangles that cross by no more
-            than that of both say nothing of the surfaces.
-    """
-    tolerance = 1e-6 * mesh.extent
-    for pairs in _near(mesh):
-        a, b = mesh.triangles[pairs.T]
-        apart = (a[:, :, None] != b[:, None, :]).all(axis=(1, 2))
-        least = np.full(int(apart.sum()), tolerance) + (0.0 if off is None else off[pairs[apart]].sum(axis=1))
-        for edges, sheets in ((a[apart], b[apart]), (b[apart], a[apart])):
-            where = _through(mesh.corners[edges], mesh.corners[sheets], least)
-            if where is not None:
-                return where
-    return None
-
-
-def _near(mesh: Mesh) -> Iterator[Any]:
-    """Pairs of triangles whose boxes overlap, (p, 2), some at a time."""
-    from scipy.spatial import cKDTree
-
-    points = mesh.corners[mesh.triangles]
-    low = points.min(axis=1)
-    high = points.max(axis=1)
-    order = cKDTree((low + high) / 2.0, leafsize=1).indices  # that keeps neighbours together
-    # A box is its lowest corner and minus its highest one, (6,), so the box around two boxes is their minimum.
-    levels = int(np.ceil(np.log2(max(len(order), 2))))
-    leaves = np.full((1 << levels, 6), np.inf)
-    leaves[: len(order)] = np.hstack([low, -high])[order]
-    tree = [leaves]
-    for _ in range(levels):
-        tree.append(np.minimum(tree[-1][::2], tree[-1][1::2]))
-    # From the root down, each pair of boxes that overlap is opened into the four pairs of what is in them.
-    open_pairs = [(levels, np.zeros((1, 2), dtype=np.int64))]
-    while open_pairs:
-        level, pairs = open_pairs.pop()
-        if level == 0:
-            yield order[pairs[pairs[:, 0] < pairs[:, 1]]]
-            continue
-        every = np.concatenate([2 * pairs + off for off in _OF_TWO])
-        every = every[every[:, 0] <= every[:, 1]]
-        i, k = tree[level - 1][every.T]
-        every = every[((i[:, :3] <= -k[:, 3:]) & (k[:, :3] <= -i[:, 3:])).all(axis=1)]
-        open_pairs += [(level - 1, every[first : first + _AT_ONCE]) for first in range(0, len(every), _AT_ONCE)]
-
-
-def _through(a: Array, b: Array, tolerance: Array) -> Array | None:
-    """Where an edge of a triangle goes through the inside of another one; both (p, 3, 3).
-
-    Args:
-        tolerance: What is nearer only touches, (p,).
-    """
-    # Heights of the corners of a over the plane of b; an edge goes through where they have different signs.
-    n = np.cross(b[:, 1] - b[:, 0], b[:, 2] - b[:, 0])
-    size = np.linalg.norm(n, axis=1)
-    n = n / np.maximum(size, 1e-300)[:, None]
-    height = ((a - b[:, :1]) * n[:, None]).sum(axis=2)
-    above = height > tolerance[:, None]
-    below = height < -tolerance[:, None]
-    for i in range(3):
-        k = (i + 1) % 3
-        through = ((above[:, i] & below[:, k]) | (below[:, i] & above[:, k])) & (size > tolerance**2)
-        if not through.any():
-            continue
-        start = a[through, i]
-        share = height[through, i] / (height[through, i] - height[through, k])
-        x = start + share[:, None] * (a[through, k] - start)
-        # x is inside of b if it is left of each of its edges, seen against n: (edge x (x - corner)) . n is the length
-        # of the edge times the distance from it.
-        corners = b[through]
-        edges = np.roll(corners, -1, axis=1) - corners
-        left = (np.cross(edges, x[:, None] - corners) * n[through][:, None]).sum(axis=2)
-        margin = tolerance[through][:, None] * np.linalg.norm(edges, axis=2)
-        inside = (left > _INSIDE * size[through][:, None] + margin).all(axis=1)
-        if inside.any():
-            return np.asarray(x[inside][0])
-    return None

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.solids.raw_solid import SAME_CORNER_MM, Mesh, square_to
+from apo_bench.cad.solids.raw_solid import SAME_CORNER_MM, square_to
 from apo_bench.geometry import Array, Hull
 
 _MOST_CORNERS = 600
@@ -35,20 +35,6 @@ def corners_of(body: Any) -> Array:
     """Of a body of manifold3d, (k, 3)."""
     raw = body.to_mesh64()
     return np.asarray(raw.vert_properties)[np.unique(np.asarray(raw.tri_verts)), :3].astype(np.float64)
-
-
-def mesh_of(body: Any) -> Mesh:
-    """Of a body of manifold3d."""
-    raw = body.to_mesh64()
-    return Mesh(np.asarray(raw.vert_properties)[:, :3], np.asarray(raw.tri_verts).astype(np.int64))
-
-
-def body_of(mesh: Mesh) -> Any:
-    """A closed mesh as manifold3d has it."""
-    import manifold3d
-
-    triangles = np.array(mesh.triangles, dtype=np.uint64, order="C")
-    return manifold3d.Manifold(manifold3d.Mesh64(np.array(mesh.corners, dtype=np.float64, order="C"), triangles))
 
 
 def extremes(points: Array, flats: Array, cuts: Array = _NO_PLANES, is_near: bool = False) -> Array:

@@ -4,10 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.cad.pieces.corners import body_of, corners_of, extremes, is_thick, without_near
+from apo_bench.cad.pieces.corners import corners_of, extremes, is_thick, without_near
 from apo_bench.cad.pieces.halving import at_shoulders, convex_parts, settled
 from apo_bench.cad.pieces.refining import Beside
 from apo_bench.cad.pieces.round_walls import as_cylinders, bored, least_pieces, with_round_shafts
+from apo_bench.cad.solids.bodies import body_of
 from apo_bench.cad.solids.raw_solid import RawSolid
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Hull

@@ -5,9 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.pieces.corners import corners_of, mesh_of
+from apo_bench.cad.pieces.corners import corners_of
 from apo_bench.cad.pieces.cut_part import CutPart
 from apo_bench.cad.pieces.refining import Beside, refined
+from apo_bench.cad.solids.bodies import mesh_of
 from apo_bench.cad.solids.raw_solid import Region
 from apo_bench.geometry import Array
 

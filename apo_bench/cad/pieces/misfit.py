@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.cad.pieces.corners import body_of
+from apo_bench.cad.solids.bodies import body_of
 from apo_bench.cad.solids.raw_solid import Mesh
 from apo_bench.geometry import Array, Hull
 

@@ -13,9 +13,10 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.cad.pieces.corners import LEFT_MM, mesh_of, reduced
+from apo_bench.cad.pieces.corners import LEFT_MM, reduced
 from apo_bench.cad.pieces.cut_part import CutPart
 from apo_bench.cad.pieces.misfit import depths
+from apo_bench.cad.solids.bodies import mesh_of
 from apo_bench.cad.solids.raw_solid import Mesh, square_to
 from apo_bench.geometry import Array
 

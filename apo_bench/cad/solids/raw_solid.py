@@ -68,6 +68,12 @@ class Mesh:
         """The corners of these edges, (e, 2)."""
         return self.sides[self.twins[:, 0]]
 
+    @cached_property
+    def is_closed(self) -> bool:
+        """Whether each edge is beside two triangles."""
+        counts = np.unique(np.sort(self.sides, axis=1), axis=0, return_counts=True)[1]
+        return len(self.triangles) > 3 and bool((counts == 2).all())
+
     def part(self, triangles: Any) -> "Mesh":
         """The mesh of some of the triangles, with the corners that they use, in their order."""
         used, index = np.unique(self.triangles[triangles], return_inverse=True)

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from apo_bench.cad.faces.facets import facets_of
-from apo_bench.cad.faces.fitting import Round, border_of, plane_region, round_region
-from apo_bench.cad.meshes.shells import INSIDE_OUT, check_closed, check_uncrossed, has_three
+from apo_bench.cad.faces.fitting import Round, border_of, plane_region, round_region, turn_of
+from apo_bench.cad.meshes.closing import has_three
+from apo_bench.cad.meshes.shells import INSIDE_OUT, check_closed, check_uncrossed
 from apo_bench.cad.solids.naming import with_names
 from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, Region, connected, put_together, square_to
 from apo_bench.cad.step.surfaces import TRIANGLES_RAD, BrepFace, BrepSolid, Flat, Wall, is_same, surface_of
@@ -18,7 +19,6 @@ from apo_bench.parts.making.moments import Moments
 
 _SAME_CORNER = 1e-7
 """Corners nearer to each other than this part of the size are one."""
-_FULL_RAD = 1e-6
 _LEVEL = 1e-6
 _SAME_RAD = 1e-5
 _FEWEST = 6
@@ -98,7 +98,7 @@ def _in_strips(mesh: Mesh, owner: Any, surfaces: list[Flat | Wall | None]) -> tu
     owner_of_added = [owner[:0]]
     for k, wall in enumerate(surfaces):
         triangles = np.flatnonzero(owner == k)
-        if not isinstance(wall, Wall) or not len(triangles) or _turn(mesh, triangles, wall) < WHOLE_TURN:
+        if not isinstance(wall, Wall) or not len(triangles) or turn_of(mesh, triangles, wall.surface) < WHOLE_TURN:
             continue
         strips = _wall_strips(mesh, triangles, wall.surface)
         if strips is not None:
@@ -118,27 +118,7 @@ def _region(mesh: Mesh, triangles: Any, surface: Flat | Wall | None) -> Region:
         return plane_region(mesh, triangles, sign * surface.normal, surface.point)
     _, _, out = surface.surface.polar(mesh.corners[mesh.triangles[triangles]].mean(axis=1))
     hole = bool((across * out).sum() < 0.0)
-    return round_region(mesh, triangles, surface.surface, hole, _turn(mesh, triangles, surface))
-
-
-def _turn(mesh: Mesh, triangles: Any, wall: Wall) -> float:
-    """How far around its axis a wall reaches, as its triangles lie there, [rad]."""
-    x, y = square_to(wall.surface.axis)
-    _, distance, out = wall.surface.polar(mesh.corners[mesh.triangles[triangles]].reshape(-1, 3))
-    angle = np.arctan2(out @ y, out @ x).reshape(-1, 3)
-    # Each triangle from its lowest to its highest angle, seen from one of its corners; one on the axis has no angle.
-    sound = (distance > 1e-6 * distance.max()).reshape(-1, 3)
-    first = angle[np.arange(len(angle)), sound.argmax(axis=1)]
-    off = np.where(sound, (angle - first[:, None] + np.pi) % WHOLE_TURN - np.pi, 0.0)
-    low = (first + off.min(axis=1)) % WHOLE_TURN
-    order = np.argsort(low)
-    high = (low + off.max(axis=1) - off.min(axis=1))[order]
-    low = low[order]
-    # Gaps between the farthest angle that was reached so far and the next lowest one, around the turn.
-    reach = np.maximum.accumulate(high)
-    gaps = np.append(low[1:], low[0] + WHOLE_TURN) - np.maximum(reach, reach[-1] - WHOLE_TURN)
-    widest = float(gaps.max())
-    return WHOLE_TURN if widest < _FULL_RAD else WHOLE_TURN - widest
+    return round_region(mesh, triangles, surface.surface, hole, turn_of(mesh, triangles, surface.surface))
 
 
 def _wall_strips(mesh: Mesh, triangles: Any, surface: Round) -> Any:

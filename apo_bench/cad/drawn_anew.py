@@ -1,0 +1,88 @@
+"""When a mesh is drawn anew: where its faces have corners inside of them, or are hidden by noise, [mm]."""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from apo_bench.cad.faces.facets import facets_of
+from apo_bench.cad.faces.fitting import border_of
+from apo_bench.cad.faces.parallel import regular
+from apo_bench.cad.faces.redrawing import redrawn
+from apo_bench.cad.faces.regions import regions_of
+from apo_bench.cad.faces.rough import patches_of, rough_of
+from apo_bench.cad.meshes.crossings import crossings
+from apo_bench.cad.solids.bodies import body_of, mesh_of
+from apo_bench.cad.solids.raw_solid import Mesh, Region
+
+_EXACT = 1e-6
+"""Corners this near to a flat piece, in parts of the size, are left out of it."""
+_NEAR_MM = (0.045, 0.1, 0.2)
+_NEAREST = 4e-3
+"""How far corners may be off their faces: the first of these with which nearly all of the surface is faces, and no more
+than this part of the size."""
+_ALL = 0.998
+_MORE = 0.005
+"""A mesh is drawn anew if that makes so much more of its surface faces."""
+_VOLUME = 0.02
+"""... and changes its volume by no more than this part."""
+
+
+class Faces(NamedTuple):
+    """A mesh and its faces."""
+
+    mesh: Mesh
+    regions: tuple[Region, ...]
+    facets: Any
+    said: tuple[str, ...] = ()
+
+
+def faces_of(mesh: Mesh) -> Faces:
+    """The faces of a closed mesh as it is, or of one drawn anew if more of the surface is faces then."""
+    as_is = Faces(mesh, *regions_of(mesh))
+    share = _share(as_is)
+    if share > _ALL:
+        return as_is
+    best = as_is
+    body = body_of(mesh)
+    plain = mesh_of(body.simplify(_EXACT * mesh.extent)) if body.num_tri() == len(mesh.triangles) else mesh
+    if _is_sound(plain, mesh) and len(plain.triangles) < 0.9 * len(mesh.triangles):
+        fewer = Faces(
+            plain, *regions_of(plain), (f"{len(mesh.triangles) - len(plain.triangles):,} triangles were merged",)
+        )
+        if _share(fewer) > share + _MORE:
+            share = _share(fewer)
+            best = fewer
+    for near in _NEAR_MM:
+        if share > _ALL or near > _NEAREST * mesh.extent:
+            break
+        rough = rough_of(mesh, near)
+        drawn = redrawn(rough, regular(rough, patches_of(rough)))
+        if drawn is None or not _is_sound(drawn.mesh, mesh):
+            continue
+        said = (
+            f"it was drawn anew, as corners are up to {near:g} mm off its faces: {len(mesh.triangles):,} triangles "
+            f"became {len(drawn.mesh.triangles):,}, and corners moved by {drawn.moved:.2g} mm at most"
+        )
+        anew = Faces(drawn.mesh, drawn.regions, facets_of(drawn.mesh).of, (said,))
+        if _share(anew) > share + _MORE:
+            share = _share(anew)
+            best = anew
+    return best
+
+
+def _is_sound(new: Mesh, old: Mesh) -> bool:
+    """Whether a mesh is closed, does not cross itself, and stands for the same solid."""
+    return new.is_closed and abs(new.volume - old.volume) < _VOLUME * old.volume and next(crossings(new), None) is None
+
+
+def _share(faces: Faces) -> float:
+    """How much of the surface is faces that can be stated: flat ones, and round ones without corners inside."""
+    areas = np.linalg.norm(faces.mesh.across, axis=1)
+    good = (r.triangles for r in faces.regions if r.kind == "plane" or (r.is_round and _is_plain(faces.mesh, r)))
+    return float(sum(areas[triangles].sum() for triangles in good) / areas.sum())
+
+
+def _is_plain(mesh: Mesh, wall: Region) -> bool:
+    corners = np.unique(mesh.triangles[wall.triangles])
+    inner = np.setdiff1d(corners, border_of(mesh, wall.triangles))
+    return (wall.square or not wall.is_whole) and len(inner) <= 1

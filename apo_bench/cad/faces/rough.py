@@ -1,0 +1,308 @@
+"""Faces of a mesh whose corners are a little off, or anywhere on its faces: remeshed, noisy and decimated ones, [mm].
+
+Here a triangle lies on a surface if its corners are near to it, however it is turned by that.
+"""
+
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from apo_bench.cad.faces.facets import SMOOTH_RAD
+from apo_bench.cad.faces.fitting import Round, axis_of, circle_through, refined
+from apo_bench.cad.solids.raw_solid import Mesh, connected
+from apo_bench.geometry import Array
+
+_WEAK = 4.0
+"""The normal of a triangle that is less high than so many distances says nothing."""
+_WHOLE = 0.995
+"""So much of a smooth part of a surface is on one face if all of it is."""
+_SPREAD = 0.45
+"""Corners of a face are nearer to it than this part of what is allowed, root mean square; those of a band that was
+grown on a free surface are not."""
+_TURNED_RAD = 0.6
+_SEEDS = 3
+_BALLS = (12, 48, 192)
+"""With how many triangles a face begins."""
+_MOST_FAILED = 5
+_LEAST = 2e-4
+"""Faces are no smaller than this part of the surface."""
+_FLATTEST = 5.0
+"""No wall has a radius so much larger than the part."""
+_LEAST_SLOPE = 0.02
+
+
+class Plane(NamedTuple):
+    """A flat surface."""
+
+    normal: Array
+    offset: float
+
+    def off(self, points: Array) -> Array:
+        """How far points are above it, (k,)."""
+        return np.asarray(points @ self.normal - self.offset)
+
+
+def normals_at(surface: Plane | Round, points: Array) -> Array:
+    """Outward normals of a surface under points, (k, 3)."""
+    return surface.normals(surface.polar(points)[2]) if isinstance(surface, Round) else surface.normal
+
+
+class Patch(NamedTuple):
+    """Triangles on one surface."""
+
+    surface: Plane | Round | None
+    """None: neither flat nor round."""
+    triangles: Any
+    hole: bool = False
+
+
+class Rough(NamedTuple):
+    """A mesh and what is asked of it again and again."""
+
+    mesh: Mesh
+    near: float
+    """How far corners may be off a face."""
+    normals: Array
+    weak: Any
+    areas: Array
+    middles: Array
+    smooth: Any
+    """Pairs of triangles, (s, 2)."""
+
+    def points(self, triangles: Any) -> Array:
+        return self.mesh.corners[np.unique(self.mesh.triangles[triangles])]
+
+
+def rough_of(mesh: Mesh, near: float) -> Rough:
+    """Normals of narrow triangles are those of the neighbours across their longest edges."""
+    size = np.linalg.norm(mesh.across, axis=1)
+    normals = mesh.across / np.maximum(size, 1e-300)[:, None]
+    own = mesh.neighbours.T.ravel()
+    other = mesh.neighbours[:, ::-1].T.ravel()
+    length = np.tile(np.linalg.norm(mesh.corners[mesh.edges[:, 0]] - mesh.corners[mesh.edges[:, 1]], axis=1), 2)
+    longest = np.zeros(len(size))
+    np.maximum.at(longest, own, length)
+    high = size / np.maximum(longest, 1e-300)
+    weak = high < _WEAK * near
+    take = weak[own] & (length > longest[own] * (1.0 - 1e-9)) & (high[other] > 1.5 * high[own])
+    for _ in range(4):
+        normals[own[take]] = normals[other[take]]
+    i, k = mesh.neighbours.T
+    smooth = mesh.neighbours[(normals[i] * normals[k]).sum(axis=1) > np.cos(SMOOTH_RAD)]
+    middles = mesh.corners[mesh.triangles].mean(axis=1)
+    return Rough(mesh, near, normals, weak, size / 2.0, middles, smooth)
+
+
+def patches_of(rough: Rough) -> list[Patch]:
+    """The surface as faces, and what is none of them."""
+    count, of = connected(rough.smooth, len(rough.areas))
+    order = np.argsort(of, kind="stable")
+    groups = np.split(order, np.cumsum(np.bincount(of, minlength=count))[:-1])
+    patches = [patch for group in groups for patch in _patches_in(rough, group)]
+    return _together(rough, _at_nearest(rough, patches))
+
+
+def _patches_in(rough: Rough, group: Any) -> Iterator[Patch]:
+    """Faces in a smooth part of the surface: one that is all of it, or the largest ones that grow from seeds."""
+    total = rough.areas[group].sum()
+    for kind in ("plane", "cylinder", "cone"):
+        surface = _fitted(rough, kind, group)
+        if surface is not None:
+            mine, hole = _on(rough, surface, group)
+            if rough.areas[mine].sum() > _WHOLE * total:
+                yield Patch(surface, group, hole)
+                return
+    least = _LEAST * rough.areas.sum()
+    left = group
+    free = [group[:0]]
+    failed = 0
+    while rough.areas[left].sum() > least and failed < _MOST_FAILED:
+        best = _largest(rough, left)
+        if best is not None and rough.areas[best.triangles].sum() > least and _is_tight(rough, best):
+            yield best
+            gone = best.triangles
+            failed = 0
+        else:
+            gone = _balls(rough, left, int(left[rough.areas[left].argmax()]))[0]
+            free.append(gone)
+            failed += 1
+        left = np.setdiff1d(left, gone)
+    rest = np.sort(np.concatenate([*free, left]))
+    if len(rest):
+        yield Patch(None, rest)
+
+
+def _is_tight(rough: Rough, patch: Patch) -> bool:
+    off = patch.surface.off(rough.points(patch.triangles)) if patch.surface is not None else np.ones(1)
+    return float(np.sqrt((off**2).mean())) < _SPREAD * rough.near
+
+
+def _largest(rough: Rough, left: Any) -> Patch | None:
+    """The face of the largest area that grows from any of some seeds."""
+    order = left[np.argsort(-rough.areas[left], kind="stable")]
+    best = None
+    most = 0.0
+    for seed in order[np.linspace(0, len(order) - 1, _SEEDS).astype(int)].tolist():
+        for ball in _balls(rough, left, seed):
+            grown = next(
+                (p for kind in ("plane", "cylinder", "cone") if (p := _grown(rough, kind, ball, left, seed))), None
+            )
+            area = 0.0 if grown is None else float(rough.areas[grown.triangles].sum())
+            if area > most and grown is not None and _is_tight(rough, grown):
+                most = area
+                best = grown
+        if most > 0.5 * rough.areas[left].sum():
+            break
+    return best
+
+
+def _balls(rough: Rough, left: Any, seed: int) -> list[Any]:
+    """The nearest triangles to one that look about the same way, in growing numbers."""
+    alike = left[rough.normals[left] @ rough.normals[seed] > 0.5]
+    order = alike[np.argsort(((rough.middles[alike] - rough.middles[seed]) ** 2).sum(axis=1), kind="stable")]
+    sizes = [n for n in _BALLS if n < len(order)]
+    return [order[:n] for n in [*sizes, len(order)][: len(_BALLS)]] or [np.array([seed])]
+
+
+def _grown(rough: Rough, kind: str, ball: Any, left: Any, seed: int) -> Patch | None:
+    """The face that begins with some triangles: in turns what is on it, and what is nearest to that."""
+    surface = _fitted(rough, kind, ball)
+    if surface is None or np.quantile(np.abs(surface.off(rough.points(ball))), 0.9) > rough.near:
+        return None
+    count = 0
+    for _ in range(8):
+        mine, hole = _on(rough, surface, left)
+        mine = _with_seed(rough, mine, seed)
+        if len(mine) < 2:
+            return None
+        if len(mine) == count:
+            break
+        count = len(mine)
+        better = _fitted(rough, kind, mine, surface)
+        if better is None:
+            break
+        surface = better
+    return Patch(surface, mine, hole)
+
+
+def _with_seed(rough: Rough, members: Any, seed: int) -> Any:
+    """Those, ascending, that hang together with a seed."""
+    members = np.sort(members)
+    at = int(np.searchsorted(members, seed))
+    if at == len(members) or members[at] != seed:
+        return members[:0]
+    pairs = rough.smooth[np.isin(rough.smooth, members).all(axis=1)]
+    _, group = connected(np.searchsorted(members, pairs), len(members))
+    return members[group == group[at]]
+
+
+def _fitted(rough: Rough, kind: str, triangles: Any, before: Plane | Round | None = None) -> Plane | Round | None:
+    """The surface nearest to triangles."""
+    points = rough.points(triangles)
+    if kind == "plane":
+        n = rough.mesh.across[triangles].sum(axis=0)
+        size = float(np.linalg.norm(n))
+        if size < 1e-300:
+            return None
+        n = n / size
+        return Plane(n, float((points @ n).mean()))
+    start = before if isinstance(before, Round) else None
+    if start is None:
+        strong = triangles[~rough.weak[triangles]]
+        strong = strong if len(strong) > 8 else triangles
+        if len(strong) < 4:
+            return None
+        start = circle_through(points, axis_of(rough.normals[strong], kind == "cone"))
+    wall = (
+        refined(start, points, kind == "cone") if start is not None and start.radius < 1e3 * rough.mesh.extent else None
+    )
+    is_wall = wall is not None and wall.radius < _FLATTEST * rough.mesh.extent
+    return wall if wall is not None and is_wall and (kind != "cone" or abs(wall.slope) > _LEAST_SLOPE) else None
+
+
+def _on(rough: Rough, surface: Plane | Round, among: Any) -> tuple[Any, bool]:
+    """Which triangles are on a surface, and whether it is a hole."""
+    mine = among[(np.abs(_off(rough, surface, among)) <= rough.near).all(axis=1)]
+    facing = _facing(rough, surface, mine)
+    hole = bool((np.sign(facing) * rough.areas[mine]).sum() < 0.0) and isinstance(surface, Round)
+    good = (-facing if hole else facing) > np.cos(_TURNED_RAD)
+    return mine[good | rough.weak[mine]], hole
+
+
+def _off(rough: Rough, surface: Plane | Round, triangles: Any) -> Array:
+    """Of the corners of triangles, (t, 3)."""
+    return surface.off(rough.mesh.corners[rough.mesh.triangles[triangles].ravel()]).reshape(-1, 3)
+
+
+def _facing(rough: Rough, surface: Plane | Round, triangles: Any) -> Array:
+    """Cosine of the angle between triangles and the surface under them, (t,)."""
+    n = normals_at(surface, rough.middles[triangles])
+    return np.asarray((rough.normals[triangles] * n).sum(axis=1))
+
+
+def _at_nearest(rough: Rough, patches: list[Patch]) -> list[Patch]:
+    """With triangles between faces that go over into each other smoothly on the one that they are nearer to."""
+    owner = np.full(len(rough.areas), -1)
+    for k, patch in enumerate(patches):
+        owner[patch.triangles] = k
+    pairs = rough.mesh.neighbours
+    sizes = np.bincount(owner, rough.areas, len(patches)) / rough.areas.sum()
+    free = np.array([p.surface is None for p in patches])
+    is_weak = np.array([bool(rough.weak[p.triangles].all()) for p in patches])
+    stray = free | (sizes < np.where(is_weak, 50.0 * _LEAST, _LEAST))
+    key = len(owner)
+    is_smooth = np.tile(np.isin(pairs @ [key, 1], rough.smooth @ [key, 1]), 2)
+    for _ in range(6):
+        # Of pairs across a border each triangle may go over to the face of the other one.
+        # ... and what belongs to none, or to next to nothing, also over a sharp edge and however it looks.
+        i, k = np.concatenate([pairs, pairs[:, ::-1]]).T
+        across = (owner[i] != owner[k]) & (stray[owner[i]] | is_smooth) & ~stray[owner[k]]
+        moved = owner.copy()
+        for to in np.unique(owner[k[across]]):
+            surface = patches[to].surface
+            mine = np.unique(i[across & (owner[k] == to)])
+            if surface is None:
+                continue
+            sign = -1.0 if patches[to].hole else 1.0
+            new = np.abs(_off(rough, surface, mine)).max(axis=1)
+            is_stray = stray[owner[mine]]
+            looks = (sign * _facing(rough, surface, mine) > np.cos(_TURNED_RAD)) | rough.weak[mine] | is_stray
+            nearer = is_stray | (new < _cost(rough, patches, owner, mine))
+            moved[mine[looks & nearer & (new < rough.near * np.where(is_stray, 1.5, 1.0))]] = to
+        if (moved == owner).all():
+            break
+        owner = moved
+    return [p._replace(triangles=np.flatnonzero(owner == k)) for k, p in enumerate(patches) if (owner == k).any()]
+
+
+def _together(rough: Rough, patches: list[Patch]) -> list[Patch]:
+    """With faces that touch and lie on one surface as one, which narrow triangles had cut in two."""
+    owner = np.zeros(len(rough.areas), dtype=np.int64)
+    for k, patch in enumerate(patches):
+        owner[patch.triangles] = k
+    beside = np.unique(np.sort(owner[rough.mesh.neighbours], axis=1), axis=0)
+    same = [(i, k) for i, k in beside.tolist() if i != k and _is_same(rough, patches[i], patches[k])]
+    _, group = connected(np.array(same, dtype=np.int64).reshape(-1, 2), len(patches))
+    return [
+        patches[int(np.flatnonzero(group == g)[0])]._replace(triangles=np.flatnonzero(group[owner] == g))
+        for g in np.unique(group)
+    ]
+
+
+def _is_same(rough: Rough, a: Patch, b: Patch) -> bool:
+    if a.surface is None or type(a.surface) is not type(b.surface) or a.hole != b.hole:
+        return False
+    is_near = np.abs(a.surface.off(rough.points(b.triangles))).max() < rough.near
+    return bool(is_near) and float(_facing(rough, a.surface, b.triangles).mean()) * (-1.0 if a.hole else 1.0) > 0.8
+
+
+def _cost(rough: Rough, patches: list[Patch], owner: Any, triangles: Any) -> Array:
+    """How far triangles are off their own faces."""
+    cost = np.full(len(triangles), np.inf)
+    for k in np.unique(owner[triangles]):
+        surface = patches[k].surface
+        if surface is not None:
+            mine = owner[triangles] == k
+            cost[mine] = np.abs(_off(rough, surface, triangles[mine])).max(axis=1)
+    return cost
