@@ -19,7 +19,7 @@ _THINNEST = 1e-6
 """Volume over twice the area, in parts of the size: what is thinner is a sheet."""
 NO_SOLID = "the triangles make no solid; save the part as a closed mesh."
 ROUGH_MM = 0.1
-CROSSED_A_LITTLE = f"it crosses itself by less than {ROUGH_MM:g} mm"
+CROSSED_A_LITTLE = f"crossings of less than {ROUGH_MM:g} mm were taken as noise"
 """That is noise where the mesh is drawn anew, and refused elsewhere."""
 INSIDE_OUT = "it was inside out, and was turned"
 
