@@ -19,7 +19,8 @@ def check_lines(check: ArmCheck) -> list[str]:
     at = check.reached
     x, y, z = check.mm_per_n
     friction = f", friction {arm.hand.friction:g}, closes in {arm.hand.seconds:.2f} s" if arm.hand is not None else ""
-    margins = ", ".join(f"{name} {x:.0f}" for name, x in zip(arm.joints, check.margins_deg, strict=True))
+    rooms = [f"{x:.0f}" if np.isfinite(x) else "no limit" for x in check.margins_deg]
+    margins = ", ".join(f"{name} {room}" for name, room in zip(arm.joints, rooms, strict=True))
     return [
         f"joints: {len(arm.joints)} ({', '.join(arm.joints)}), {arm.control}",
         f"home: {_row(np.degrees(arm.home))} degrees; base at {_row(1e3 * np.array(arm.base))} mm",
@@ -31,10 +32,20 @@ def check_lines(check: ArmCheck) -> list[str]:
             f"behind, turned by {error.turn_deg:.3f} degrees at most"
             for error in check.tip_errors
         ),
-        f"tip at rest: {check.rest_error_mm:.4f} mm off",
-        f"stiffness: a newton pushes the tip by {x:.4f} mm along x, {y:.4f} along y, {z:.4f} along z",
+        *(
+            [
+                f"tip at rest: {check.rest_error_mm:.4f} mm off",
+                f"stiffness: a newton pushes the tip by {x:.4f} mm along x, {y:.4f} along y, {z:.4f} along z",
+            ]
+            if check.tip_errors
+            else []
+        ),
         f"gripper: opens {check.opening_mm:.1f} mm, each pad pushes with {check.force_n:.1f} N{friction}",
-        f"room to the limits of joints along the plans of {check.scenario}, degrees: {margins}",
+        *(
+            [f"room to the limits of joints along the plans of {check.scenario}, degrees: {margins}"]
+            if check.layouts_reached
+            else []
+        ),
         f"layouts of {check.scenario} in reach: {check.layouts_reached} of {check.layouts}",
         *([f"missing: {each}" for each in check.missing] or ["nothing is missing"]),
     ]

@@ -14,9 +14,12 @@ from apo_bench.records.run.own_code import own_code
 from apo_bench.resources import folder
 from apo_bench.show.arm_text import check_lines
 from apo_bench.simulation.arm_checks.arm_check import check_arm, unsaid
+from apo_bench.simulation.arms.chain import find_flange
+from apo_bench.simulation.arms.description import ArmDescription, GripperDescription
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.simulation.arms.home import find_home
+from apo_bench.simulation.arms.home import with_home
 from apo_bench.simulation.arms.kinematics import Kinematics
+from apo_bench.simulation.arms.loading import compiled, load_model
 from apo_bench.simulation.robot.paths import smooth
 from apo_bench.simulation.robot.reach import along, within_speed
 from apo_bench.simulation.robot.robot import Robot
@@ -277,12 +280,33 @@ def test_fingers_that_turn_on_hinges_hold_by_their_edges_and_this_is_said(tmp_pa
 def test_an_arm_waits_with_no_joint_wound_up() -> None:
     """A Panda's tip may wait at any of four turns: the usual posture, elbow up, is among those."""
     arm = replace(find_arm("panda_primitive"), base=(-0.48, 0.0, 0.0))
-    q = find_home(arm)
+    q = with_home(arm, base_is_stated=True).home
     kinematics = Kinematics(arm)
     low, high = kinematics.range_of_joints
     assert (np.minimum(q - low, high - q) > np.radians(15.0)).all()
     assert (np.abs(q) <= np.pi).all()
     assert kinematics.forward(q)[2, 2] == pytest.approx(-1.0, abs=1e-4)
+
+
+def test_an_arm_that_is_short_stands_nearer_unless_its_base_is_stated() -> None:
+    far = replace(find_arm("ur5e_primitive"), base=(-1.9, 0.0, 0.0))
+    nearer = with_home(far, base_is_stated=False)
+    assert nearer.base[0] >= -0.4
+    np.testing.assert_allclose(Kinematics(nearer).forward(nearer.home)[:3, 3], (-0.05, 0.0, 0.3), atol=1e-5)
+    with pytest.raises(InputError, match="the tip does not reach"):
+        with_home(far, base_is_stated=True)
+
+
+def test_a_gripper_stands_at_the_end_of_the_last_link_where_no_flange_is_named() -> None:
+    """That of the UR5e ends where its flange is, and looks along the axis of its last joint."""
+    model = compiled(load_model(ARMS / "ur5e_primitive.xml", "arm"), ARMS)
+    description = ArmDescription(ARMS, ARMS, GripperDescription(mjcf=ARMS))
+    stated = find_flange(model, replace(description, flange="flange"))
+    spec = load_model(ARMS / "ur5e_primitive.xml", "arm")
+    next(each for each in (*spec.sites, *spec.bodies) if each.name == "flange").name = "end"
+    found = find_flange(compiled(spec, ARMS), description)
+    assert found[0] == stated[0]
+    np.testing.assert_allclose(found[1][:3, 2:], stated[1][:3, 2:], atol=0.04)
 
 
 def described(folder: Path, said: str) -> Path:

@@ -9,7 +9,7 @@ from apo_bench.assembly import Plan
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
 from apo_bench.scenario import Scenario, draw_layout
-from apo_bench.simulation.arm_checks.tip_error import HIGH_M, SPEEDS, STAND_S, WAY_M, TipError, error_on
+from apo_bench.simulation.arm_checks.tip_error import SPEEDS, STAND_S, WAY_M, TipError, error_on, rise
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.home import tip_down
 from apo_bench.simulation.arms.kinematics import Kinematics
@@ -50,7 +50,8 @@ class ArmCheck:
     force_n: float
     """Of each pad."""
     margins_deg: Array
-    """(joints,), the least distance of each from its limits along the plans in reach; not a number where none is."""
+    """(joints,), the least distance of each from its limits along the plans in reach; infinite for a joint without
+    limits; not a number where no plan is in reach."""
     layouts: int
     layouts_reached: int
     clearance_mm: float
@@ -75,11 +76,11 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
     force = _force(arm, scene)
     drawn = [draw_layout(scenario, np.random.default_rng([seed, 0])) for seed in range(layouts)]
     of_layouts = [_margins(scene, Plan(scenario.assembly, each.start, each.goals)) for each in drawn]
-    in_reach = [each for each in of_layouts if np.isfinite(each).all()]
+    in_reach = [each for each in of_layouts if not np.isnan(each).any()]
     margins = np.min(in_reach or of_layouts, axis=0)
     across = max((each.across_mm for each in errors if each.speed < SPEEDS[-1]), default=0.0)
     if not errors:
-        missing.append(f"the tip does not reach {HIGH_M * 1e3:g} mm above its home; move 'base' or state 'home_deg'.")
+        missing.append("the tip has no line of 150 mm aside of its home; move 'base' or state 'home_deg'.")
     if across > scene.clearance_mm:
         missing.append(
             f"the tip goes up to {across:.2f} mm beside its line and the clearance is {scene.clearance_mm:g} mm; make "
@@ -153,12 +154,9 @@ def _reach(kinematics: Kinematics, arm: Arm) -> Array:
 def _errors(scene: Scene) -> tuple[tuple[TipError, ...], float, tuple[float, float, float]]:
     """Errors along a line and at rest, [mm], and how far a newton pushes the tip, [mm/N], in free air."""
     robot = Robot(scene, scene.scenario.start)
-    up = np.array(robot.T)
-    up[2, 3] = HIGH_M
     errors = []
     try:
-        robot.trace(smooth(robot.T, up, 0.3))
-        robot.wait(STAND_S)
+        rise(robot, 0.3)
         for i, speed in enumerate(SPEEDS):
             way = WAY_M if speed > SPEEDS[0] else WAY_M / 10
             end = shifted(robot.T, np.array([0.0, 1.0 if i % 2 else -1.0, 0.0]), way)

@@ -12,12 +12,15 @@ from apo_bench.simulation.scene.scene import Scene
 
 SPEEDS = (0.01, 0.06, 0.5)
 """[m/s], at which the robot touches, inserts, and carries."""
-HIGH_M = 0.35
-"""Height at which errors are looked at."""
+_HIGH_M = 0.35
+"""Height at which errors are looked at, where the arm reaches it; else at that of its home."""
 WAY_M = 0.15
 """Length of the way along which they are looked at."""
 STAND_S = 0.3
 """How long the arm stands before it."""
+_RESTS_M = 2e-5
+_LOOKS = 10
+"""It stands so much longer, as often as this, until the tip is where it shall be: weak joints swing behind."""
 
 
 @final
@@ -40,15 +43,25 @@ def motion_error(scene: Scene) -> TipError | None:
     It is found by trying, once for a scene.
     """
     robot = Robot(scene, scene.scenario.start)
-    up = np.array(robot.T)
-    up[2, 3] = HIGH_M
     try:
-        robot.trace(smooth(robot.T, up, SPEEDS[-1]))
-        robot.wait(STAND_S)
+        rise(robot, SPEEDS[-1])
         line = steady(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), WAY_M), SPEEDS[1])
         return error_on(line, robot.trace(line), SPEEDS[1])
     except Halt:
         return None
+
+
+def rise(robot: Robot, speed: float) -> None:
+    """Go to where errors are looked at, at a speed [m/s], and come to rest there."""
+    up = np.array(robot.T)
+    up[2, 3] = _HIGH_M
+    if robot.scene.kinematics.inverse(up, robot.q) is not None:
+        robot.trace(smooth(robot.T, up, speed))
+    robot.wait(STAND_S)
+    looks = 0
+    while looks < _LOOKS and np.linalg.norm(robot.tip()[:3, 3] - robot.T[:3, 3]) > _RESTS_M:
+        robot.wait(STAND_S)
+        looks += 1
 
 
 def error_on(line: Trajectory, tips: Array, speed: float) -> TipError:

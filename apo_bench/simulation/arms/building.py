@@ -16,7 +16,7 @@ from apo_bench.simulation.arms.apart import build_apart
 from apo_bench.simulation.arms.arm import Arm, ArmLimits
 from apo_bench.simulation.arms.chain import find_flange, find_joints
 from apo_bench.simulation.arms.description import ArmDescription, GripperDescription, read_description
-from apo_bench.simulation.arms.home import find_home
+from apo_bench.simulation.arms.home import with_home
 from apo_bench.simulation.arms.loading import check_surroundings, compiled, files_of, load_model
 from apo_bench.simulation.arms.measuring import Measured, measure
 from apo_bench.simulation.arms.pressing import PROBE
@@ -29,6 +29,11 @@ _GRIPPER = "gripper/"
 _FINGER_ARMATURE = 1e-4
 _FINGER_DAMPING = 0.02
 """Of finger joints that are neither damped nor geared, [kg m^2] and [Nm s/rad]: light links would rattle for ever."""
+_COUPLED_SOLREF = (0.004, 1.0)
+_COUPLED_SOLIMP = (0.98, 0.999, 0.0001, 0.5, 2.0)
+_UNSAID_SOLREF = (0.02, 1.0)
+"""Fingers that are coupled as softly as MuJoCo has it where nothing is said give way by 1 mm to some newtons; they get
+the first two, which the grippers that come with the benchmark have."""
 _USUAL_FINGERS_M_S = 0.05
 """As the hand of a Panda. Pads that meet a part at 0.28 m/s go up to 0.8 mm into it; where they overlap a wall of it by
 less than that in another direction, MuJoCo pushes along that one, and the pad sticks between two walls."""
@@ -93,7 +98,6 @@ def build_arm(description: ArmDescription) -> Arm:
         lambda spec: measure(_measuring_model(spec, mjcf), where, joints, home, flange, gripper),
     )
     hand = measured.hand
-    own = _drive(spec, joints, felt_inertia(whole, joints, home), drives, hand.actuators, description)
     arm = Arm(
         mjcf=description.file,
         base=tuple(description.base[:3, 3].tolist()),
@@ -115,10 +119,14 @@ def build_arm(description: ArmDescription) -> Arm:
             fingers_m_s=description.gripper.speed_m_s or _USUAL_FINGERS_M_S,
         ),
         files=_files(description),
-        control=("own position actuators" if own else "position servos made from the model")
-        + (f", gripper drive {times:.3g} times as strong as in the model" if times != 1.0 else ""),
     )
-    return arm if description.home is not None else replace(arm, home=find_home(arm))
+    if description.home is None:
+        arm = with_home(arm, description.base_is_stated)
+    own = _drive(spec, joints, felt_inertia(whole, joints, arm.home), drives, hand.actuators, description)
+    spec.compile()
+    control = "own position actuators" if own else "position servos made from the model"
+    stronger = f", gripper drive {times:.3g} times as strong as in the model" if times != 1.0 else ""
+    return replace(arm, model=str(spec.to_xml()), control=control + stronger)
 
 
 def _mount_gripper(spec: Any, flange: str, T_flange: Array, description: ArmDescription) -> None:
@@ -151,7 +159,11 @@ def _with_names_as_mounted(model: Any, gripper: GripperDescription) -> GripperDe
 
 
 def _make_passive(spec: Any, joints: Sequence[str]) -> None:
-    """Nothing falls, nothing of the arm touches itself or what it stands on, and light finger links do not rattle."""
+    """Nothing falls, nothing of the arm touches itself or what it stands on, and fingers do not rattle or give way."""
+    for equality in spec.equalities:
+        if equality.type == mujoco.mjtEq.mjEQ_JOINT and tuple(equality.solref) == _UNSAID_SOLREF:
+            equality.solref[:] = _COUPLED_SOLREF
+            equality.solimp[:] = _COUPLED_SOLIMP
     for body in spec.bodies[1:]:
         body.gravcomp = 1.0
     for geom in spec.geoms:

@@ -6,28 +6,31 @@ import mujoco
 import numpy as np
 
 from apo_bench.errors import InputError, unknown
-from apo_bench.geometry import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.simulation.arms.description import ArmDescription
+from apo_bench.simulation.arms.rig import geom_reach
 from apo_bench.simulation.frames import frame, rotation
 
-_USUAL_FLANGES = ("attachment_site", "flange", "tool0", "ee_site", "right_hand", "hand", "attachment")
+_USUAL_FLANGES = ("attachment_site", "flange", "tool0", "ee_site", "right_hand", "hand", "attachment", "pinch_site")
+_JAWS = ("jaw", "finger", "gripper", "claw")
+"""Words in the name of a hinge that is of the gripper, where the model does not branch there."""
+_LEAST_JOINTS = 5
 _MOST_JOINTS = 8
 
 
 def find_flange(model: Any, description: ArmDescription) -> tuple[int, Array]:
-    """The body at the end of the arm, and the frame of the flange in it."""
+    """The body at the end of the arm, and the frame of the flange in it.
+
+    A gripper of its own file is mounted where the last link ends along the axis of its joint, if nothing tells where.
+    """
     sites = {model.site(i).name: i for i in range(model.nsite)}
     bodies = {model.body(i).name: i for i in range(1, model.nbody)}
     name = description.flange
     if name is None:
         name = next((each for each in _USUAL_FLANGES if each in sites or each in bodies), None)
     if name is None:
-        if description.gripper.mjcf is not None:
-            raise InputError(
-                f"{description.file}: where the gripper is mounted is not known; state 'flange', a site or body of "
-                f"the arm ({', '.join((*sites, *bodies))})."
-            )
-        return _last_link(model, description), np.eye(4)
+        last = _last_link(model, description)
+        return last, np.eye(4) if description.gripper.mjcf is None else _end_of(model, last)
     if name in sites:
         site = sites[name]
         return int(model.site_bodyid[site]), frame(rotation(model.site_quat[site]), model.site_pos[site])
@@ -48,11 +51,32 @@ def _last_link(model: Any, description: ArmDescription) -> int:
         if len(moving) != 1:
             break
         body = moving[0]
-    while body and not model.body_jntnum[body]:
+    while body and (not model.body_jntnum[body] or (not moving and _is_jaw(model, body))):
         body = int(model.body_parentid[body])
     if not body:
         raise InputError(f"{description.mjcf}: the arm has no joints; give the MJCF file of an arm.")
     return body
+
+
+def _is_jaw(model: Any, body: int) -> bool:
+    """Whether a body turns on a hinge that is of a gripper by its name."""
+    return any(word in model.joint(int(model.body_jntadr[body])).name.lower() for word in _JAWS)
+
+
+def _end_of(model: Any, body: int) -> Array:
+    """Where a link ends along the axis of its joint, on the side where it is longer, looking ahead, in its frame."""
+    data = mujoco.MjData(model)
+    mujoco.mj_kinematics(model, data)
+    joint = int(model.body_jntadr[body])
+    at = data.xanchor[joint]
+    axis = data.xaxis[joint]
+    fixed = np.flatnonzero(model.body_weldid[model.geom_bodyid] == body)
+    ends = [max((geom_reach(model, data, g, way) for g in fixed), default=0.0) - at @ way for way in (axis, -axis)]
+    ahead = axis if ends[0] >= ends[1] else -axis
+    across = np.cross(ahead, np.eye(3)[int(np.abs(ahead).argmin())])
+    across /= np.linalg.norm(across)
+    T = frame(np.column_stack([across, np.cross(ahead, across), ahead]), at + max(ends) * ahead)
+    return np.asarray(pose.inverse(frame(data.xmat[body], data.xpos[body])) @ T)
 
 
 def _moves(model: Any, body: int) -> bool:
@@ -83,9 +107,9 @@ def find_joints(model: Any, flange: int, description: ArmDescription) -> list[st
                 f"{', '.join(names) or 'none'}."
             )
         names = [name for name in names if name in description.joints]
-    if not 6 <= len(names) <= _MOST_JOINTS:
+    if not _LEAST_JOINTS <= len(names) <= _MOST_JOINTS:
         raise InputError(
-            f"{description.mjcf}: {len(names)} hinges lie between base and flange ({', '.join(names) or 'none'}); 6 to "
-            f"{_MOST_JOINTS} are needed, so check 'flange'."
+            f"{description.mjcf}: {len(names)} hinges lie between base and flange ({', '.join(names) or 'none'}); "
+            f"{_LEAST_JOINTS} to {_MOST_JOINTS} are needed, so check 'flange'."
         )
     return names

@@ -23,7 +23,7 @@ _MOST_OPENING_MM = 1000.0
 _STATED = ("tip", "slides", "opening_mm")
 """Keys of a gripper that is not measured."""
 _USUAL_BASE = frozen(pose.at((-0.45, 0.0, 0.0)))
-"""Where a base stands that nothing is said of: behind the middle of the table, (4, 4), world, [m]."""
+"""Where a base stands that nothing is said of and that reaches the table: behind its middle, (4, 4), world, [m]."""
 
 
 @final
@@ -77,6 +77,8 @@ class ArmDescription:
     """[rad]; None: looked for."""
     base: Array = field(default_factory=lambda: _USUAL_BASE)
     """Where the base stands, (4, 4), world, [m]."""
+    base_is_stated: bool = False
+    """Else an arm that is short is put nearer, where its home is not stated either."""
     payload_kg: float | None = None
     """Of what is held, without the gripper."""
     speed_rad_s: Array | None = None
@@ -113,6 +115,7 @@ def read_description(path: Path) -> ArmDescription:
         joints=_names(top["joints"]) if "joints" in top else None,
         home=np.radians(_row(top["home_deg"])) if "home_deg" in top else None,
         base=read_pose(top["base"]) if "base" in top else _USUAL_BASE,
+        base_is_stated="base" in top,
         gripper=_gripper(path, top["gripper"]) if "gripper" in top else GripperDescription(),
         payload_kg=top["payload_kg"].number(0.0, _MOST_PAYLOAD_KG, above=True) if "payload_kg" in top else None,
         speed_rad_s=None if speed is None else np.radians(speed),

@@ -23,7 +23,7 @@ _ROBOSUITE = "APO_BENCH_ROBOSUITE"
 """Variables that name their folders."""
 _CACHE = Path("robot_descriptions") / "mujoco_menagerie"
 _2F85 = Path("robotiq_2f85") / "2f85.xml"
-_WITH_FINGERS = ("finger", "gripper", "hand", "knuckle", "driver")
+_WITH_FINGERS = ("finger", "gripper", "hand", "knuckle", "driver", "jaw")
 _GRIPPERS = MappingProxyType(
     {
         "ur5e": "robotiq_gripper_85",
@@ -131,7 +131,9 @@ def _robosuite() -> Path | None:
 
 
 def _has_fingers(mjcf: Path) -> bool:
-    """Whether an actuator, by its name or what it drives, is of a gripper."""
+    """Whether a joint slides, or it or its body is by its name of a gripper."""
     root = read_model_tree(mjcf, "arm").root
+    if any(joint.get("type") == "slide" for joint in root.iter("joint")):
+        return True
     names = (f"{body.get('name')} {joint.get('name')}" for body in root.iter("body") for joint in body.iter("joint"))
     return any(word in name.lower() for name in names for word in _WITH_FINGERS)

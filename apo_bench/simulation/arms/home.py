@@ -1,5 +1,8 @@
 """Where an arm waits, if nobody says: of the ways to hold the tip over the table the one that has most room."""
 
+from dataclasses import replace
+from itertools import product
+
 import numpy as np
 
 from apo_bench.errors import InputError
@@ -13,7 +16,12 @@ _TABLE = [(-0.15, -0.25, 0.03), (-0.15, 0.25, 0.3), (0.2, 0.25, 0.03), (0.2, -0.
 """Places of the tip, [m], and turns from the way it waits, [rad], at which there should be room; ways it may wait."""
 _TURNS = (-1.6, 0.0, 1.6)
 _WAYS = (0.0, np.pi / 2, np.pi, -np.pi / 2)
+_MOST_PLACES = len(_TABLE) * len(_TURNS)
+_NEARER_M = (-0.4, -0.3, -0.2, -0.1)
+_STANDS_M = (0.0, 0.1, 0.2)
+"""Where the base of an arm may stand that reaches at most half of these: behind the middle of the table, how high."""
 _TRIES = 40
+_QUICK_TRIES = 16
 _WIDEST = 3.0
 _SAME_RAD = 0.2
 _TABLE_ROOM_M = 0.02
@@ -29,17 +37,39 @@ def tip_down(at: Array, turn: float = 0.0) -> Array:
     return frame(np.array([[-c, s, 0.0], [-s, -c, 0.0], [0.0, 0.0, 1.0]]) @ np.diag([1.0, -1.0, -1.0]), at)
 
 
-def find_home(arm: Arm) -> Array:
-    """Joint angles, [rad], from which the tip reaches most of the table with most room to the limits of the joints.
+def with_home(arm: Arm, base_is_stated: bool) -> Arm:
+    """The arm with the joint angles at which it waits: from there the tip reaches most of the table with most room.
+
+    Args:
+        base_is_stated: Else the base of an arm that is short stands nearer, or on a stand, where most is reached.
 
     Raises:
         InputError: The arm does not reach over the table at all.
     """
+    best = _home(arm, _TRIES)
+    if not base_is_stated and (best is None or best[0] <= _MOST_PLACES / 2):
+        for z, x in product(_STANDS_M, _NEARER_M):
+            nearer = replace(arm, base=(x, 0.0, z))
+            found = _home(nearer, _QUICK_TRIES)
+            if found is not None and (best is None or found[0] > best[0]):
+                best = found
+                arm = nearer
+    if best is None:
+        at = ", ".join(f"{1e3 * x:g}" for x in _AT)
+        raise InputError(
+            f"{arm.mjcf}: the tip does not reach ({at}) mm looking down; move the 'base', which stands at "
+            f"({', '.join(f'{1e3 * x:g}' for x in arm.base)}) mm."
+        )
+    return replace(arm, home=best[1])
+
+
+def _home(arm: Arm, tries: int) -> tuple[int, Array] | None:
+    """How many places on the table are reached from the best home, and that, [rad]; None where there is no home."""
     kinematics = Kinematics(arm, posture=False)
     rng = np.random.default_rng(0)
     low, high = (np.clip(limit, -_WIDEST, _WIDEST) for limit in kinematics.range_of_joints)
     homes: list[tuple[Array, float]] = []
-    for i in range(_TRIES):
+    for i in range(tries):
         start = rng.uniform(low, high)
         near = _NEAR * (i > 0)
         start = start if i % 2 else (low + high) / 2 + near * (start - (low + high) / 2)
@@ -51,13 +81,9 @@ def find_home(arm: Arm) -> Array:
         if any(np.abs(q - other).max() < _SAME_RAD for other, _ in homes) or _in_table(kinematics, q):
             continue
         homes.append((q, way))
-    if not homes:
-        at = ", ".join(f"{1e3 * x:g}" for x in _AT)
-        raise InputError(
-            f"{arm.mjcf}: the tip does not reach ({at}) mm looking down; move the 'base', which stands at "
-            f"({', '.join(f'{1e3 * x:g}' for x in arm.base)}) mm."
-        )
-    return max(homes, key=lambda each: _worth(kinematics, *each))[0]
+    worths = [(_worth(kinematics, *each), each[0]) for each in homes]
+    worth, home = max(worths, key=lambda each: each[0], default=((0, 0.0, 0.0), None))
+    return None if home is None else (worth[0], home)
 
 
 def _worth(kinematics: Kinematics, q: Array, way: float) -> tuple[int, float, float]:

@@ -17,7 +17,7 @@ from apo_bench.geometry import Array
 from apo_bench.simulation.arms.arm import Hand
 from apo_bench.simulation.arms.description import GripperDescription
 from apo_bench.simulation.arms.pressing import PROBE_WIDE, force_of
-from apo_bench.simulation.arms.rig import Rig, below, command_ends, geom_reach, pads_of, rig_of
+from apo_bench.simulation.arms.rig import LONGEST_S, Rig, below, command_ends, geom_reach, pads_of, rig_of
 from apo_bench.simulation.frames import frame
 
 _LEVELS = 17
@@ -55,10 +55,13 @@ def measure(
     """
     rig = rig_of(model, path, joints, home, flange, gripper)
     widths = {}
+    longest = 0.0
     for command in command_ends(rig, gripper):
-        rig.settle(np.array(command))
+        longest = max(longest, rig.settle(np.array(command)))
         bodies = rig.data.xipos[model.jnt_bodyid[rig.joints]]
         widths[command] = float(np.linalg.norm(bodies - bodies.mean(axis=0), axis=1).sum())
+    if longest >= LONGEST_S:
+        rig.steady()
     if gripper.open is not None and gripper.closed is not None:
         opened = gripper.open
         closed = gripper.closed

@@ -17,10 +17,12 @@ from apo_bench.simulation.arms.description import GripperDescription
 from apo_bench.simulation.physics import physics
 
 STEP_S = 0.001
-_LONGEST_S = 1.5
+LONGEST_S = 1.5
 _STILL = 2e-3
 _QUIET = 20
 """Longest time of one command; joints slower than the second rest after so many steps."""
+_HEAVY = 10.0
+"""[kg m^2]"""
 _MOST_ACTUATORS = 4
 _MOVES_M = 0.001
 _TIP_M = 0.012
@@ -43,7 +45,7 @@ class Rig(NamedTuple):
     joints: Ints
     path: Path
 
-    def settle(self, command: Array, most_s: float = _LONGEST_S) -> float:
+    def settle(self, command: Array, most_s: float = LONGEST_S) -> float:
         """Drive until nothing moves; returns how long it took, [s]."""
         model = self.model
         data = self.data
@@ -62,6 +64,11 @@ class Rig(NamedTuple):
             raise InputError(f"{self.path}: the gripper is unstable when it is driven; mend its actuators or masses.")
         mujoco.mj_kinematics(model, data)
         return STEP_S * steps
+
+    def steady(self) -> None:
+        """Make the arm heavy: one of light links chatters where it is held still step by step."""
+        self.model.dof_armature[self.arm_dof] += _HEAVY
+        mujoco.mj_setConst(self.model, mujoco.MjData(self.model))
 
 
 def rig_of(model: Any, path: Path, joints: Sequence[str], home: Array, flange: int, gripper: GripperDescription) -> Rig:

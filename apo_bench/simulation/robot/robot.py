@@ -80,9 +80,10 @@ class Robot:
         self._dof = model.jnt_dofadr[joints]
         self._drives = np.array([model.actuator(f"arm/{name}").id for name in self.arm.joints])
         # A position servo pushes with gain (u - q) - damping dq, so at a constant speed it lags behind its command by
-        # damping / gain times the speed: so much is the command ahead of the path.
+        # damping / gain times the speed: so much is the command ahead of the path; for dry friction by friction / gain.
         damping = model.dof_damping[self._dof] - model.actuator_biasprm[self._drives, 2]
         self._lead = damping / model.actuator_gainprm[self._drives, 0]
+        self._stick = model.dof_frictionloss[self._dof] / model.actuator_gainprm[self._drives, 0]
         self.step_s = float(model.opt.timestep)
         self._steps_of_tick = max(1, round(TICK_S / self.step_s))
         self.q: Array = np.array(self.arm.home)
@@ -122,7 +123,7 @@ class Robot:
                 work = self.scene.work
                 fast_forward(work, self.data, kinematics.forward, joints, q - self.q, velocity[0], self.forces.held)
                 self._pass((begin - done) * self.step_s)
-            if self._run((path + self._lead * velocity)[1:], guard) < end - begin:
+            if self._run(self._led(path, velocity)[1:], guard) < end - begin:
                 # The measured joint positions become the command, which takes the pressure away.
                 self.q = self.encoders()
                 self.T = kinematics.forward(self.q)
@@ -144,7 +145,7 @@ class Robot:
         n = max(2, round(line.seconds / self.step_s))
         path = self.reached(along(kinematics, line, line.progress(np.arange(n + 1) / n), self.q, knots))
         tips = []
-        for target in (path + self._lead * np.gradient(path, self.step_s, axis=0))[1:]:
+        for target in self._led(path, np.gradient(path, self.step_s, axis=0))[1:]:
             self._tick(self._commands(target[None]))
             tips.append(self.tip())
         self.q = path[-1]
@@ -282,6 +283,9 @@ class Robot:
         if q is None:
             raise Halt(self.stage, "unreachable_start" if self.stage in ("pick", "lift") else "unreachable")
         return q
+
+    def _led(self, path: Array, velocity: Array) -> Array:
+        return np.asarray(path + (self._lead * velocity + self._stick * np.tanh(velocity / _REST_RAD_S)))
 
     def _commands(self, targets: Array) -> Array:
         """What all drives are commanded, (n, controls), while the joints go to targets, (n, joints), [rad]."""
