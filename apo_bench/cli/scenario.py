@@ -112,6 +112,9 @@ def scenario_check(
     file: Annotated[Path, typer.Argument(help="A scenario file.", parser=path_given)],
     seeds: Annotated[int, typer.Option(help="Trials in which the robot knows the truth.")] = 5,
     fidelity: Annotated[str, typer.Option(help="Of these trials: full, or contact.")] = "full",
+    arm: Annotated[str, typer.Option(help="By which arm, as in `arm check`; what would be in its reach is said.")] = (
+        "six_axis"
+    ),
 ) -> None:
     """Say whether human and robot can do a scenario, and which line of its file to change if not."""
     from apo_bench.drafting.checking import check_file
@@ -122,7 +125,7 @@ def scenario_check(
     check("fidelity", fidelity)
 
     is_well = True
-    for finding in check_file(file, seeds, fidelity):
+    for finding in check_file(file, seeds, fidelity, arm):
         typer.echo(finding)
         is_well &= finding.ok
     if not is_well:

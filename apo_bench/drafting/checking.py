@@ -19,6 +19,7 @@ from apo_bench.geometry import extent
 from apo_bench.io.ordinary_files import read_bytes
 from apo_bench.records import TrialSettings
 from apo_bench.scenario import Scenario, layout_at, load_scenario, nominal_operations
+from apo_bench.simulation.arm_checks.placing import place_in_reach
 from apo_bench.simulation.execution.prepare import key_angles, moves
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.trial import run_trial
@@ -35,8 +36,8 @@ _REMEDIES = {
     "collision": "operation {k}, grasp: hold the part elsewhere, or let what is struck start farther away",
     "lost_grasp": "operation {k}, grasp: hold the part elsewhere",
     "force_stop": "operation {k}, attach: state another way, or give the parts more play",
-    "unreachable": "site: move it nearer to the arm, which stands at (-420, 0) mm",
-    "unreachable_start": "parts, {part}, start: let the part wait nearer to the arm, which stands at (-420, 0) mm",
+    "unreachable": "site: move it nearer to the arm, which stands at {base} mm",
+    "unreachable_start": "parts, {part}, start: let the part wait nearer to the arm, which stands at {base} mm",
 }
 """Outcome of a trial -> what to change."""
 _NAMED = re.compile(r"operation (\d+)(?:, (\w+))?|parts, (\w+)(?:, (\w+))?|site\b")
@@ -58,14 +59,14 @@ class Finding(NamedTuple):
         return f"{'ok' if self.ok else 'wrong':6} {self.what:8} {line}{self.sentence}"
 
 
-def check_file(path: Path, seeds: int = 5, fidelity: str = "full") -> Iterator[Finding]:
+def check_file(path: Path, seeds: int = 5, fidelity: str = "full", arm: str = "six_axis") -> Iterator[Finding]:
     """Look at a scenario file from its syntax to trials in which the robot knows the truth; each finding at once.
 
     Raises:
         InputError: There is no such file.
     """
     text = read_bytes(path, "scenario file (.toml)").decode("utf-8", "replace")
-    for finding in _findings(path, seeds, fidelity):
+    for finding in _findings(path, seeds, fidelity, arm):
         yield finding if finding.ok else finding._replace(line=line_of(text, finding.sentence))
 
 
@@ -89,7 +90,7 @@ def line_of(text: str, sentence: str) -> int | None:
     return 1 + next((i for i in body if key and re.match(rf"{key}\s*=", lines[i])), heads[k])
 
 
-def _findings(path: Path, seeds: int, fidelity: str) -> Iterator[Finding]:
+def _findings(path: Path, seeds: int, fidelity: str, arm: str) -> Iterator[Finding]:
     try:
         scenario = load_scenario(path)
     except InputError as error:
@@ -104,17 +105,18 @@ def _findings(path: Path, seeds: int, fidelity: str) -> Iterator[Finding]:
     ):
         yield from _looked(what, look(scenario), well)
     try:
-        scene = build_scene(scenario)
+        scene = build_scene(scenario, arm=arm)
     except InputError as error:
         # `operation 2: the grasp` names the key `grasp`.
         sentence = re.sub(r"^(operation \d+): the grasp", r"\1, grasp: that", str(error))
         yield Finding("gripper", False, sentence)
         return
     yield Finding("gripper", True, "every part can be held and lifted")
-    yield from _looked(
-        "reach", _reach(scenario, scene), "the arm reaches every start and goal, wherever the site may be"
-    )
-    yield from _trials(path, scenario, scene, seeds, fidelity)
+    far = list(_reach(scenario, scene))
+    yield from _looked("reach", far, "the arm reaches every start and goal, wherever the site may be")
+    if far and (place := place_in_reach(scene, lambda nearer: not any(_reach(nearer.scenario, nearer)))):
+        yield Finding("reach", False, place)
+    yield from _trials(replace(_ideal(path, arm), fidelity=fidelity), scenario, scene, seeds)
 
 
 def _looked(what: str, wrong: Iterable[str], well: str) -> Iterator[Finding]:
@@ -182,32 +184,41 @@ def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:
             if code and code + part not in known:
                 known.add(code + part)
                 k = move.step.operation + 1
+                remedy = _REMEDIES[code].format(k=k, part=part, base=_base(scene))
                 yield (
-                    f"{_REMEDIES[code].format(k=k, part=part)}: the arm does not reach '{part}' in operation {k} with "
-                    f"the site at ({1e3 * x:g}, {1e3 * y:g}) mm, turned by {np.degrees(yaw):g} degrees"
+                    f"{remedy}: the arm does not reach '{part}' in operation {k} with the site at "
+                    f"({1e3 * x:g}, {1e3 * y:g}) mm, turned by {np.degrees(yaw):g} degrees"
                 )
 
 
-def _trials(path: Path, scenario: Scenario, scene: Scene, seeds: int, fidelity: str) -> Iterator[Finding]:
-    settings = TrialSettings(
-        str(path), level_mm=0.0, level_deg=0.0, clearance_mm=scene.clearance_mm, method="oracle", fidelity=fidelity
-    )
+def _ideal(path: Path, arm: str) -> TrialSettings:
+    """A trial in which the robot knows the truth."""
+    return TrialSettings(str(path), arm=arm, level_mm=0.0, level_deg=0.0, method="oracle")
+
+
+def _base(scene: Scene) -> str:
+    """`(-420, 0)`: where the arm stands, [mm]."""
+    return f"({1e3 * scene.arm.base[0]:g}, {1e3 * scene.arm.base[1]:g})"
+
+
+def _trials(settings: TrialSettings, scenario: Scenario, scene: Scene, seeds: int) -> Iterator[Finding]:
+    settings = replace(settings, clearance_mm=scene.clearance_mm)
     failed = 0
     for seed in range(seeds):
         row = run_trial(replace(settings, seed=seed), scene)
         if not row["success"]:
             failed += 1
-            yield Finding("oracle", False, _failed(row, scenario))
+            yield Finding("oracle", False, _failed(row, scenario, _base(scene)))
     if seeds:
         sentence = f"{seeds - failed} of {seeds} trials in which the robot knows the truth are right"
         yield Finding("oracle", not failed, sentence)
 
 
-def _failed(row: Mapping[str, Any], scenario: Scenario) -> str:
+def _failed(row: Mapping[str, Any], scenario: Scenario, base: str) -> str:
     """What went wrong in a trial, after what to change."""
     k = row["failure_operation"]
     part = scenario.assembly.operations[k - 1].main if k else ""
     remedy = _REMEDIES.get(row["failure_code"])
-    change = f"{remedy.format(k=k, part=part)}: " if remedy else ""
+    change = f"{remedy.format(k=k, part=part, base=base)}: " if remedy else ""
     who = "the human" if row["failure_stage"] == "demonstrate" else "the robot"
     return f"{change}{who} with seed {row['seed']}: {row['sentence'].rstrip('.')}"

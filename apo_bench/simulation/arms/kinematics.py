@@ -20,6 +20,10 @@ class Kinematics:
     GAIN = 0.95
     """A step takes at most this part of the way to a joint's limit."""
 
+    LEAN_RAD = 0.035
+    LEANING = 1e-3
+    """An arm of five joints holds the tip at its place, turned as near as it can: so much off at most, by this cost."""
+
     POSTURE = 2e-4
     """How much an arm with more than six joints prefers its home, as a cost: the tip is off by some 1e-8 m for it."""
 
@@ -30,7 +34,9 @@ class Kinematics:
         self.adr = self.model.jnt_qposadr[self.ids]
         self._mount = arm.mount
         self.site = self.model.site(arm.tip).id
-        self._task = mink.FrameTask(arm.tip, "site", position_cost=1.0, orientation_cost=0.3)
+        self._leans = len(arm.joints) < 6
+        turning = self.LEANING if self._leans else 0.3
+        self._task = mink.FrameTask(arm.tip, "site", position_cost=1.0, orientation_cost=turning)
         self._limits = [mink.ConfigurationLimit(self.model)]
         self._full = self.model.qpos0.copy()
         limited = self.model.jnt_limited.astype(np.bool_)
@@ -81,7 +87,10 @@ class Kinematics:
         return np.asarray(whole[:, self.model.jnt_dofadr[self.ids]])
 
     def inverse(self, T: Array, near: Array, turns: int = 40) -> Array | None:
-        """Joint angles that bring the tip to T, found by Newton steps from `near`; None if there are none there."""
+        """Joint angles that bring the tip to T, found by Newton steps from `near`; None if there are none there.
+
+        The turn about one axis is left to an arm of five joints, within `LEAN_RAD`.
+        """
         self._task.set_target(mink.SE3(np.concatenate([quaternion(T), T[:3, 3]])))
         self._full[self.adr] = near
         self.configuration.update(self._full)
@@ -93,6 +102,8 @@ class Kinematics:
             step = self._step()
             if step is None:
                 return None
+            if self._leans and max(map(abs, off[:3])) < self.POSITION_M and np.abs(step).max() < self.ANGLE_RAD:
+                return self.last if max(map(abs, off[3:])) < self.LEAN_RAD else None
             # No joint turns by more than half a radian in one step: far from the target the linearisation is wrong.
             longest = float(np.abs(step).max())
             self.configuration.integrate_inplace(step * min(1.0, 0.5 / max(longest, 1e-12)), 1.0)

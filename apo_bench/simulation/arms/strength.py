@@ -21,7 +21,8 @@ def with_force(
 ) -> tuple[Measured, float]:
     """Measure the gripper of an arm, and scale its drive until each pad pushes as it should.
 
-    Gains, damping and limits of its actuators are scaled alike in `spec`, so that it closes as fast as before.
+    Gains, damping and limits of its actuators, and limits of the joints they push, are scaled alike in `spec`, so that
+    it closes as fast as before.
 
     Args:
         wanted_n: The force of each pad; None: as in the model, and 20 N where that is less than 10 N.
@@ -65,3 +66,6 @@ def _scale(spec: Any, actuators: Sequence[str], by: float) -> None:
         actuator.biasprm[:2] = by * actuator.biasprm[:2]
         actuator.biasprm[2] = damping if damping > 0.0 else by * damping
         actuator.forcerange[:] = by * actuator.forcerange
+        joint = spec.joint(actuator.target)
+        if joint is not None:
+            joint.actfrcrange[:] = by * joint.actfrcrange
