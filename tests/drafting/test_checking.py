@@ -50,6 +50,16 @@ def test_a_trial_that_fails_is_said_with_the_line_to_change(folder: Path) -> Non
     assert (summary.ok, summary.sentence) == (False, "0 of 1 trials in which the robot knows the truth are right")
 
 
+def test_a_site_that_is_too_far_is_named_with_one_in_reach(folder: Path) -> None:
+    text = (folder / "own.toml").read_text(encoding="utf-8").replace("center_mm = [100, 0]", "center_mm = [400, 0]")
+    path = folder / "farther.toml"
+    path.write_text(text, encoding="utf-8")
+    *far, place = (finding for finding in check_file(path, seeds=0) if finding.what == "reach")
+    assert far[0].sentence.startswith("site: move it nearer to the arm, which stands at (-420, 0) mm")
+    assert place.sentence.startswith("site: all is in reach with center_mm = [")
+    assert place.line == far[0].line
+
+
 def test_a_screw_is_known_by_its_name(folder: Path) -> None:
     text = re.sub(r"\bcube\b(?!\.xml)", "screw_m4", (folder / "own.toml").read_text(encoding="utf-8"))
     path = folder / "renamed.toml"

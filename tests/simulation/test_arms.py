@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from apo_bench import Arm, InputError, TrialSettings, build_scene, load_scenario, read_arm, run_trial
-from apo_bench.geometry import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.records.run.own_code import own_code
 from apo_bench.resources import folder
 from apo_bench.show.arm_text import check_lines
@@ -17,7 +17,7 @@ from apo_bench.simulation.arm_checks.arm_check import check_arm, unsaid
 from apo_bench.simulation.arms.chain import find_flange
 from apo_bench.simulation.arms.description import ArmDescription, GripperDescription
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.simulation.arms.home import with_home
+from apo_bench.simulation.arms.home import tip_down, with_home
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.arms.loading import compiled, load_model
 from apo_bench.simulation.robot.paths import smooth
@@ -307,6 +307,37 @@ def test_a_gripper_stands_at_the_end_of_the_last_link_where_no_flange_is_named()
     found = find_flange(compiled(spec, ARMS), description)
     assert found[0] == stated[0]
     np.testing.assert_allclose(found[1][:3, 2:], stated[1][:3, 2:], atol=0.04)
+
+
+def test_an_arm_of_five_joints_looks_down_and_leans_where_it_cannot(tmp_path: Path) -> None:
+    """Waist, three pitches and a roll: straight down at any turn; tilted across its plane by 1 degree, not by 5."""
+    link = '<body pos="{0}"><joint name="j{1}" axis="{2}" range="-3 3"/><geom size="0.02"/>'
+    links = (
+        ("0 0 0.1", "0 0 1"),
+        ("0 0 0", "0 1 0"),
+        ("0 0 0.3", "0 1 0"),
+        ("0 0 0.3", "0 1 0"),
+        ("0 0 0.05", "0 0 1"),
+    )
+    bodies = "".join(link.format(at, i, axis) for i, (at, axis) in enumerate(links))
+    text = f"""<mujoco><compiler angle="radian"/><worldbody>{bodies}<site name="tip" pos="0 0 0.1"/>{"</body>" * 5}
+        </worldbody></mujoco>"""
+    joints = tuple(f"j{i}" for i in range(5))
+    home = np.array([0.0, 0.3, 1.4, 1.4, 0.0])
+    arm = Arm(tmp_path, (0.0, 0.0, 0.0), joints, "tip", (), "", "body", home, 0.04, model=text)
+    kinematics = Kinematics(arm)
+    for turn in (0.0, 1.0):
+        T = tip_down(np.array([0.35, 0.1, 0.05]), turn)
+        q = kinematics.inverse(T, home)
+        assert q is not None
+        np.testing.assert_allclose(kinematics.forward(q), T, atol=2e-5)
+    across = np.array([0.35, 0.1, 0.0]) / np.hypot(0.35, 0.1)
+    for degrees, reached in ((1.0, True), (5.0, False)):
+        tilted = T @ pose.exp(np.concatenate([np.zeros(3), T[:3, :3].T @ (np.radians(degrees) * across)]))
+        q = kinematics.inverse(tilted, home)
+        assert (q is not None) == reached
+        if q is not None:
+            np.testing.assert_allclose(kinematics.forward(q)[:3, 3], T[:3, 3], atol=2e-6)
 
 
 def described(folder: Path, said: str) -> Path:

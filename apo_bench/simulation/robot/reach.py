@@ -19,6 +19,8 @@ _SHORT_RAD = 0.05
 """So short a line has one knot in its middle; any other has two at least."""
 _SPEED_LOOKS = 101
 """Times at which the speed of joints is looked at."""
+_CREEP_RAD_S = 2e-3
+"""Dry friction is full above some such."""
 _FAR_M = 0.3
 _FAR_RAD = 1.0
 """The spacing of knots where only the joint angles at the end are asked for."""
@@ -57,6 +59,16 @@ def at_end(kinematics: Kinematics, line: Trajectory, begin: float, end: float, q
     count = 1 + max(1, int(np.ceil((end - begin) * _steps(line, _FAR_M, _FAR_RAD))))
     knots = _knots(kinematics, line, np.linspace(begin, end, count), q)
     return None if knots is None else knots.q[-1]
+
+
+def led(path: Array, velocity: Array, lead: Array, stick: Array) -> Array:
+    """What position servos are commanded so that the joints are on a path, (n, joints), at velocities, [rad/s].
+
+    Args:
+        lead: (joints,), damping over gain, [s].
+        stick: (joints,), dry friction over gain, [rad].
+    """
+    return np.asarray(path + (lead * velocity + stick * np.tanh(velocity / _CREEP_RAD_S)))
 
 
 def turned_by(kinematics: Kinematics, ends: Sequence[tuple[Array, Array]], q: Array, by: float) -> Array | None:

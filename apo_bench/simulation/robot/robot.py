@@ -22,7 +22,7 @@ from apo_bench.simulation.robot.gripper import fingers_of
 from apo_bench.simulation.robot.in_hand import Carried, HoldWatch, fast_forward, steadied, take_along, weld
 from apo_bench.simulation.robot.obstacles import clear, moving_with_tip, near_spans
 from apo_bench.simulation.robot.paths import Trajectory, smooth, waypoints_unwound
-from apo_bench.simulation.robot.reach import along, at_end, within_speed
+from apo_bench.simulation.robot.reach import along, at_end, led, within_speed
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.robot.wrist import WristSensor
 from apo_bench.simulation.scene.scene import Scene
@@ -123,7 +123,7 @@ class Robot:
                 work = self.scene.work
                 fast_forward(work, self.data, kinematics.forward, joints, q - self.q, velocity[0], self.forces.held)
                 self._pass((begin - done) * self.step_s)
-            if self._run(self._led(path, velocity)[1:], guard) < end - begin:
+            if self._run(led(path, velocity, self._lead, self._stick)[1:], guard) < end - begin:
                 # The measured joint positions become the command, which takes the pressure away.
                 self.q = self.encoders()
                 self.T = kinematics.forward(self.q)
@@ -145,7 +145,7 @@ class Robot:
         n = max(2, round(line.seconds / self.step_s))
         path = self.reached(along(kinematics, line, line.progress(np.arange(n + 1) / n), self.q, knots))
         tips = []
-        for target in self._led(path, np.gradient(path, self.step_s, axis=0))[1:]:
+        for target in led(path, np.gradient(path, self.step_s, axis=0), self._lead, self._stick)[1:]:
             self._tick(self._commands(target[None]))
             tips.append(self.tip())
         self.q = path[-1]
@@ -283,9 +283,6 @@ class Robot:
         if q is None:
             raise Halt(self.stage, "unreachable_start" if self.stage in ("pick", "lift") else "unreachable")
         return q
-
-    def _led(self, path: Array, velocity: Array) -> Array:
-        return np.asarray(path + (self._lead * velocity + self._stick * np.tanh(velocity / _REST_RAD_S)))
 
     def _commands(self, targets: Array) -> Array:
         """What all drives are commanded, (n, controls), while the joints go to targets, (n, joints), [rad]."""
