@@ -30,6 +30,7 @@ _LAYOUTS = 20
 _MOST_GIVING_M = 0.002
 _LEAST_MARGIN_DEG = 5.0
 _MOST_TURN_DEG = 5.0
+_LEVER_M = 0.1
 
 
 @final
@@ -83,8 +84,8 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
         missing.append("the tip has no line of 150 mm aside of its home; move 'base' or state 'home_deg'.")
     if across > scene.clearance_mm:
         missing.append(
-            f"the tip goes up to {across:.2f} mm beside its line and the clearance is {scene.clearance_mm:g} mm; make "
-            "the joints stiffer ('torque_nm' limits them) or the clearance larger."
+            f"the tip goes up to {across:.2f} mm beside its line and the clearance is {scene.clearance_mm:g} mm; "
+            f"{_softest(scene)}, or make the clearance larger."
         )
     if force < LEAST_FORCE_N:
         missing.append(f"each pad pushes with {force:.1f} N; parts slip below some {LEAST_FORCE_N:g} N.")
@@ -112,6 +113,18 @@ def check_arm(arm: Arm, scenario: Scenario, layouts: int = _LAYOUTS) -> ArmCheck
         layouts_reached=len(in_reach),
         clearance_mm=scene.clearance_mm,
         missing=tuple(missing),
+    )
+
+
+def _softest(scene: Scene) -> str:
+    """Which joint gives way most, pushed at the tip or turned there by as much 0.1 m farther, and what would help."""
+    J = np.array(scene.kinematics.jacobian(scene.arm.home))
+    gains = np.array([scene.work.model.actuator(f"arm/{name}").gainprm[0] for name in scene.arm.joints])
+    J[3:] *= _LEVER_M
+    k = int(((J**2).sum(axis=0) / gains).argmax())
+    return (
+        f"the joint '{scene.arm.joints[k]}' gives way most ({gains[k]:.0f} Nm/rad): its servo gets stiffer with the "
+        "'armature' of its motor in the MJCF"
     )
 
 
