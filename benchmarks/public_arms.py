@@ -55,8 +55,8 @@ LAYOUTS = 3
 SAID = """\
 # Arms of public collections
 
-Written by `python benchmarks/public_arms.py MENAGERIE ...`: every arm with what its files say and nothing else, and the
-2F-85 of Menagerie where it has no gripper. The check is `arm check` and what is foretold of the trials: `yes` where
+Written by `python benchmarks/public_arms.py MENAGERIE --trials N`: every arm with what its files say and nothing else,
+and the 2F-85 of Menagerie where it has no gripper. The check is `arm check` and what is foretold of trials: `yes` where
 nothing but payload, speeds and torques is missing. `oracle` at zero noise with a careful human, `--fidelity contact`.
 """
 QUIET = ("no payload", "no speed", "the torque of a joint")
@@ -119,9 +119,15 @@ def tried(arm: str, scenario: str, trials: int) -> Tried:
         scenario, arm=arm, level_mm=0.0, level_deg=0.0, careless=0.0, method="oracle", fidelity="contact"
     )
     rows = tuple(run_trial(replace(ideal, seed=seed), scene) for seed in range(trials))
-    foretold = next((row["predicted"]["code"] for row in rows if row["predicted"]["fails"]), "")
+    foretold = next(filter(None, map(warned, rows)), "")
     says = missing[0] if missing else f"foretold: {foretold}" if foretold else "yes"
     return Tried(arm, scenario, at, says, rows)
+
+
+def warned(row: Row) -> str:
+    """Which failure was foretold; empty where none was."""
+    predicted = row["predicted"]
+    return predicted["code"] if predicted is not None and predicted["fails"] else ""
 
 
 def line(each: Tried) -> str:
@@ -139,7 +145,7 @@ def page(tried: Sequence[Tried], trials: int) -> str:
     failed = [row for row in rows if not row["success"]]
     right = [row for row in rows if row["success"]]
     yes = share([bool(row["success"]) for row in sure])
-    caught, wrongly = (share([row["predicted"]["fails"] for row in of]) for of in (failed, right))
+    caught, wrongly = (share([bool(warned(row)) for row in of]) for of in (failed, right))
     return "\n".join(
         [
             SAID,
