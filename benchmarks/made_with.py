@@ -14,6 +14,12 @@ def mujoco_of(folders: Iterable[Path]) -> list[str]:
     return sorted({run["versions"]["mujoco"] for run in runs})
 
 
+def states_of_code(folders: Iterable[Path]) -> int:
+    """How many states of the package these sweeps were made with."""
+    runs = [json.loads((folder / "run.json").read_text(encoding="utf-8")) for folder in folders]
+    return len({json.dumps(run["code"], sort_keys=True) for run in runs})
+
+
 def said_by(page: str) -> list[str]:
     """The versions that a page names already."""
     found = re.search(r"^\*Simulated with MuJoCo (.*)\.\*$", page, re.MULTILINE)

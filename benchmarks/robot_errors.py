@@ -20,9 +20,15 @@ from apo_bench.records import Row, TrialSettings
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.statistics import Cell, tally, wilson
 from benchmarks.feel_acts import Line, lines_of, table
-from benchmarks.made_with import mujoco_of, with_mujoco
+from benchmarks.made_with import mujoco_of, states_of_code, with_mujoco
 
 PAGE = Path(__file__).parents[1] / "docs" / "results" / "robot-errors.md"
+OVER = """
+## Over all scenarios
+"""
+OLDER = """
+The sweeps were made with {} states of the package, so rows of different lines or scenarios may be some commits apart.
+"""
 SAID = """\
 # Errors of the robot
 
@@ -72,7 +78,9 @@ def main() -> None:
     rows = [row for folder in folders for row in read_rows(folder)]
     acts = [] if given.acts is None else lines_of(given.acts)
     simulated = {*mujoco_of(folders), *(line["mujoco"] for line in acts)}
-    PAGE.write_text(with_mujoco(page(rows, acts), sorted(simulated)), encoding="utf-8")
+    states = states_of_code(folders)
+    said = page(rows, acts).replace(SAID, SAID.replace(OVER, OLDER.format(states) + OVER) if states > 1 else SAID)
+    PAGE.write_text(with_mujoco(said, sorted(simulated)), encoding="utf-8")
     print(f"Wrote {PAGE}")
 
 
