@@ -31,7 +31,7 @@ from apo_bench.cad.solids.naming import free_name
 from apo_bench.drafting.checking import check_file
 from apo_bench.drafting.posed import PosedPart, import_assembly, read_posed
 from apo_bench.drafting.upright import drafted
-from apo_bench.drafting.writing import scenario_text
+from apo_bench.drafting.writing import write_scenario
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.records import TrialSettings
@@ -153,7 +153,7 @@ def became(each: Foreign, mirror: Path, folder: Path, seeds: int) -> Iterator[di
     path = folder / f"{each.name}.toml"
     try:
         made = drafted(parts)
-        path.write_text(scenario_text(made, each.name, each.repository, folder), encoding="utf-8")
+        write_scenario(made, path, each.name, each.repository)
         scenario = load_scenario(path)
     except (InputError, RuntimeError) as error:
         yield {"draft": str(error), "seconds": round(time.process_time() - begin, 1)}

@@ -13,7 +13,7 @@ import numpy as np
 
 from apo_bench.drafting.draft import draft
 from apo_bench.drafting.posed import on_the_table, read_posed
-from apo_bench.drafting.writing import scenario_text
+from apo_bench.drafting.writing import write_scenario
 from apo_bench.parts.making import Body, Frustum, bore, extrude, join, polygon, rectangle, shaft, turned, write_part
 from apo_bench.records import TrialSettings
 from apo_bench.trial.stages import scene_of
@@ -227,7 +227,7 @@ def scenario_of(seed: int, folder: Path) -> Path:
     poses = write(generated(seed), folder)
     path = folder / f"generated_{seed}.toml"
     made = draft(on_the_table(read_posed(poses)))
-    path.write_text(scenario_text(made, f"Generated assembly {seed}", poses.name, folder), encoding="utf-8")
+    write_scenario(made, path, f"Generated assembly {seed}", poses.name)
     return path
 
 

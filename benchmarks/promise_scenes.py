@@ -11,7 +11,7 @@ import numpy as np
 
 from apo_bench.drafting.draft import draft
 from apo_bench.drafting.posed import on_the_table, read_posed
-from apo_bench.drafting.writing import scenario_text
+from apo_bench.drafting.writing import write_scenario
 from apo_bench.parts.making import Body, extrude, join, polygon, rectangle
 from benchmarks.generated import Assembled, Between, Place, write
 
@@ -154,5 +154,5 @@ def scenario_of_blocks(seed: int, folder: Path) -> Path:
     poses = write(blocks(seed), folder)
     path = folder / f"blocks_{seed}.toml"
     made = draft(on_the_table(read_posed(poses)))
-    path.write_text(scenario_text(made, f"Blocks {seed}", poses.name, folder), encoding="utf-8")
+    write_scenario(made, path, f"Blocks {seed}", poses.name)
     return path

@@ -111,6 +111,8 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
         "operations, grasp": {
             "at_mm": "point between the fingers, frame of the part, at most 10 mm over it: pads reach so far down",
             "across": f"axis along which the fingers close, level when the part is picked; {SHIFT}",
+            "ahead": "axis along which the fingers point, of a tilted hand, up to 45 degrees from straight down; "
+            "it needs both others",
         },
         "operations, vary": {
             "along": f"of a shift, with `mm`: its direction, {SHIFT}",

@@ -81,7 +81,7 @@ def scenario_new(
     """Make a scenario of parts at their final poses: contacts, an order, starts, grasps, a comment for each choice."""
     from apo_bench.drafting.posed import UPS, import_assembly, read_posed
     from apo_bench.drafting.upright import drafted
-    from apo_bench.drafting.writing import draft_lines, scenario_text
+    from apo_bench.drafting.writing import draft_lines, write_scenario
     from apo_bench.scenario.file import load_scenario
 
     check_writable(out, "--out", (".toml",))
@@ -101,7 +101,7 @@ def scenario_new(
         raise InputError("neither --assembly nor --poses was given; say where the parts are in the end.")
     made = drafted(read_posed(poses, named), up, fixed or (), clearance)
     source = str((assembly or poses).name)
-    out.write_text(scenario_text(made, f"Assembly of {out.stem}", source, out.parent), encoding="utf-8")
+    write_scenario(made, out, f"Assembly of {out.stem}", source)
     typer.echo("\n".join(draft_lines(made)))
     load_scenario(out)
     typer.echo(f"Wrote {out}; look at it with: apo-bench scenario check {shlex.quote(str(out))}")

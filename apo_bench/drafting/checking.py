@@ -15,16 +15,19 @@ from apo_bench.drafting.posed import TABLE
 from apo_bench.drafting.touching import walls_without_play
 from apo_bench.drafting.waiting import stance
 from apo_bench.errors import InputError
-from apo_bench.geometry import extent
+from apo_bench.geometry import extent, is_held
 from apo_bench.io.ordinary_files import read_bytes
 from apo_bench.records import TrialSettings
 from apo_bench.scenario import Scenario, layout_at, load_scenario, nominal_operations
 from apo_bench.simulation.arm_checks.placing import place_in_reach
+from apo_bench.simulation.arm_checks.plan_check import struck_by
 from apo_bench.simulation.execution.prepare import key_angles, moves
+from apo_bench.simulation.execution.transfer import after_transfer
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.trial.trial import run_trial
 
 _ON_TABLE_M = 1e-4
+_STRUCK_M = 1e-4
 _NAMES = {
     "screws and nuts are put in straight here, nothing is turned": re.compile(
         r"(^|_)(m\d+(_|x|$)|screw|bolt|nut(_|$)|thread)", re.IGNORECASE
@@ -111,7 +114,7 @@ def _findings(path: Path, seeds: int, fidelity: str, arm: str) -> Iterator[Findi
         sentence = re.sub(r"^(operation \d+): the grasp", r"\1, grasp: that", str(error))
         yield Finding("gripper", False, sentence)
         return
-    yield Finding("gripper", True, "every part can be held and lifted")
+    yield from _looked("gripper", _room(scenario, scene), "every part can be held and lifted")
     far = list(_reach(scenario, scene))
     yield from _looked("reach", far, "the arm reaches every start and goal, wherever the site may be")
     if far and (place := place_in_reach(scene, lambda nearer: not any(_reach(nearer.scenario, nearer)))):
@@ -148,7 +151,7 @@ def _starts(scenario: Scenario) -> Iterator[str]:
         if not stance(solid, T[:3, :3]).stands:
             yield (
                 f"parts, {part}, start: '{part}' does not stand like this and needs turning over, which the robot "
-                "cannot do; give it a foot, or let another part be fixed"
+                "cannot do; give it a foot, or let it wait in a nest, as `scenario new` makes them"
             )
 
 
@@ -167,6 +170,30 @@ def _play(scenario: Scenario) -> Iterator[str]:
                 f"operation {k}, contacts: '{contact}' and '{opposite}' leave no play; say fit = true of the faces of "
                 "the slot in its part file, or make the part thinner"
             )
+
+
+def _room(scenario: Scenario, scene: Scene) -> Iterator[str]:
+    """Grasps between whose pads a part does not lie, and those at which the gripper has no room."""
+    for k, (operation, grasp) in enumerate(zip(scenario.assembly.operations, scenario.grasps, strict=True), start=1):
+        up = scenario.start[operation.main][2, :3] if grasp.ahead is None else -grasp.ahead
+        solid = scenario.assembly.solids[operation.main]
+        if not is_held(solid, grasp.point, grasp.across, np.round(up, 9), scene.arm.opening_m):
+            yield (
+                f"operation {k}, grasp: between these pads '{operation.main}' has no opposite faces, and no shaft; "
+                "hold it elsewhere"
+            )
+    layout = layout_at(scenario, *scenario.site.center_m, sum(scenario.site.yaw_rad) / 2, None, scene.clearance_mm)
+    believed = layout.start
+    for move in moves(Plan(scenario.assembly, layout.start, layout.goals), scene, False):
+        operation = scenario.assembly.operations[move.step.operation]
+        after = after_transfer(operation, move.transfer.T_world_goal, believed)
+        depth, other = struck_by(scene, move.transfer, believed, after)
+        if depth > _STRUCK_M:
+            yield (
+                f"operation {move.step.operation + 1}, grasp: the open gripper would be {1e3 * depth:.2g} mm deep in "
+                f"'{other}' here, and no other place from above has room; let '{operation.main}' stand out higher"
+            )
+        believed = after
 
 
 def _reach(scenario: Scenario, scene: Scene) -> Iterator[str]:

@@ -7,28 +7,23 @@ from typing import final
 import numpy as np
 
 from apo_bench.assembly import Poses
+from apo_bench.cad.solids.naming import free_name
+from apo_bench.drafting.holding import Holds, found_holds
+from apo_bench.drafting.nests import FLOOR_M, RAISED_M, nest_of
 from apo_bench.drafting.ordering import OrderSearch, Placing
 from apo_bench.drafting.posed import TABLE, PosedPart
 from apo_bench.drafting.touching import clashes, closed, found_contacts, walls_without_play
 from apo_bench.drafting.waiting import Stance, laid_out, reach_of, site_of, stance
 from apo_bench.errors import InputError, unknown
-from apo_bench.geometry import Array, Box, PadPlace, Solid, extent, holds, intrusion_depths, pose
+from apo_bench.geometry import Array, Solid, extent, pose
 from apo_bench.parts import load_part
-from apo_bench.scenario.scenario import Site
+from apo_bench.scenario.scenario import Grasp, Site
 
 _OPENING_M = 0.046
 """How far each finger of the arm that comes with the benchmark opens."""
 _LOW_M = 1e-4
 _GROUP_ROOM_M = 0.05
 _FARTHEST_ASIDE_M = 0.26
-_FINGER_M = (0.013, 0.018, 0.035)
-_MOST_HOLDS = 300
-"""Half the size of a finger with room to open and to go down, from 10 mm below its tip up; so many places are looked
-at."""
-_ROOM_M = 0.002
-"""Room that the robot asks for; a finger that goes down flush with a wall strikes it."""
-_OVER_M = 0.005
-"""How far tips may be over the top of a part that stands out little; pads hold its uppermost 5 mm then."""
 
 
 @final
@@ -42,15 +37,17 @@ class Draft:
     why_fixed: str
     order: tuple[Placing, ...]
     starts: Mapping[str, Array]
-    """(4, 4), world, [m]; of fixed parts in the frame of the assembly."""
+    """(4, 4), world, [m]; of fixed parts in the frame of the assembly. Of nests too."""
     stances: Mapping[str, Stance]
-    grasps: Mapping[str, PadPlace | None]
+    nests: Mapping[str, Solid]
+    """Part -> what it waits in, as it does not stand alone."""
+    grasps: Mapping[str, Grasp | None]
     site: Site
     clearance_mm: float
     notes: tuple[str, ...]
     """What a person should know, one sentence each."""
     unfit: tuple[str, ...]
-    """Those of them that say why the robot cannot do a part: it does not stand, or there is no place to hold it."""
+    """Those of them that say why the robot cannot do a part: there is no place to hold it, or none with room."""
     up: str = "z"
     """Which axis of the poses that were given looks up, and why, in words."""
 
@@ -59,12 +56,16 @@ class NoOrder(RuntimeError):
     """Parts cannot be put together one after the other, with this side up."""
 
 
-def draft(parts: Sequence[PosedPart], fixed: Sequence[str] = (), clearance_mm: float = 0.25) -> Draft:
+def draft(
+    parts: Sequence[PosedPart], fixed: Sequence[str] = (), clearance_mm: float = 0.25, *, turned: bool = False
+) -> Draft:
     """Make a scenario of parts that stand on the table as `on_the_table` puts them.
 
     Args:
         fixed: Parts that stay where they are; none: the largest of those that lie lowest.
         clearance_mm: Room per side of faces that their part files mark as fit.
+        turned: Whether they stand as they shall; else they may be turned by quarters about the vertical, so that a hand
+            that has to be tilted leans towards its arm.
 
     Raises:
         InputError: No part has that name, or there is no room on the table.
@@ -107,22 +108,48 @@ def draft(parts: Sequence[PosedPart], fixed: Sequence[str] = (), clearance_mm: f
     starts = {part: np.array(poses[part]) for part in (*base, *turns)}
     for part, at in laid_out(solids, turns, keep_free).items():
         starts[part][:3, 3] = (*at, stances[part].height_m)
-    grasps, crowded = _holds(solids, poses, order, base)
-    unfit = (*crowded, *_unfit(solids, turns, stances, grasps))
-    rolling = [f"'{part}' lies on a round wall at its start and may roll" for part, it in stances.items() if it.rolls]
+
+    def held(floors_m: Mapping[str, float]) -> tuple[dict[str, Solid], dict[str, Array], Holds]:
+        """Nests, starts and grasps, with some parts in nests that are so high."""
+        nests = {p: nest_of(free_name(f"nest_{p}", solids), solids[p], turns[p], f) for p, f in floors_m.items()}
+        raised = {p: pose.at((0.0, 0.0, f)) @ starts[p] for p, f in floors_m.items()}
+        there = {**starts, **raised, **{nest.name: pose.at((*starts[p][:2, 3], 0.0)) for p, nest in nests.items()}}
+        return nests, there, found_holds(solids, poses, there, nests, order, base, site)
+
+    floors_m = {part: FLOOR_M for part in turns if not stances[part].stands}
+    nests, there, found = held(floors_m)
+    if found.crowded:  # a hand that is tilted wants room below what waits
+        higher = held(floors_m | dict.fromkeys(found.crowded, RAISED_M))[2]
+        if helped := found.crowded - higher.crowded:
+            nests, there, found = held(floors_m | dict.fromkeys(helped, RAISED_M))
+    quarters = 0 if turned else _quarters(poses, found)
+    if quarters:
+        T = pose.at(np.zeros(3), (0.0, 0.0, 90.0 * quarters))
+        return draft([replace(each, T=T @ each.T) for each in parts], fixed, clearance_mm, turned=True)
+    unfit = tuple(_unfit(solids, turns, found))
     return Draft(
         tuple(replace(each, T=poses[each.name]) for each in parts),
         base,
         why_fixed,
         order,
-        starts,
+        there,
         stances,
-        grasps,
+        nests,
+        found.grasps,
         site,
         clearance_mm,
-        (*notes, *unfit, *rolling),
+        (*notes, *unfit, *_waiting(stances, nests)),
         unfit,
     )
+
+
+def _quarters(poses: Poses, found: Holds) -> int:
+    """By how many quarters to turn so that the fingers of the first tilted hand point away from the arm, along x."""
+    tilted = ((part, grasp.ahead) for part, grasp in found.grasps.items() if grasp and grasp.ahead is not None)
+    for part, ahead in tilted:
+        x, y, _ = poses[part][:3, :3] @ ahead
+        return round(-np.arctan2(y, x) / (np.pi / 2)) % 4
+    return 0
 
 
 def lowest(parts: Sequence[PosedPart]) -> tuple[str, ...]:
@@ -132,65 +159,25 @@ def lowest(parts: Sequence[PosedPart]) -> tuple[str, ...]:
     return tuple(each.name for each in sorted(lie, key=lambda each: -each.solid.volume))
 
 
-def _holds(
-    solids: Mapping[str, Solid], poses: Poses, order: Sequence[Placing], base: Sequence[str]
-) -> tuple[Mapping[str, PadPlace | None], list[str]]:
-    """Where each part is held: the best place at which fingers have room beside what stands when it is put down.
-
-    And what is to be said of parts that have no such place.
-    """
-    best: dict[str, PadPlace | None] = {}
-    notes = list[str]()
-    there = {*base}
-    for placing in order:
-        main = placing.moves[0]
-        others = [part for part in there if part not in placing.moves]
-        up = np.round(poses[main][2, :3], 9)
-        offered = holds(solids[main], up, _OPENING_M)
-        # First places within the part; then those with tips over its top, whose fingers need room below, too.
-        free = (
-            hold
-            for over, below in ((0.0, 0.0), (_OVER_M, _ROOM_M))
-            for hold in holds(solids[main], up, _OPENING_M, over)[:_MOST_HOLDS]
-            if not _struck(hold, below, poses[main], solids, poses, others)
-        )
-        best[main] = next(free, None)
-        if offered and best[main] is None:
-            best[main] = offered[0]
-            notes.append(
-                f"wherever a gripper holds '{main}', fingers that reach 10 mm below their tips meet what stands around "
-                "its place; let it stand out higher, or give it a handle"
-            )
-        there |= set(placing.moves)
-    return best, notes
+def _waiting(stances: Mapping[str, Stance], nests: Mapping[str, Solid]) -> Iterator[str]:
+    """What is to be said of parts that wait in nests, or may roll."""
+    for part, how in stances.items():
+        if part in nests:
+            why = "a tilted hand wants room below it" if how.stands else "it does not stand on the table so"
+            yield f"'{part}' waits in a nest made for it: {why}"
+        elif how.rolls:
+            yield f"'{part}' lies on a round wall at its start and may roll"
 
 
-def _struck(
-    hold: PadPlace, below_m: float, T: Array, solids: Mapping[str, Solid], poses: Poses, others: Sequence[str]
-) -> bool:
-    """Whether a finger beside a part at T would be in one of the others, or so far below it."""
-    # Two boxes beside the part, in a frame with x across the pads and z up, from below their tips to above the part.
-    up = T[2, :3]
-    out = hold.half_width + _FINGER_M[0] - _ROOM_M
-    high = 0.025 - below_m / 2
-    half = np.add(_FINGER_M, (0.0, 0.0, below_m / 2))
-    fingers = tuple(Box("", np.array([sign * out, 0.0, high]), half) for sign in (-1.0, 1.0))
-    R = T[:3, :3] @ np.column_stack([hold.across, np.cross(up, hold.across), up])
-    at = pose.apply(T, hold.point[None])
-    return any(intrusion_depths(fingers, R, at, solids[part].pieces, poses[part])[0] > 0.0 for part in others)
-
-
-def _unfit(
-    solids: Mapping[str, Solid],
-    turns: Mapping[str, Array],
-    stances: Mapping[str, Stance],
-    grasps: Mapping[str, PadPlace | None],
-) -> Iterator[str]:
-    """What is to be said of parts that do not stand, or cannot be held."""
+def _unfit(solids: Mapping[str, Solid], turns: Mapping[str, Array], found: Holds) -> Iterator[str]:
+    """What is to be said of parts that cannot be held."""
     for part, R in turns.items():
-        if not stances[part].stands:
-            yield f"'{part}' needs turning over: it does not stand on the table as it is in the assembly"
-        if grasps[part] is None:
+        if part in found.crowded:
+            yield (
+                f"wherever a gripper holds '{part}', from above or tilted, it meets what stands around its place or "
+                "its start; let it stand out higher, or give it a handle"
+            )
+        if found.grasps[part] is None:
             size = " x ".join(f"{1e3 * np.ptp(extent(solids[part].pieces, R[i])):.4g}" for i in range(3))
             yield (
                 f"'{part}', {size} mm as it stands, offers no place to a gripper from above that opens to "

@@ -51,16 +51,24 @@ def stance(solid: Solid, R: Array) -> Stance:
     low = extent(solid.pieces, up)[0]
     base = (np.concatenate([_lowest(piece, up, low) for piece in solid.pieces]) @ R.T)[:, :2]
     middle = R @ solid.centroid
+    if is_carried(base, middle, float(middle[2] - low)):
+        return Stance(-low, True, False)
     carrier = MultiPoint(base).convex_hull
     at = Point(middle[:2])
-    # It stands if the middle is above the area that carries, with a margin that grows with its height.
-    is_above = carrier.geom_type == "Polygon" and carrier.contains(at)
-    if is_above and carrier.exterior.distance(at) >= max(_LEAST_M, _SLOPE * (middle[2] - low)):
-        return Stance(-low, True, False)
     # It rolls if what carries is a line below the middle: a strip of an area that is a hair's breadth times its length.
     area = MultiPoint(base).minimum_rotated_rectangle.buffer(0.0).area if len(base) > 1 else np.inf
     rolls = bool(area <= _LEAST_M * np.ptp(base, axis=0).max() and carrier.distance(at) < _LEAST_M)
     return Stance(-low, rolls, rolls)
+
+
+def is_carried(base: Array, middle: Array, height_m: float) -> bool:
+    """Whether a centre of mass is above the area that carries, (k, 2), with a margin that grows with its height."""
+    from shapely import MultiPoint, Point
+
+    carrier = MultiPoint(base).convex_hull
+    at = Point(middle[:2])
+    is_above = carrier.geom_type == "Polygon" and carrier.contains(at)
+    return bool(is_above and carrier.exterior.distance(at) >= max(_LEAST_M, _SLOPE * height_m))
 
 
 def _lowest(piece: Piece, up: Array, low: float) -> Array:

@@ -9,11 +9,13 @@ import numpy as np
 
 from apo_bench.assembly import Contact
 from apo_bench.drafting.draft import Draft
+from apo_bench.drafting.nests import nest_xml
 from apo_bench.drafting.ordering import Placing
 from apo_bench.drafting.posed import TABLE, PosedPart
-from apo_bench.geometry import Array, PadPlace, pose
+from apo_bench.geometry import Array, Solid, pose
 from apo_bench.parts import part_names, part_path
 from apo_bench.records import Thresholds
+from apo_bench.scenario.scenario import Grasp
 
 _WIDTH = 118
 _LEVEL = 1e-9
@@ -31,12 +33,23 @@ THRESHOLDS = {
 """Thresholds, and what each is of; all as in the scenarios of the package."""
 
 
-def scenario_text(draft: Draft, title: str, source: str, folder: Path) -> str:
-    """The file.
+def write_scenario(draft: Draft, path: Path, title: str, source: str) -> None:
+    """Write the file, and beside it the part files of nests."""
+    path.write_text(scenario_text(draft, title, source, path), encoding="utf-8")
+    for nest in draft.nests.values():
+        _nest_file(path, nest).write_text(nest_xml(nest), encoding="utf-8")
+
+
+def _nest_file(path: Path, nest: Solid) -> Path:
+    return path.with_name(f"{path.stem}_{nest.name}.xml")
+
+
+def scenario_text(draft: Draft, title: str, source: str, path: Path) -> str:
+    """The text of the file.
 
     Args:
         source: What the poses were read from, in words.
-        folder: Of the file; part files are named relative to it.
+        path: Of the file; part files are named relative to it.
     """
     lines = [
         f"# Written by `apo-bench scenario new` from {source}. Every choice may be changed; `scenario check` says what",
@@ -56,7 +69,11 @@ def scenario_text(draft: Draft, title: str, source: str, folder: Path) -> str:
         "fixed = true",
     ]
     for each in draft.parts:
-        lines += ["", *_part(draft, each, folder)]
+        lines += ["", *_part(draft, each, path.parent)]
+    for part, nest in draft.nests.items():
+        file = json.dumps(_nest_file(path, nest).name, ensure_ascii=False)
+        lines += ["", f"[parts.{nest.name}]  # '{part}' waits in it", f"file = {file}", "fixed = true"]
+        lines.append(f"start = {_pose(draft.starts[nest.name])}")
     for placing in draft.order:
         lines += ["", *_operation(draft, placing)]
     lines += [
@@ -96,7 +113,7 @@ def _part(draft: Draft, each: PosedPart, folder: Path) -> Iterator[str]:
     stance = draft.stances[each.name]
     why = "as in the assembly; it may roll" if stance.rolls else "stands as in the assembly"
     if not stance.stands:
-        why = "NEEDS TURNING OVER: it does not stand like this"
+        why = "as in the assembly, in its nest"
     yield f"start = {_pose(draft.starts[each.name])}  # {why}"
 
 
@@ -117,7 +134,7 @@ def _contacts(contacts: Sequence[Contact], main: str) -> Iterator[str]:
     yield from [line] if len(line) <= _WIDTH else ["contacts = [", *(f"    {pair}," for pair in pairs), "]"]
 
 
-def _grasp(hold: PadPlace | None, main: str, draft: Draft) -> Iterator[str]:
+def _grasp(hold: Grasp | None, main: str, draft: Draft) -> Iterator[str]:
     solid = next(each.solid for each in draft.parts if each.name == main)
     low, high = solid.bounds
     if hold is None:
@@ -125,12 +142,15 @@ def _grasp(hold: PadPlace | None, main: str, draft: Draft) -> Iterator[str]:
         level = draft.starts[main][:2, :3]
         across = level[int(np.argmin(np.ptp(solid.bounds @ level.T, axis=0)))]
         at = np.clip(solid.centroid, low, high)
-        yield f"grasp = {{ at_mm = {_list(1e3 * at)}, across = {_axis(across)} }}  # TOO WIDE for the gripper"
+        yield f"grasp = {{ at_mm = {_list(1e3 * at)}, across = {_axis(across)} }}  # NO PLACE for the gripper"
         return
-    wide = f"{2e3 * hold.half_width:.4g} mm between the fingers"
-    if ((hold.point < low - _LEVEL) | (hold.point > high + _LEVEL)).any():
+    wide = f"{2e3 * (hold.half_width or 0.0):.4g} mm between the fingers"
+    ahead = "" if hold.ahead is None else f", ahead = {_axis(hold.ahead)}"
+    if hold.ahead is not None:
+        wide += ", of a hand that is tilted"
+    elif ((hold.point < low - _LEVEL) | (hold.point > high + _LEVEL)).any():
         wide += ", whose tips end above the part"
-    yield f"grasp = {{ at_mm = {_list(1e3 * hold.point)}, across = {_axis(hold.across)} }}  # {wide}"
+    yield f"grasp = {{ at_mm = {_list(1e3 * hold.point)}, across = {_axis(hold.across)}{ahead} }}  # {wide}"
 
 
 def _file_key(file: Path, folder: Path) -> str:

@@ -8,7 +8,7 @@ from apo_bench.geometry.exact_turns import depth_inside
 from apo_bench.geometry.flips import Flips, approximate_symmetries
 from apo_bench.geometry.hull import SAGITTA_M, Cylinder, Hull, cylinder_hull, first_of_each, sides_of
 from apo_bench.geometry.mating import Mate, angle_between, mate
-from apo_bench.geometry.pads import FINGER_ROOM_M, PAD_M, PadPlace, held_span, held_width, holds, holds_whole
+from apo_bench.geometry.pads import FINGER_ROOM_M, PAD_M, PadPlace, held_span, held_width, holds, holds_whole, is_held
 from apo_bench.geometry.penetration import (
     TOUCH_M,
     drop,
@@ -88,6 +88,7 @@ __all__ = (
     "holds_whole",
     "intrusion",
     "intrusion_depths",
+    "is_held",
     "is_rigid",
     "is_way_free",
     "mate",

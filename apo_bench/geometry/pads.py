@@ -30,7 +30,12 @@ _FLAT_M = 1e-4
 _LINE_M = 0.003
 """Rays are so far apart, and rows of them so where that finds nothing, as on a thin flange; surfaces so deep behind the
 outermost one are pressed, too; and so long at least."""
+_PINCH_M = 0.006
+_PINCH_RAY_M = 0.0005
+"""Tips that are farther over the top pinch it: rays are denser, and a shorter line will do."""
 _ROUNDING_M = 1e-6
+_TINY_M = 1e-8
+"""Heights are rounded."""
 _LEVEL = 1e-3
 _HEIGHT = 0.65
 """Height of the tips over the part's lowest point that is best, as a part of its height."""
@@ -108,7 +113,31 @@ def holds(solid: Solid, up: Array, opening_m: float, over_m: float = 0.0) -> tup
         over_m: So far over the top of the part tips may be; pads reach below them.
     """
     asks = solid, tuple(map(float, up)), opening_m, over_m
+    if over_m > _PINCH_M:
+        return _places(*asks, _PINCH_RAY_M)
     return _places(*asks, _RAY_M) or _places(*asks, _FINE_M)
+
+
+def is_held(solid: Solid, point: Array, across: Array, up: Array, opening_m: float) -> bool:
+    """Whether pads that close on a point lie flat on the part, or on a shaft; arguments as in `holds`."""
+    along = np.cross(up, across)
+    t, h, here = (float(point @ axis) for axis in (along, up, across))
+    for rim in (0.0, _RAY_M):  # what is just below the pads may join what they hold, or be in their way
+        ends = (t - PAD_M[0] - rim, t + PAD_M[0] + rim), (h - PAD_M[1] - rim, h + PAD_M[2])
+        columns, rows = (
+            _lines(*each, [mid, *_round_axes(solid, axis, *each)], _PINCH_RAY_M)
+            for each, mid, axis in zip(ends, (t, h), (along, up), strict=True)
+        )
+        offers = _offers(_cast(solid.pieces, across, up, columns, rows), t, h, opening_m, _FINE_M)
+        if any(low < here < high for low, high, _ in offers):
+            return True
+    return False
+
+
+def _round_axes(solid: Solid, axis: Array, low: float, high: float) -> list[float]:
+    """Where the axes of round faces that lie square to an axis are along it, between two places."""
+    places = [float(f.point @ axis) for f in solid.rounds.values() if abs(f.axis @ axis) < _LEVEL]
+    return [x for x in places if low < x < high]
 
 
 def _axes_within(pieces: tuple[Piece, ...], axis: Array, low: float, high: float) -> list[float]:
@@ -125,8 +154,9 @@ def _places(
     up = np.array(vertical)
     bottom, top = extent(solid.pieces, up)
     best = max(bottom + _HEIGHT * (top - bottom), bottom + _OVER_M, top - _PALM_M)
-    heights = _lines(bottom, max(top + over_m, best), [best])
-    tips = heights[(heights >= bottom + _OVER_M) & (heights >= top - _PALM_M)]
+    least, step = (_LINE_M, _RAY_M) if over_m <= _PINCH_M else (_FINE_M, _PINCH_RAY_M)
+    heights = _lines(bottom, max(top + over_m, best), [best], step)
+    tips = heights[heights >= max(bottom + _OVER_M, top - _PALM_M) - _TINY_M]
     candidates: list[tuple[float, PadPlace]] = []
     for across in _directions(solid, up):
         along = np.cross(up, across)
@@ -136,7 +166,7 @@ def _places(
         rays = _cast(solid.pieces, across, up, t, _lines(bottom, top, level, ray_m))
         for tip in tips:
             for place in t:
-                for low, high, uneven in _offers(rays, place, tip, opening_m):
+                for low, high, uneven in _offers(rays, place, tip, opening_m, least):
                     point = (low + high) / 2 * across + place * along + tip * up
                     off = np.abs([(point - solid.centroid) @ across, (point - solid.centroid) @ along]).sum()
                     cost = float(off + 0.5 * abs(tip - best) + 0.25 * (high - low) + _UNEVEN_M * uneven)
@@ -148,11 +178,11 @@ def _directions(solid: Solid, up: Array) -> Iterator[Array]:
     """Level directions in which pads may close, each once up to its sign."""
     ways = [face.normal for face in solid.faces.values() if abs(face.normal @ up) < _LEVEL]
     for face in (face for face in solid.rounds.values() if not face.hole and face.kind == "cylinder"):
-        if abs(face.axis @ up) < _LEVEL:
-            ways.append(np.cross(up, face.axis))
-        elif abs(face.axis @ up) > 1.0 - _LEVEL:
+        if abs(face.axis @ up) > 1.0 - _LEVEL:
             x, y = (np.asarray(axis - (axis @ up) * up) for axis in plane_across(up).T)
             ways += [x, y, (x + y) / np.sqrt(2.0), (x - y) / np.sqrt(2.0)]
+        else:
+            ways.append(np.cross(up, face.axis))
     kept: list[Array] = []
     for way in ways:
         way = way - (way @ up) * up
@@ -209,8 +239,8 @@ def _clusters(rays: _Rays, within: NDArray[np.bool_]) -> list[tuple[float, float
     return list(zip(begins.tolist(), ends.tolist(), strict=True))
 
 
-def _offers(rays: _Rays, t: float, h: float, opening_m: float) -> Iterator[tuple[float, float, bool]]:
-    """What pads between (t, h) can hold: from where to where, and whether along a line only."""
+def _offers(rays: _Rays, t: float, h: float, opening_m: float, least: float) -> Iterator[tuple[float, float, bool]]:
+    """What pads between (t, h) can hold along so much, [m]: from where to where, and whether along a line only."""
     side, down, over = PAD_M
     above = (np.abs(rays.t - t) <= side + _RAY_M) & (rays.h >= h - down - _RAY_M)
     within = above & (rays.h <= h + over)
@@ -225,7 +255,7 @@ def _offers(rays: _Rays, t: float, h: float, opening_m: float) -> Iterator[tuple
             pressed = on & (first < low + _FLAT_M) & (last > high - _FLAT_M)
         if (np.abs(rays.t[within][pressed] - t) < side / 3).any():
             lengths = [float(np.ptp(places[within][pressed])) for places in (rays.t, rays.h)]
-            if max(lengths) >= _LINE_M:
+            if max(lengths) >= least:
                 yield low, high, min(lengths) < _LINE_M
 
 

@@ -2,6 +2,8 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain as chained
+from itertools import product
 from typing import final
 
 import numpy as np
@@ -16,6 +18,10 @@ _ROOM_M = 0.02
 """A part begins its way in so far outside of what it goes into."""
 _TRAVEL_M = 0.03
 """How far before its goal the line begins at least."""
+_LONGER_M = (0.04, 0.06, 0.08, 0.1, 0.12, 0.14, 0.16)
+"""Where it is roofed there, the line is longer, unless it is as good as vertical."""
+_STRAIGHT = 0.99
+_OPENS = 0.015
 CLEAR_M = 0.3
 """A part comes from above to where its way in begins: so much above that place must be free."""
 _LIFTED = 0.1
@@ -96,10 +102,12 @@ def arrive(
     if direction is not None and not classify(normals).admits(-(T[:3, :3] @ direction), float(np.sin(angle_rad))):
         direction = None
 
+    def along_is_free(way: Array, length_m: float) -> bool:
+        return is_way_free(moving, way, length_m, list(resting.values()))
+
     def clear(way: Array, length_m: float) -> bool:
         begin = [Posed(posed.pieces, _shifted(posed.T, length_m * way)) for posed in moving]
-        others = list(resting.values())
-        return is_way_free(moving, way, length_m, others) and is_way_free(begin, UP, CLEAR_M, others)
+        return along_is_free(way, length_m) and is_way_free(begin, UP, CLEAR_M, list(resting.values()))
 
     def reach(exit_m: float) -> float:
         # For a part that is free after a way the line is as long as that and some room, in whole millimetres.
@@ -130,7 +138,9 @@ def arrive(
         there = list(_admissible(macros, normals, T)) if direction is None else [-(T[:3, :3] @ direction)]
         over = [resting[part] for part in dict.fromkeys(each.rests for each in touched if each.normal @ UP < -_LIFTED)]
         tried = [(way, reach(far)) for way in there for far in dict.fromkeys((0.0, _past(moving, way, over)))]
-        found_free = next((each for each in tried if clear(*each)), None)
+        aslant = (way for way in there if stated.travel_m is None and abs(way @ UP) < _STRAIGHT)
+        longer = product((way for way in aslant if along_is_free(way, _LONGER_M[0])), _LONGER_M)
+        found_free = next((each for each in chained(tried, longer) if clear(*each)), None)
         way, length_m = found_free or tried[0]
         is_free = found_free is not None
         line = Attach(_own(-way, T), length_m)
@@ -173,14 +183,17 @@ def _readable(basis: Array, T: Array) -> Array:
 
 def _admissible(macros: Chain, normals: Array, T: Array) -> Iterator[Array]:
     """Ways off contacts that enclose nothing: straight up if that is one, as the first contact or the last one opens,
-    any other."""
+    any other, at last off each, opening the others a little or not at all."""
     cone = classify(normals)
     if macros.locked:
         yield UP
         return
     back = [-macros.macros[i].direction for i in (0, -1)] if macros.macros else []
     inside = [cone.direction] if cone.direction.any() else []
-    for way in (UP, *back, *inside, *(sign * axis for axis in T[:3, :3].T for sign in (-1.0, 1.0))):
+    axes = [sign * axis for axis in T[:3, :3].T for sign in (-1.0, 1.0)]
+    aslant = normals + _OPENS * normals.sum(axis=0)
+    aslant /= np.linalg.norm(aslant, axis=1)[:, None]
+    for way in (UP, *back, *inside, *axes, *aslant, *normals):
         if cone.admits(way):
             yield way
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from apo_bench.geometry import FINGER_ROOM_M, PAD_M, Array, Solid, all_boxes, extent, holds, holds_whole
+from apo_bench.geometry import FINGER_ROOM_M, PAD_M, Array, Solid, all_boxes, angle_between, extent, holds, holds_whole
 from apo_bench.io.documents import JsonNode
 from apo_bench.scenario.keys import read_unit_axis, refuse
 from apo_bench.scenario.scenario import Grasp
@@ -15,6 +15,8 @@ _OPENING_M = 0.046
 """How far each finger of the arm that comes with the benchmark opens."""
 _MOST_HELD_M = 2 * _OPENING_M - FINGER_ROOM_M
 """Width that the arm can hold where the file does not say how: so much room its fingers want before they close."""
+MOST_TILT_DEG = 45.0
+"""A hand is tilted by no more."""
 _LEVEL = 1e-6
 """Vertical component below which a unit vector is level."""
 
@@ -24,11 +26,13 @@ def read_grasp(node: JsonNode | None, entry: JsonNode, solid: Solid, before: Arr
 
     Where that leaves pads beside the part, and of other parts, it is the best place that the shape offers.
     """
-    keys = node.fields((), ("at_mm", "across")) if node else {}
+    keys = node.fields((), ("at_mm", "across", "ahead")) if node else {}
     low, high = solid.bounds
     level = [axis for axis in range(3) if abs(before[2, axis]) < _LEVEL]
     across = None
     point = _above_middle(solid, before)
+    if "ahead" in keys:
+        return _tilted(keys, solid, before)
     if "at_mm" in keys:
         point = 1e-3 * keys["at_mm"].numbers(3)
         over = PAD_M[1] * np.round(before[2, :3], 9)
@@ -52,6 +56,28 @@ def read_grasp(node: JsonNode | None, entry: JsonNode, solid: Solid, before: Arr
         if keys or ends[1] - ends[0] <= _MOST_HELD_M or not holds(solid, np.round(before[2, :3], 9), _OPENING_M):
             return stated
     return _by_shape(keys, entry, solid, before, point)
+
+
+def _tilted(keys: Mapping[str, JsonNode], solid: Solid, before: Array) -> Grasp:
+    """A grasp of which the file says all, with fingers that point along `ahead`."""
+    ahead = read_unit_axis(keys["ahead"])
+    across = read_unit_axis(keys["across"]) if "across" in keys else ahead
+    keys["ahead"].require(
+        "at_mm" in keys and abs(ahead @ across) <= _LEVEL,
+        "'at_mm' and an axis 'across' that is square to it are needed",
+        "the fingers point along 'ahead' and close along 'across'",
+    )
+    tilt = float(np.degrees(angle_between(-before[2, :3], ahead)))
+    keys["ahead"].require(
+        tilt <= MOST_TILT_DEG + _LEVEL,
+        f"an axis within {MOST_TILT_DEG:g} degrees of straight down is needed where the part is picked",
+    )
+    point = 1e-3 * keys["at_mm"].numbers(3)
+    for axis, over in ((across, 0.0), (np.cross(ahead, across), 0.0), (-ahead, PAD_M[1])):
+        low, high = extent(solid.pieces, axis)
+        inside = low - _LEVEL <= point @ axis <= high + over + _LEVEL
+        keys["at_mm"].require(inside, f"a point beside the part, or up to {1e3 * over:g} mm before it, is needed")
+    return Grasp(point, across, ahead=ahead)
 
 
 def _holds_box(solid: Solid, grasp: Grasp, T: Array) -> bool:

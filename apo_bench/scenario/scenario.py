@@ -17,7 +17,7 @@ from apo_bench.records import Meaning, Thresholds
 @copyable
 @dataclass(frozen=True, eq=False)
 class Grasp:
-    """A grasp from above: where the gripper holds the main part."""
+    """Where the gripper holds the main part, from above or tilted."""
 
     point: Array
     """Centre between the fingertips, (3,), part frame, [m]."""
@@ -25,9 +25,11 @@ class Grasp:
     """Unit vector along which the fingers close, (3,), part frame, horizontal when the part stands at its start."""
     half_width: float | None = None
     """Of what is held there, [m], where that is known."""
+    ahead: Array | None = None
+    """Unit vector along which the fingers point, (3,), part frame, square to `across`; None: straight down."""
 
     def __post_init__(self) -> None:
-        freeze(self, point=(3,), across=(3,))
+        freeze(self, point=(3,), across=(3,), ahead=(3,))
 
 
 @final

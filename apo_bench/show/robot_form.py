@@ -13,6 +13,7 @@ import numpy as np
 from apo_bench.assembly import Plan, placements
 from apo_bench.files.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
+from apo_bench.insertion.macros import UP
 from apo_bench.scenario.scenario import Grasp, Scenario
 from apo_bench.show.plan_text import PlanLine
 
@@ -101,7 +102,7 @@ def _step(
             "part_is_at_most_mm_wide": round(1e3 * width, 6),
         },
         "pick": {
-            "above": tip_form(_shifted(tip, np.array([0.0, 0.0, 1.0]), _ABOVE_M), frames),
+            "above": tip_form(_shifted(tip, UP if line.grasp.ahead is None else -tip[:3, 2], _ABOVE_M), frames),
             "at": tip_form(tip, frames),
         },
         "motions": [
@@ -115,9 +116,9 @@ def _step(
 
 
 def tip_in_part(grasp: Grasp, T_world_part: Array) -> Array:
-    """The tip in the frame of the part, (4, 4): looking down where the part stands like this."""
+    """The tip in the frame of the part, (4, 4): looking down where the part stands like this, or as the grasp says."""
     # world -z in the frame of the part: z of the tip; x is the grasp's direction with what is along z taken out
-    down = -T_world_part[2, :3]
+    down = -T_world_part[2, :3] if grasp.ahead is None else grasp.ahead
     across = grasp.across - (grasp.across @ down) * down
     across = across / np.linalg.norm(across)
     T = np.eye(4)

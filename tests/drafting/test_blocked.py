@@ -86,7 +86,7 @@ def test_another_side_goes_up_where_there_is_no_order_with_z(tmp_path: Path) -> 
     found = drafted(over, fixed=("cup",))
     assert found.up.startswith("-z, as with z up there is no order")
     assert drafted(over, "-z", ("cup",)).up == "-z, as asked"
-    assert "# Up: -z, as with z up" in scenario_text(found, "own", "a test", tmp_path)
+    assert "# Up: -z, as with z up" in scenario_text(found, "own", "a test", tmp_path / "own.toml")
     assert [placing.moves for placing in found.order] == [("core",)]
 
 

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from apo_bench.drafting.checking import check_file
 from apo_bench.drafting.draft import draft
 from apo_bench.drafting.posed import on_the_table
 from apo_bench.drafting.touching import clashes
-from apo_bench.drafting.writing import scenario_text
+from apo_bench.drafting.writing import write_scenario
 from apo_bench.parts import load_part
 from apo_bench.parts.making import bore, extrude, join, rectangle, shaft
 from tests.drafting.test_draft import at, made
@@ -25,7 +27,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     cube = extrude(rectangle(30, 30), 0, 30, bottom="bottom", top="top")
     places = {"plate": ("plate", at(0, 0, 0)), "cube": ("cube", at(0, 0, 15))}
     pile = draft(on_the_table(made(folder, {"plate": plate, "cube": cube}, places)))
-    (folder / "own.toml").write_text(scenario_text(pile, "own", "a test", folder), encoding="utf-8")
+    write_scenario(pile, folder / "own.toml", "own", "a test")
     return folder
 
 
@@ -76,15 +78,13 @@ def test_a_part_that_does_not_stand_at_its_start_is_named_with_its_line(tmp_path
     places = {"plate": ("plate", at(0, 0, 0)), "thin": ("thin", at(0, 0, 0))}
     path = tmp_path / "own.toml"
     tall = draft(on_the_table(made(tmp_path, {"plate": hole, "thin": thin}, places)))
-    path.write_text(scenario_text(tall, "own", "a test", tmp_path), encoding="utf-8")
+    start = np.array(tall.starts["thin"])
+    start[2, 3] = 0.0  # beside its nest
+    write_scenario(replace(tall, nests={}, starts={**tall.starts, "thin": start}), path, "own", "a test")
     (wrong,) = (finding for finding in check_file(path, seeds=0) if finding.what == "starts")
     assert wrong.sentence.startswith("parts, thin, start: 'thin' does not stand like this and needs turning over")
     assert wrong.line is not None
-    assert (
-        path.read_text(encoding="utf-8")
-        .splitlines()[wrong.line - 1]
-        .endswith("# NEEDS TURNING OVER: it does not stand like this")
-    )
+    assert path.read_text(encoding="utf-8").splitlines()[wrong.line - 1].startswith("start = ")
 
 
 def test_a_wall_on_either_side_without_play_is_found(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from apo_bench.drafting.checking import line_of
 from apo_bench.drafting.draft import draft
 from apo_bench.drafting.posed import PosedPart, on_the_table
 from apo_bench.drafting.waiting import stance
-from apo_bench.drafting.writing import scenario_text
+from apo_bench.drafting.writing import write_scenario
 from apo_bench.geometry import pose
 from apo_bench.parts import load_part
 from apo_bench.parts.making import Body, bore, extrude, join, polygon, rectangle, shaft, write_part
@@ -53,7 +53,7 @@ def covered(folder: Path, off_mm: float) -> tuple[PosedPart, ...]:
 
 def loaded(parts: tuple[PosedPart, ...], folder: Path, *fixed: str) -> Scenario:
     path = folder / "own.toml"
-    path.write_text(scenario_text(draft(on_the_table(parts), fixed), "own", "a test", folder), encoding="utf-8")
+    write_scenario(draft(on_the_table(parts), fixed), path, "own", "a test")
     return load_scenario(path)
 
 
@@ -114,7 +114,7 @@ def test_a_press_fit_and_a_part_that_must_be_turned_over_are_named(tmp_path: Pat
         tmp_path, {"plate": hole, "thin": thin}, {"plate": ("plate", at(0, 0, 0)), "thin": ("thin", at(0, 0, 0))}
     )
     notes = draft(on_the_table(tall)).notes
-    assert any("'thin' needs turning over" in note for note in notes)
+    assert any("'thin' waits in a nest" in note for note in notes)
 
 
 def test_grasps_keep_clear_of_what_stands_beside_a_goal_or_it_is_said(tmp_path: Path) -> None:
@@ -144,6 +144,32 @@ def test_grasps_keep_clear_of_what_stands_beside_a_goal_or_it_is_said(tmp_path: 
         "stand out higher" in note
         for note in draft(on_the_table(made(tmp_path, {"hole": hole, "low": low}, sunk))).notes
     )
+
+
+def test_a_hand_is_tilted_away_from_a_tower_and_leans_towards_its_arm(tmp_path: Path) -> None:
+    floor = extrude(rectangle(110, 110), 0, 12)
+    tower = extrude(rectangle(20, 110, (-30, 0)), 12, 130)
+    block = extrude(rectangle(18, 18), 0, 30, bottom="bottom", top="top")
+    places = {"base": ("base", at(0, 0, 0)), "block": ("block", at(-9.5, 0, 12))}
+    scenario = loaded(made(tmp_path, {"base": join(floor, tower), "block": block}, places), tmp_path)
+    (grasp,) = scenario.grasps
+    assert grasp.ahead is not None
+    assert abs(grasp.ahead[2]) >= np.cos(np.radians(45.0)) - 1e-9
+    leans = scenario.goals[0][:3, :3] @ grasp.ahead
+    assert leans[0] > 0.2  # the hand is nearer to the arm, which stands at x = -420 mm, than its tips
+    tall = scenario.start["base"][:3, :3] @ np.array([-1.0, 0.0, 0.0])
+    assert tall[0] == pytest.approx(1.0)  # so the assembly was turned
+
+
+def test_a_pin_that_stands_out_little_is_pinched(tmp_path: Path) -> None:
+    hole = extrude(rectangle(60, 60), 0, 20, bores=[bore((0, 0), 4.3, 12, 20, "bore")], bottom="bottom", top="top")
+    places = {"base": ("base", at(0, 0, 0)), "pin": ("pin", at(0, 0, 12))}
+    pin = shaft(4, 0, 12, "side", bottom="tip", top="head")
+    found = draft(on_the_table(made(tmp_path, {"base": hole, "pin": pin}, places)))
+    assert not found.notes
+    grasp = found.grasps["pin"]
+    assert grasp is not None
+    assert grasp.point[2] - 0.010 > 0.0085
 
 
 def test_what_hangs_in_the_air_has_no_order(tmp_path: Path) -> None:

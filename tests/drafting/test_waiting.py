@@ -86,10 +86,10 @@ def test_a_part_that_rolls_or_is_too_wide_is_said_and_written(tmp_path: Path) ->
     assert any(
         note.startswith("'lid', 110 x 110 x 30 mm as it stands, offers no place to a gripper") for note in result.notes
     )
-    text = scenario_text(result, 'a "title"', "a test", tmp_path)
+    text = scenario_text(result, 'a "title"', "a test", tmp_path / "own.toml")
     assert 'title = "a \\"title\\""' in text
     assert "# as in the assembly; it may roll" in text
-    assert "# TOO WIDE for the gripper" in text
+    assert "# NO PLACE for the gripper" in text
 
 
 def test_a_contact_that_no_poses_close_with_the_others_is_left_out_and_said(tmp_path: Path) -> None:

@@ -20,6 +20,7 @@ from apo_bench.simulation.execution.grasping import (
     tip_frame,
 )
 from apo_bench.simulation.execution.prepare import Move, moves
+from apo_bench.simulation.execution.transfer import is_tilted
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.robot.obstacles import obstacle
 from apo_bench.simulation.robot.paths import turn_from, waypoints_unwound
@@ -221,6 +222,21 @@ def test_no_part_is_centred_where_fingers_would_close_flush_with_a_wall(tmp_path
         walls = [Box(f"wall{side}", np.array([0.005, side * 0.0205, 0.02]), size) for side in (-1, 1)]
         grasp = clear_across(scene, "part", T[:3, 0], RestingPart(T, (*around, obstacle(tuple(walls), T))))
         assert (grasp is not None) == clear
+
+
+def test_the_robot_takes_a_bar_with_a_tilted_hand(tmp_path: Path) -> None:
+    ahead = np.array([-0.5, 0.0, -np.sqrt(0.75)])
+    bar = extrude(rectangle(60, 20), 0, 40, bottom="bottom")
+    scene = one_part(tmp_path, bar, Grasp(np.array([0.0, 0.0, 0.03]), np.array([0.0, 1.0, 0.0]), ahead=ahead))
+    for yaw in (0.2, np.pi):  # one of them is reached the other way round
+        layout = layout_at(scene.scenario, 0.1, 0.0, yaw)
+        plan = Plan(scene.scenario.assembly, layout.start, layout.goals)
+        (move,) = moves(plan, scene)
+        np.testing.assert_allclose(move.transfer.grips[0].T_part_tip[:3, 2], ahead, atol=1e-12)
+        assert is_tilted(move.transfer.T_world_start @ move.transfer.grips[0].T_part_tip)
+    layout = layout_at(scene.scenario, 0.1, 0.0, 0.2)
+    result = replay(Plan(scene.scenario.assembly, layout.start, layout.goals), scene, fidelity="contact")
+    assert result.outcome.code == "ok"
 
 
 def test_the_robot_carries_an_l_shaped_bracket_by_its_arm(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from apo_bench.simulation.arm_checks.tip_error import motion_error
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.execution.fingers import OPEN_TO_PICK_M, OPEN_TO_RELEASE_M
 from apo_bench.simulation.execution.prepare import Move, key_angles, moves
-from apo_bench.simulation.execution.transfer import Grip, after_transfer
+from apo_bench.simulation.execution.transfer import Grip, Transfer, after_transfer
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.scene.scene import Scene
 
@@ -57,10 +57,7 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], bel
     if scene.arm.hand is None:
         return ArmMove(step.operation, step.undo)
     tip = scene.kinematics.forward(path[-1])[:3, 3]
-    depth, struck = max(
-        _struck(scene, t.part, t.grips[0], OPEN_TO_PICK_M, believed),
-        _struck(scene, t.part, t.grips[-1], OPEN_TO_RELEASE_M, after),
-    )
+    depth, struck = struck_by(scene, t, believed, after)
     low, high = scene.kinematics.range_of_joints
     return ArmMove(
         operation=step.operation,
@@ -79,6 +76,14 @@ def _at_limit(scene: Scene, q: Array) -> str:
     room = np.minimum(q - low, high - q)
     k = int(room.argmin())
     return scene.arm.joints[k] if room[k] < _AT_LIMIT_RAD else ""
+
+
+def struck_by(scene: Scene, t: Transfer, believed: Poses, after: Poses) -> tuple[float, str]:
+    """How deep the open gripper is in a part, [m], and in which, where it takes hold or lets go."""
+    return max(
+        _struck(scene, t.part, t.grips[0], OPEN_TO_PICK_M, believed),
+        _struck(scene, t.part, t.grips[-1], OPEN_TO_RELEASE_M, after),
+    )
 
 
 def _struck(scene: Scene, part: str, grip: Grip, beyond: float, poses: Poses) -> tuple[float, str]:

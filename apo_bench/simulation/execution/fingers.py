@@ -1,7 +1,7 @@
 """The fingers: take a part, let go of it, take it elsewhere, centre it."""
 
 from apo_bench.geometry import Array
-from apo_bench.simulation.execution.transfer import Grip, Transfer, hover_pose
+from apo_bench.simulation.execution.transfer import Grip, Transfer, hover, is_tilted
 from apo_bench.simulation.robot.in_hand import weld
 from apo_bench.simulation.robot.paths import shifted, smooth, with_height
 from apo_bench.simulation.robot.robot import Halt, Robot
@@ -20,11 +20,13 @@ the way to the middle."""
 
 def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
     """Come down to the part with open fingers, and close them."""
-    above = with_height(at, hover_pose(at))
+    above = hover(at)
     robot.follow(smooth(robot.T, with_height(robot.T, max(robot.T[2, 3], above[2, 3], t.over)), _NEAR))
     robot.go(with_height(above, robot.T[2, 3]), _FREE, turn_speed=4.5)
     robot.forces.handle(t.part)
     robot.fingers(min(grip.half_width + OPEN_TO_PICK_M, robot.arm.opening_m))
+    if is_tilted(at):
+        robot.follow(smooth(robot.T, above, _NEAR))
     robot.follow(smooth(robot.T, at, _NEAR))
     robot.stand()
     robot.forces.hold(t.part, *t.carried)

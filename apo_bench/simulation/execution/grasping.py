@@ -1,6 +1,7 @@
 """Where to hold a part, chosen from the planned poses so that the gripper strikes nothing."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import groupby
 from typing import NamedTuple
 
@@ -21,7 +22,7 @@ from apo_bench.geometry import (
 )
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.frames import frame
-from apo_bench.simulation.robot.gripper import gripper_boxes
+from apo_bench.simulation.robot.gripper import HasGripper, gripper_boxes
 from apo_bench.simulation.robot.obstacles import Obstacle, obstacle
 from apo_bench.simulation.robot.paths import shifted
 from apo_bench.simulation.scene.scene import Scene
@@ -75,9 +76,10 @@ def obstacles(solids: Mapping[str, Solid], poses: Poses, without: Sequence[str])
 
 def grasp_at(scene: Scene, part: str, preferred: Grasp, places: Sequence[RestingPart]) -> Grasp:
     """The first grasp at which the open gripper is clear at every place; the preferred one if there is none."""
-    if any(_clear(scene, part, [preferred], places, _MARGINS_M[-1])):
+    solid = scene.scenario.assembly.solids[part]
+    if any(_clear(scene, solid, [preferred], places, _MARGINS_M[-1])):
         return preferred
-    return _first_clear(scene, part, _candidates(scene, part, places[0].T), places) or preferred
+    return first_clear(scene, solid, _candidates(scene, solid, places[0].T), places) or preferred
 
 
 def clear_across(scene: Scene, part: str, across: Array, place: RestingPart) -> Grasp | None:
@@ -89,9 +91,10 @@ def clear_across(scene: Scene, part: str, across: Array, place: RestingPart) -> 
     level = across - (across @ up) * up  # without its vertical part
     level /= np.linalg.norm(level)
     stays = Stroke(place.T, up, 0.0, place.around)
-    able = [grasp for grasp in _candidates(scene, part, place.T) if abs(grasp.across @ level) > 0.99]
-    able = [grasp for grasp in able if _closed_depth(scene, part, grasp, stays, np.zeros(1), _MARGINS_M[-1])[0] <= 0.0]
-    return _first_clear(scene, part, able, [place])
+    solid = scene.scenario.assembly.solids[part]
+    able = [grasp for grasp in _candidates(scene, solid, place.T) if abs(grasp.across @ level) > 0.99]
+    able = [grasp for grasp in able if _closed_depth(scene, solid, grasp, stays, np.zeros(1), _MARGINS_M[-1])[0] <= 0.0]
+    return first_clear(scene, solid, able, [place])
 
 
 def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[RestingPart], stroke: Stroke) -> Grips:
@@ -103,28 +106,28 @@ def grips_along(scene: Scene, part: str, preferred: Grasp, places: Sequence[Rest
         places: Where the part is picked up or put down besides, clear for the grasp that is used there.
     """
     ends = (*places, RestingPart(stroke.T, stroke.around))
+    solid = scene.scenario.assembly.solids[part]
     least = _MARGINS_M[-1]
-    if any(_clear(scene, part, [preferred], ends, least)) and not _nearest(scene, part, preferred, stroke, least):
+    if any(_clear(scene, solid, [preferred], ends, least)) and not _nearest(scene, solid, preferred, stroke, least):
         return Grips(preferred)
-    everything = _candidates(scene, part, places[0].T)
-    for margin in _MARGINS_M:
-        for grasp in _clear(scene, part, everything, ends, margin):
-            if not _nearest(scene, part, grasp, stroke, margin):
-                return Grips(grasp)
+    everything = _candidates(scene, solid, places[0].T)
+    if one := first_clear(scene, solid, everything, ends, [stroke]):
+        return Grips(one)
     for margin in _MARGINS_M:
         able = [
-            (_nearest(scene, part, grasp, stroke, margin), grasp)
-            for grasp in _clear(scene, part, everything, places, margin)
+            (_nearest(scene, solid, grasp, stroke, margin), grasp)
+            for grasp in _clear(scene, solid, everything, places, margin)
         ]
-        pair = _pair(scene, part, stroke, sorted(able, key=lambda pair: -pair[0]), margin)
+        pair = _pair(scene, solid, stroke, sorted(able, key=lambda pair: -pair[0]), margin)
         if pair is not None:
             return pair
     return Grips(preferred)
 
 
 def tip_frame(grasp: Grasp, T_part: Array) -> Array:
-    """The tip in the part's frame, (4, 4): looking down where the part stands like this, closing along `across`."""
-    ahead = T_part[:3, :3].T @ np.array([0.0, 0.0, -1.0])
+    """The tip in the part's frame, (4, 4): looking down where the part stands like this, or as the grasp says, closing
+    along `across`."""
+    ahead = T_part[:3, :3].T @ np.array([0.0, 0.0, -1.0]) if grasp.ahead is None else grasp.ahead
     across = grasp.across
     along = float(across @ ahead)
     if abs(along) > _SQUARE:  # of a part that stands tilted
@@ -136,7 +139,7 @@ def tip_frame(grasp: Grasp, T_part: Array) -> Array:
 def half_width(pieces: tuple[Piece, ...], grasp: Grasp, T: Array) -> float:
     """Half of the width between the fingers of a part that stands at T, [m]: of boxes that of the part, where they hold
     that."""
-    up = upwards(T)
+    up = upwards(T) if grasp.ahead is None else -grasp.ahead
     own = held_width(pieces, tuple(grasp.point), tuple(grasp.across), tuple(up))
     if own is None or (all_boxes(pieces) and holds_whole(pieces, grasp.point, grasp.across, up)):
         low, high = extent(pieces, grasp.across)
@@ -156,23 +159,24 @@ def upwards(T: Array) -> Array:
     return np.asarray(np.sign(up[k]) * np.eye(3)[k] if abs(up[k]) > _UPRIGHT else up)
 
 
-def _pair(scene: Scene, part: str, stroke: Stroke, able: Sequence[tuple[float, Grasp]], margin: float) -> Grips | None:
+def _pair(
+    scene: Scene, solid: Solid, stroke: Stroke, able: Sequence[tuple[float, Grasp]], margin: float
+) -> Grips | None:
     """Begin with a grasp as near to the middle as can be, and end with one that is clear from there on."""
     goal = RestingPart(stroke.T, stroke.around)
-    last = list(_clear(scene, part, _candidates(scene, part, stroke.T), [goal], margin))
+    last = list(_clear(scene, solid, _candidates(scene, solid, stroke.T), [goal], margin))
     for left, first in able:
         change = RestingPart(shifted(stroke.T, stroke.way, -left), stroke.around)
-        if 0.0 < left < _MOST_LEFT_M and any(_clear(scene, part, [first], [change], margin)):
+        if 0.0 < left < _MOST_LEFT_M and any(_clear(scene, solid, [first], [change], margin)):
             near = Stroke(stroke.T, stroke.way, left, stroke.around)
-            for second in _clear(scene, part, last, [change], margin):
-                if _nearest(scene, part, second, near, margin) == 0.0:
+            for second in _clear(scene, solid, last, [change], margin):
+                if _nearest(scene, solid, second, near, margin) == 0.0:
                     return Grips(first, left, second)
     return None
 
 
-def _candidates(scene: Scene, part: str, T: Array) -> list[Grasp]:
+def _candidates(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
     """Places on the part at T: those of the box around it where they are on a part of boxes, else by its shape."""
-    solid = scene.scenario.assembly.solids[part]
     up = upwards(T)
     if all_boxes(solid.pieces):
         around = _around_box(scene, solid, T)
@@ -199,61 +203,68 @@ def _around_box(scene: Scene, solid: Solid, T: Array) -> list[Grasp]:
     return grasps
 
 
-def _first_clear(scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[RestingPart]) -> Grasp | None:
-    """The first of those around which there is most room at every place, or None."""
-    return next((grasp for margin in _MARGINS_M for grasp in _clear(scene, part, grasps, places, margin)), None)
+def first_clear(
+    hand: HasGripper,
+    solid: Solid,
+    grasps: Sequence[Grasp],
+    places: Sequence[RestingPart],
+    strokes: Sequence[Stroke] = (),
+) -> Grasp | None:
+    """The first of those around which there is most room at every place, and all along strokes, or None."""
+    clear = ((grasp, margin) for margin in _MARGINS_M for grasp in _clear(hand, solid, grasps, places, margin))
+    return next((grasp for grasp, m in clear if not any(_nearest(hand, solid, grasp, s, m) for s in strokes)), None)
 
 
 def _clear(
-    scene: Scene, part: str, grasps: Sequence[Grasp], places: Sequence[RestingPart], margin: float
+    hand: HasGripper, solid: Solid, grasps: Sequence[Grasp], places: Sequence[RestingPart], margin: float
 ) -> Iterator[Grasp]:
     """The grasps at which the open gripper, about to close or having let go, strikes nothing at any place.
 
     They are worked out as they are asked for, those of one direction and width together.
     """
-    pieces = scene.scenario.assembly.solids[part].pieces
     T = places[0].T
 
     def kind(grasp: Grasp) -> tuple[float, ...]:
-        return (*map(float, grasp.across), round(_known_width(pieces, grasp, T), 6))
+        ahead = () if grasp.ahead is None else map(float, grasp.ahead)
+        return (*map(float, grasp.across), round(_known_width(solid.pieces, grasp, T), 6), *ahead)
 
-    for (*across, _), those in groupby(grasps, key=kind):
+    for _, those in groupby(grasps, key=kind):
         same = list(those)
-        width = _known_width(pieces, same[0], T)
-        opening = min(width + _STAND_OFF_M, scene.arm.opening_m)
+        width = _known_width(solid.pieces, same[0], T)
+        opening = min(width + _STAND_OFF_M, hand.arm.opening_m)
         points = np.array([grasp.point for grasp in same])
         struck = np.zeros(len(same), dtype=np.bool_)
         # All points of one direction and width at once: the tip has one orientation at a place.
         for place in places:
-            R = (place.T @ tip_frame(Grasp(np.zeros(3), np.array(across)), place.T))[:3, :3]
+            R = (place.T @ tip_frame(replace(same[0], point=np.zeros(3)), place.T))[:3, :3]
             at = points @ place.T[:3, :3].T + place.T[:3, 3]
-            struck |= gripper_depth(scene, opening, R, at, place.around, margin) > 0.0
+            struck |= gripper_depth(hand, opening, R, at, place.around, margin) > 0.0
         yield from (grasp for grasp, hit in zip(same, struck, strict=True) if not hit)
 
 
-def _nearest(scene: Scene, part: str, grasp: Grasp, stroke: Stroke, margin: float) -> float:
+def _nearest(hand: HasGripper, solid: Solid, grasp: Grasp, stroke: Stroke, margin: float) -> float:
     """How near to its end the closed gripper comes along a stroke before it strikes something, [m]; 0 if it arrives."""
     lefts = np.linspace(stroke.travel, 0.0, max(2, round(stroke.travel / _GRID_M) + 1))
-    struck = _closed_depth(scene, part, grasp, stroke, lefts, margin) > 0.0
+    struck = _closed_depth(hand, solid, grasp, stroke, lefts, margin) > 0.0
     return float(lefts[max(0, int(np.argmax(struck)) - 1)]) if struck.any() else 0.0
 
 
-def _closed_depth(scene: Scene, part: str, grasp: Grasp, stroke: Stroke, lefts: Array, margin: float) -> Array:
+def _closed_depth(hand: HasGripper, solid: Solid, grasp: Grasp, stroke: Stroke, lefts: Array, margin: float) -> Array:
     """How deep the gripper, closed on the part, is in what stands around, so far before the end of a stroke, (k,)."""
-    width = _known_width(scene.scenario.assembly.solids[part].pieces, grasp, stroke.T)
+    width = _known_width(solid.pieces, grasp, stroke.T)
     tip = stroke.T @ tip_frame(grasp, stroke.T)
     at = tip[:3, 3] - lefts[:, None] * stroke.way
-    return gripper_depth(scene, width, tip[:3, :3], at, stroke.around, margin)
+    return gripper_depth(hand, width, tip[:3, :3], at, stroke.around, margin)
 
 
 def gripper_depth(
-    scene: Scene, opening: float, R: Array, at: Array, around: Sequence[Obstacle], margin: float
+    hand: HasGripper, opening: float, R: Array, at: Array, around: Sequence[Obstacle], margin: float
 ) -> Array:
     """How deep the gripper is in what stands around, (k,), [m]: one orientation of the tip, k places (k, 3), world.
 
     What its way does not come by counts as far away.
     """
-    boxes = gripper_boxes(scene.kinematics, scene.arm, opening, margin)
+    boxes = gripper_boxes(hand.kinematics, hand.arm, opening, margin)
     low, high = upright_bounds(boxes, R, np.zeros(3))
     low = low + at.min(axis=0)
     high = high + at.max(axis=0)

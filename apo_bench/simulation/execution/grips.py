@@ -1,6 +1,7 @@
 """How the gripper holds the part of a transfer, as poses of the tip."""
 
 from collections.abc import Iterable
+from dataclasses import replace
 
 from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import Array, physical_pieces
@@ -54,7 +55,7 @@ def transfer_grips(
 
 def _grip(scene: Scene, part: str, grasp: Grasp, start: Array, goal: Array) -> Grip:
     """The grasp as a pose of the tip; of the two ways round, the one that turns the wrist less."""
-    other = Grasp(grasp.point, -grasp.across)
+    other = replace(grasp, across=-grasp.across)
     rest = scene.kinematics.forward(scene.arm.home)
     tips = [tip_frame(each, start) for each in (grasp, other)]
     tip = min(tips, key=lambda T: max(abs(turn_from(rest, start @ T)), abs(turn_from(rest, goal @ T))))
@@ -92,7 +93,7 @@ def squaring_grips(assembly: Assembly, scene: Scene, k: int, grip: Grip, believe
     turned = []
     for grasp in _across_walls(scene, part, grip, walls, place, ()):
         ahead = tip_frame(grasp, T)[:3, 0] @ grip.T_part_tip[:3, 1] > 0.0
-        other = Grasp(grasp.point, -grasp.across)
+        other = replace(grasp, across=-grasp.across)
         tip, back = (tip_frame(each, T) for each in ((grasp, other) if ahead else (other, grasp)))
         turned.append(Grip(back if abs(turn_from(rest, T @ tip)) > _WRIST_ENDS else tip, half_width(pieces, grasp, T)))
     return tuple(turned)

@@ -18,7 +18,9 @@ _AHEAD_M = 0.01
 SAFE_M = 0.15
 """Least height of the tip at which parts are carried over the others."""
 _HOVER_M = 0.11
-"""How far above a grasp the hand comes to a stand."""
+"""How far before a grasp the hand comes to a stand."""
+_STRAIGHT = 0.99
+_DOWN = float(np.cos(np.radians(10.0)))
 ASIDE_M = 0.006
 """A slide begins this far from the side it shall touch; what touches at its side is moved off as far before it is
 lifted, since in the hand it drifts into its neighbour."""
@@ -118,8 +120,8 @@ class Transfer:
 
     @property
     def begins(self) -> float:
-        """How far before the goal the guarded motion begins, [m]: from above, just before it turns slow."""
-        return self.into.travel if self.into.level else min(self.into.travel, self.slow + _AHEAD_M)
+        """How far before the goal the guarded motion begins, [m]: straight from above, just before it turns slow."""
+        return min(self.into.travel, self.slow + _AHEAD_M) if self.into.way[2] < -_STRAIGHT else self.into.travel
 
     @property
     def depth(self) -> float:
@@ -181,11 +183,19 @@ def key_poses(t: Transfer) -> tuple[tuple[Array, ...], tuple[Array, ...]]:
     free = shifted(t.T_world_start @ carrying, t.out.way, -t.out.travel)
     before = shifted(t.T_world_goal @ carrying, t.into.way, -t.into.travel)
     above, over = (with_height(T, max(t.safe, T[2, 3])) for T in (free, before))
-    return (with_height(pick, hover_pose(pick)), pick, *([free] if t.out.level else []), above), (over, before, goal)
+    return (hover(pick), pick, *([free] if t.out.level else []), above), (over, before, goal)
 
 
-def hover_pose(grasp: Array) -> float:
-    return float(grasp[2, 3]) + _HOVER_M
+def is_tilted(T_tip: Array) -> bool:
+    """Whether a tip does not come from above, as near as parts that stand are upright."""
+    return bool(T_tip[2, 2] > -_DOWN)
+
+
+def hover(grasp: Array) -> Array:
+    """Where the tip comes to a stand before it goes on to a grasp: above it, of a tilted one straight back."""
+    if is_tilted(grasp):
+        return shifted(grasp, grasp[:3, 2], -_HOVER_M)
+    return with_height(grasp, float(grasp[2, 3]) + _HOVER_M)
 
 
 def arrival_line(arrival: Arrival, T: Array) -> ApproachLine:

@@ -5,7 +5,7 @@ Openings are of each finger, [m].
 
 import math
 from functools import lru_cache
-from typing import Any
+from typing import Any, NamedTuple, Protocol
 
 import mujoco
 import numpy as np
@@ -19,6 +19,22 @@ _UPRIGHT_M = 0.001
 """Room above and below: supports are where they are known to be."""
 _LONGEST_S = 0.2
 """How long fingers of a stiff drive may take to rest behind their command."""
+
+
+class HasGripper(Protocol):
+    """A scene, or an arm alone."""
+
+    @property
+    def arm(self) -> Arm: ...
+    @property
+    def kinematics(self) -> Kinematics: ...
+
+
+class ArmAlone(NamedTuple):
+    """An arm of which no scene is made yet."""
+
+    arm: Arm
+    kinematics: Kinematics
 
 
 @lru_cache(maxsize=64)

@@ -25,7 +25,7 @@ def check_holdable(scenario: Scenario, world: World, arm: Arm) -> None:
     """
     for k, (operation, grasp) in enumerate(zip(scenario.assembly.operations, scenario.grasps, strict=True)):
         solid = scenario.assembly.solids[operation.main]
-        up = scenario.start[operation.main][2, :3]
+        up = scenario.start[operation.main][2, :3] if grasp.ahead is None else -grasp.ahead
         which = f"operation {k + 1}: the grasp of '{operation.main}'"
         span = held_span(solid.pieces, grasp.point, grasp.across, np.round(up, 9))
         if span is None and not all_boxes(solid.pieces):
