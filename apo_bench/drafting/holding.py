@@ -1,5 +1,6 @@
 """Where each part of a draft is held, by the same judgement as the robot's: from above, else pinched, else tilted."""
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from typing import NamedTuple
@@ -23,7 +24,7 @@ _ARM = "six_axis"
 _OVER_M = (0.0, 0.005, 0.0085)
 """How far tips may be over the top of a part that stands out little; pads hold its uppermost 5 or 1.5 mm then."""
 _TILTS = np.radians([15.0, -15.0, 30.0, -30.0, 45.0, -45.0])
-_MOST_HOLDS = 300
+_MOST_HOLDS = 40
 """So many places are looked at, of each height and tilt."""
 _VERTICAL = 0.99
 _LIFT_M = 0.03
@@ -107,12 +108,22 @@ def _offered(solid: Solid, T: Array, opening_m: float) -> Iterator[list[Grasp]]:
     """Places from above, of one height over the part after the other, then of hands that are tilted about `across`."""
     up = _up(T)
     for over in _OVER_M:
-        yield [_grasp(hold) for hold in holds(solid, up, opening_m, over)[:_MOST_HOLDS]]
+        yield [_grasp(hold) for hold in _best_of_each_height(holds(solid, up, opening_m, over), up)]
     ways = {tuple(np.round(hold.across, 9).tolist()): hold.across for hold in holds(solid, up, opening_m, _OVER_M[-1])}
     for tilt, across in product(_TILTS, ways.values()):
         back = pose.exp(np.append(np.zeros(3), tilt * across))[:3, :3] @ up
-        places = holds(solid, back, opening_m, _OVER_M[1])[:_MOST_HOLDS]
+        places = _best_of_each_height(holds(solid, back, opening_m, _OVER_M[1]), back)
         yield [_grasp(hold, -back) for hold in places if abs(hold.across @ across) > _VERTICAL]
+
+
+def _best_of_each_height(places: Sequence[PadPlace], up: Array) -> Iterator[PadPlace]:
+    """The best of what is ordered by how good it is: the highest are the worst, and may be the only ones with room."""
+    counts = Counter[float]()
+    for place in places:
+        height = round(float(place.point @ up), 6)
+        counts[height] += 1
+        if counts[height] <= _MOST_HOLDS:
+            yield place
 
 
 def _up(T: Array) -> Array:
