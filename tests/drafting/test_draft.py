@@ -235,7 +235,7 @@ def test_from_poses_to_a_checked_scenario(tmp_path: Path, capsys: pytest.Capture
     good = [line.split()[:2] for line in said if not line.startswith("wrong")]
     assert good == [["ok", what] for what in ("file", "parts", "starts", "ways", "play", "gripper")]
     line = 1 + next(i for i, each in enumerate(text.splitlines()) if each.startswith("[site]"))
-    assert f"line {line}: site: move it nearer to the arm" in said[-1], said
+    assert f"line {line}: site: all is in reach with center_mm = " in said[-1], said
     out.write_text("schema = 1\n", encoding="utf-8")
     assert main(["scenario", "check", str(out)]) == 1
     assert main(["scenario", "check", str(tmp_path / "none.toml")]) == 2
