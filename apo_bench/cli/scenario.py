@@ -27,9 +27,11 @@ def _without_command(context: typer.Context) -> None:
 def scenario_list() -> None:
     """List the scenarios that come with the package."""
     from apo_bench.cli.terminal import print_scenarios
+    from apo_bench.generated import FAMILIES
     from apo_bench.scenario.file import load_scenario, scenario_names
 
     print_scenarios([load_scenario(name) for name in scenario_names()])
+    typer.echo(f"Generated: generated:SEED, or generated:FAMILY:SEED with a family out of {', '.join(FAMILIES)}.")
 
 
 @scenario.command("card")

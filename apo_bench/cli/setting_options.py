@@ -24,7 +24,9 @@ Command = TypeVar("Command", bound=Callable[..., None])
 def offered_names(what: str) -> list[str]:
     """Names that a shell is offered for a setting, or `scenario`: what comes with the package, and how others begin."""
     if what == "scenario":
-        return _stems("scenarios", "*.toml")
+        from apo_bench.generated import FAMILIES
+
+        return [*_stems("scenarios", "*.toml"), *(f"generated:{family}:0" for family in FAMILIES)]
     if what == "noise":
         from apo_bench.observation.noise import NOISES
 
@@ -50,7 +52,8 @@ def completion(what: str) -> Completion:
 ScenarioArgument = Annotated[
     str,
     typer.Argument(
-        help="A name out of `apo-bench scenarios`, or a scenario file.", autocompletion=completion("scenario")
+        help="A name out of `apo-bench scenarios`, generated:SEED, or a scenario file.",
+        autocompletion=completion("scenario"),
     ),
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")]

@@ -36,7 +36,7 @@ def part_path(given: str | Path) -> Path:
     return folder("assets") / "parts" / f"{given}.xml"
 
 
-def load_part(given: str | Path) -> Solid:
+def load_part(given: str | Path, checked: bool = True) -> Solid:
     """The solid of a part file, named after the file.
 
     Of boxes alone it is their union, with faces named by the sites that lie on them; those without a site are called
@@ -46,6 +46,7 @@ def load_part(given: str | Path) -> Solid:
 
     Args:
         given: The short name of a part of the package, or the path of an MJCF file.
+        checked: Whether it is held against that mesh; not if the package has just written it.
 
     Raises:
         InputError: The file breaks a rule; the message names file, element and remedy.
@@ -58,7 +59,7 @@ def load_part(given: str | Path) -> Solid:
         f"{file.path}: the part weighs {mass:.3g} kg; from {LIGHTEST_KG:g} to {HEAVIEST_KG:g} kg are allowed, "
         "so change its size or its density.",
     )
-    if file.path.parent != folder("assets") / "parts":
+    if checked and file.path.parent != folder("assets") / "parts":
         check_part(file, solid)
     return solid
 

@@ -69,7 +69,7 @@ class TrialSettings:
     """One trial: with the same code and the same assets it determines its row, which has them in this order."""
 
     scenario: Name = field(metadata=about(key=True, axis="scenarios"))
-    """A name, or the path of a scenario file."""
+    """A name, also `generated:SEED` or `generated:FAMILY:SEED`, or the path of a scenario file."""
     level_mm: NoiseLevel = field(
         default=1.0,
         metadata=about(

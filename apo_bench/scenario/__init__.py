@@ -1,7 +1,7 @@
 """A file becomes a checked scenario; where a seed puts it, and how a human errs."""
 
 from apo_bench.scenario.checks import check_clearance
-from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario.file import is_named, load_scenario, scenario_names, scenario_path
 from apo_bench.scenario.human_error import NOTHING_M, careless_covariance, spread_error
 from apo_bench.scenario.layout import draw_layout, layout_at, nominal_operations, nominal_start
 from apo_bench.scenario.order import in_the_air
@@ -17,10 +17,12 @@ __all__ = (
     "check_clearance",
     "draw_layout",
     "in_the_air",
+    "is_named",
     "layout_at",
     "load_scenario",
     "nominal_operations",
     "nominal_start",
     "scenario_names",
+    "scenario_path",
     "spread_error",
 )

@@ -62,17 +62,18 @@ class OperationEntry(NamedTuple):
     varies: tuple[Shift | Turn, ...]
 
 
-def read_parts(node: JsonNode, folder: Path) -> Mapping[str, PartEntry]:
-    """Every part; a file that several parts share is loaded once. Paths are relative to `folder`."""
+def read_parts(node: JsonNode, folder: Path, checked: bool = True) -> Mapping[str, PartEntry]:
+    """Every part; a file that several parts share is loaded once, `checked` as in `load_part`. Paths are relative to
+    `folder`."""
     node.require(isinstance(node.value, dict) and node.value, "at least one table [parts.NAME] is needed")
     refuse_unless(
         len(node.value) <= _MOST_PARTS, node, f"at most {_MOST_PARTS} parts are allowed, {len(node.value)} were given"
     )
     solids: dict[Path, Solid] = {}
-    return {name: _part(node.child(value, name), name, folder, solids) for name, value in node.value.items()}
+    return {name: _part(node.child(value, name), name, folder, solids, checked) for name, value in node.value.items()}
 
 
-def _part(node: JsonNode, name: str, folder: Path, solids: dict[Path, Solid]) -> PartEntry:
+def _part(node: JsonNode, name: str, folder: Path, solids: dict[Path, Solid], checked: bool) -> PartEntry:
     refuse_unless(
         FACE_OR_PART_NAME.fullmatch(name),
         node,
@@ -92,17 +93,17 @@ def _part(node: JsonNode, name: str, folder: Path, solids: dict[Path, Solid]) ->
         node,
         "the key 'start' is missing; say where the part stands, such as start = { at_mm = [0, 260, 0] }",
     )
-    path, solid = _solid(keys["file"], folder, solids)
+    path, solid = _solid(keys["file"], folder, solids, checked)
     start = read_pose(keys["start"]) if "start" in keys else np.eye(4)
     return PartEntry(path, solid, fixed, follows, start, _color(keys["color"]) if "color" in keys else None)
 
 
-def _solid(node: JsonNode, folder: Path, solids: dict[Path, Solid]) -> tuple[Path, Solid]:
+def _solid(node: JsonNode, folder: Path, solids: dict[Path, Solid], checked: bool) -> tuple[Path, Solid]:
     try:
         path = part_path(node.text())
         path = path if path.is_absolute() else folder / path
         if path not in solids:
-            solids[path] = load_part(path)
+            solids[path] = load_part(path, checked)
     except InputError as error:
         if str(error).startswith(f"{node.file}, "):
             raise

@@ -4,7 +4,7 @@ Lengths in mm, angles in degrees, operations numbered from 1; the file of the sc
 """
 
 import os
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -12,6 +12,7 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Gap
 from apo_bench.errors import InputError, require, unknown
+from apo_bench.generated import generated_file, is_generated, whole_name
 from apo_bench.insertion.line import Preference
 from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.io.plain_text import UNSHOWN
@@ -32,8 +33,14 @@ def scenario_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in folder("scenarios").glob("*.toml")))
 
 
+def is_named(given: str) -> bool:
+    """Whether something is the name of a scenario that every installation has, so that no file has to travel."""
+    return is_generated(given) or given in scenario_names()
+
+
 def load_scenario(given: str | Path | Scenario) -> Scenario:
-    """The scenario of a short name, of a TOML file anywhere, or the object itself.
+    """The scenario of a short name, `generated:SEED` or `generated:FAMILY:SEED`, of a TOML file anywhere, or the
+    object itself.
 
     Part files in it are short names, or paths relative to the scenario file. Of a short name it is one object for as
     long as the files of the package stay as they are.
@@ -44,7 +51,9 @@ def load_scenario(given: str | Path | Scenario) -> Scenario:
     """
     if isinstance(given, Scenario):
         return given
-    path = _path(given)
+    path = scenario_path(given)
+    if isinstance(given, str) and is_generated(given):
+        return _generated(path, whole_name(given))
     return _kept(path, _stamps()) if path.stem == given else _read(path)
 
 
@@ -60,30 +69,40 @@ def _kept(path: Path, stamps: tuple[tuple[str, int, int], ...]) -> Scenario:
     return _read(path)
 
 
-def _read(path: Path) -> Scenario:
+@lru_cache(maxsize=64)
+def _generated(path: Path, name: str) -> Scenario:
+    return replace(_read(path, checked=False), name=name)
+
+
+def _read(path: Path, checked: bool = True) -> Scenario:
     document = read_toml(path, "scenario file")
     require(
         not UNSHOWN.search(path.stem),
         f"{path}: the file's name, which the scenario gets, holds control characters; rename the file.",
     )
-    scenario, stated = _scenario(document, path)
+    scenario, stated = _scenario(document, path, checked)
     check_scenario(scenario, str(path))
     return with_attach_lines(scenario, stated, str(path))
 
 
-def _path(given: str | Path) -> Path:
+def scenario_path(given: str | Path) -> Path:
+    """The file of a scenario, as `load_scenario` finds it; a generated one is written first."""
     require(
         isinstance(given, str | Path),
         f"a scenario is a short name, a path or a Scenario, a {type(given).__name__} was given.",
     )
+    if isinstance(given, str) and is_generated(given):
+        return generated_file(given)
     if isinstance(given, Path) or given.endswith(".toml") or "/" in given or "\\" in given:
         return Path(given)
     if given not in scenario_names():
-        raise InputError(unknown("scenario", given, scenario_names()) + " Or give the path of a .toml file.")
+        raise InputError(
+            unknown("scenario", given, scenario_names()) + " Or give the path of a .toml file, or generated:SEED."
+        )
     return folder("scenarios") / f"{given}.toml"
 
 
-def _scenario(root: JsonNode, path: Path) -> tuple[Scenario, tuple[Preference, ...]]:
+def _scenario(root: JsonNode, path: Path, checked: bool) -> tuple[Scenario, tuple[Preference, ...]]:
     """The scenario without lines of attach, and what the file states of them."""
     schema = root.value.get("schema", _SCHEMA)
     root.child(schema, "schema").require(
@@ -95,7 +114,7 @@ def _scenario(root: JsonNode, path: Path) -> tuple[Scenario, tuple[Preference, .
         ("schema", "title", "parts", "operations"),
         ("paper", "human", "success", "clearance_mm", "gap_mm", "site", "careless", "judge"),
     )
-    parts = read_parts(top["parts"], path.parent)
+    parts = read_parts(top["parts"], path.parent, checked)
     entries = read_operations(top["operations"], parts)
     assembly = Assembly(
         {name: part.solid for name, part in parts.items()},

@@ -74,12 +74,12 @@ def _picture_of(
 ) -> FailurePicture:
     import imageio.v3 as iio
 
-    from apo_bench.scenario.file import scenario_names
+    from apo_bench.scenario.file import is_named
     from apo_bench.simulation.scene.render import picture
     from apo_bench.trial.fingerprint import content_hash, spec_hash
     from apo_bench.trial.stages import scene_key, scene_of
 
-    if row["scenario"] not in files and row["scenario"] not in scenario_names():
+    if row["scenario"] not in files and not is_named(row["scenario"]):
         raise InputError(f"run.json says no file of the scenario '{row['scenario']}'")
     spec = replace(settings_of(row, files.get(row["scenario"], row["scenario"])), salt=salt)
     key = scene_key(spec)

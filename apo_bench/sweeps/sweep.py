@@ -10,7 +10,7 @@ from apo_bench.io.grouping import grouped
 from apo_bench.records import CORRECTOR, CORRECTOR_LIMIT_S, Limits, Row, level_pair, salt_of_sweep, trial_key
 from apo_bench.records.run.run_file import run_record
 from apo_bench.records.run.run_folder import RunFolder
-from apo_bench.scenario import Scenario, scenario_names
+from apo_bench.scenario import Scenario, is_named
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.physics import physics
@@ -82,7 +82,7 @@ def run_sweep(
     # the whole path of the folder of demonstrations, as every worker finds it
     cache = None if cache is None else str(KeptDemonstrations(cache).folder.resolve())
     lock = replace(environment_lock(names, loaded, arm.files, corrector_limit_s), cache=cache)
-    files = {loaded[source].name: source for source in loaded if source not in scenario_names()}
+    files = {loaded[source].name: source for source in loaded if not is_named(source)}
     salt = None if salt_file is None else salt_of_sweep(salt_file, out)
     limits = Limits(None if here else limit_s, corrector_limit_s)
     run = run_record(

@@ -26,7 +26,7 @@ from apo_bench.observation.presets import noise_path
 from apo_bench.records import ROW, TrialSettings
 from apo_bench.records.run.own_code import DATA_PREFIXES, is_own_code
 from apo_bench.resources import folder
-from apo_bench.scenario import Scenario, scenario_names
+from apo_bench.scenario import Scenario, scenario_path
 
 _SCHEMAS = (ROW, OBSERVATION_SCHEMA, PLAN_SCHEMA)
 ROOMS_WITHOUT_TRIALS = (
@@ -165,8 +165,7 @@ def _hash(text: bytes) -> str:
 def _scenario_bytes(scenario: Scenario, source: str | Path | Scenario) -> bytes:
     if isinstance(source, Scenario):
         return json.dumps(_plain(scenario), sort_keys=True).encode()
-    path = folder("scenarios") / f"{source}.toml" if source in scenario_names() else Path(source)
-    return read_bytes(path, "scenario file")
+    return read_bytes(scenario_path(source), "scenario file")
 
 
 def _plain(value: Any) -> Any:

@@ -21,7 +21,7 @@ from typing import Any, final
 
 from apo_bench.errors import InputError
 from apo_bench.observation.presets import noise_path
-from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario.file import is_named, load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps.local.pool import GRACE_S
 from apo_bench.sweeps.local.process import THREADS
@@ -159,8 +159,8 @@ def runtime_files(names: Names) -> dict[str, Path]:
     brought = names.check()
     arm = find_arm(names.arm)
     files = (
-        *(Path(name) for name in names.scenarios if name not in scenario_names()),
-        *(part for name in names.scenarios for part in load_scenario(name).part_files.values()),
+        *(Path(name) for name in names.scenarios if not is_named(name)),
+        *(part for name in names.scenarios if not is_named(name) for part in load_scenario(name).part_files.values()),
         *(path for name in names.noises if (path := noise_path(name)) is not None),
         *(_with_named(arm.mjcf) if arm.model is None else arm.files),
         *(Path(path) for module in list(sys.modules.values()) if (path := getattr(module, "__file__", None))),
