@@ -14,10 +14,12 @@ from __future__ import annotations
 
 import argparse
 import csv
+import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 
+import imageio.v3 as imageio
 import numpy as np
 
 from apo_bench.assembly import Demonstration, placements
@@ -28,6 +30,7 @@ from apo_bench.observation.observing import observe
 from apo_bench.records import TrialSettings
 from apo_bench.scenario import draw_layout, load_scenario, nominal_operations
 from apo_bench.simulation.execution.replay_cache import ReplayCache
+from apo_bench.simulation.scene.render import camera_view, picture
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.statistics import wilson
 from apo_bench.trial.pose_error import goal_errors
@@ -37,6 +40,14 @@ from apo_bench.trial.trial import run_trial
 ROOT = Path(__file__).parents[1]
 RESULTS = ROOT / "benchmarks" / "results"
 PAGE = ROOT / "docs" / "results" / "thousand.md"
+PICTURE = ROOT / "docs" / "pictures" / "thousand.png"
+DRAWN = tuple(
+    f"generated:{name}"
+    for name in (
+        *("corners:3", "posts:5", "covers:5", "carried:5"),
+        *("pinned:4", "bridges:0", "grooves:5", "castles:0"),
+    )
+)
 FIRST = "<!-- thousand -->"
 LAST = "<!-- end of thousand -->"
 CHECKS = ("name", "parts", "operations", "contacts", "wrong", "fixed_mm", "seen_mm", "gap_mm", "cpu_s")
@@ -55,7 +66,9 @@ def main() -> None:
     asked.add_argument("--check", type=int, default=0, help="so many are looked at without simulation")
     asked.add_argument("--simulate", type=int, default=0, help="so many are simulated")
     asked.add_argument("--oracle", type=int, default=5, help="seeds of `oracle`")
-    asked.add_argument("--others", type=float, default=1.0, help="which part of the seeds of the other methods")
+    asked.add_argument(
+        "--others", type=float, default=1.0, help="which part of the seeds of the other methods, rounded up"
+    )
     asked.add_argument("--part", default="1/1", help="only this part of the work: 1/2, 2/2")
     asked.add_argument("--page", action="store_true", help="write tables of what is there")
     given = asked.parse_args()
@@ -63,11 +76,12 @@ def main() -> None:
     part, parts = map(int, given.part.split("/"))
     names = checked_names(given.check)[part - 1 :: parts]
     append(given.folder / "checks.csv", CHECKS, "name", names, lambda name: [check(name)])
-    seeds = {"oracle": given.oracle} | {method: round(given.others * n) for method, n in SEEDS.items()}
+    seeds = {"oracle": given.oracle} | {method: math.ceil(given.others * n) for method, n in SEEDS.items()}
     chosen = stratified(given.simulate)[part - 1 :: parts]
     trials(given.folder / "trials.csv", chosen, seeds)
     if given.page:
         keep(given.folder)
+        draw()
 
 
 def checked_names(count: int) -> list[str]:
@@ -195,6 +209,19 @@ def keep(folder: Path) -> None:
     text = "\n".join([*checks_table(kept[0]), "", *trials_table(kept[1])])
     PAGE.write_text(f"{before}{FIRST}\n\n{text}\n\n{LAST}{rest.split(LAST)[1]}", encoding="utf-8")
     print(f"Wrote {PAGE}")
+
+
+def draw() -> None:
+    """One assembly of each of eight families, every part at its goal, in two rows."""
+    views = []
+    for name in DRAWN:
+        scene = build_scene(load_scenario(name))
+        scenario = scene.scenario
+        poses = placements(scenario.assembly, scenario.start, scenario.goals)[-1]
+        view = camera_view((0.0, 0.0, 0.04), 0.33, 150.0, -30.0)
+        views.append(picture(scene, poses, 360, 300, view))
+    rows = [np.concatenate(views[k : k + 4], axis=1) for k in (0, 4)]
+    imageio.imwrite(PICTURE, np.concatenate(rows, axis=0))
 
 
 def checks_table(lines: Sequence[Line]) -> Iterator[str]:
