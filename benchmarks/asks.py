@@ -19,7 +19,9 @@ Each card says, under *What it asks for*, how often the [methods](methods.md) su
 and degrees (`by-heart` at 4, too), the same seeds for every method; `apo-bench sweep benchmarks/baselines.toml --out
 FOLDER`, then `python benchmarks/baselines.py FOLDER` and `python docs/cards.py`. `snap` puts each part onto its newest
 contacts: where it is enough, neither loops of contacts nor history matter. `by-heart` builds the assembly of the
-scenario's file: where that is enough, no layout asks for more than one assembly that is right in itself."""
+scenario's file: where that is enough, no layout asks for more than one assembly that is right in itself.
+
+There are many more: [a seed draws one](generated.md)."""
 
 
 def asks(scenario: Scenario, counts: Mapping[Place, Count]) -> str:
