@@ -25,13 +25,11 @@ def _without_command(context: typer.Context) -> None:
 
 @scenario.command("list")
 def scenario_list() -> None:
-    """List the scenarios that come with the package."""
+    """List the scenarios that come with the package; generated:SEED names any number of others."""
     from apo_bench.cli.terminal import print_scenarios
-    from apo_bench.generated import FAMILIES
     from apo_bench.scenario.file import load_scenario, scenario_names
 
     print_scenarios([load_scenario(name) for name in scenario_names()])
-    typer.echo(f"Generated: generated:SEED, or generated:FAMILY:SEED with a family out of {', '.join(FAMILIES)}.")
 
 
 @scenario.command("card")
@@ -46,7 +44,7 @@ def print_card(scenario: ScenarioArgument) -> None:
 def scenarios_command(
     scenario: Annotated[str | None, typer.Argument(help="Print the task card of this one; a name or a file.")] = None,
 ) -> None:
-    """List the scenarios that come with the package, or print the task card of one."""
+    """List the scenarios that come with the package, or print the task card of one, such as generated:17."""
     if scenario is None:
         scenario_list()
     else:

@@ -24,9 +24,7 @@ Command = TypeVar("Command", bound=Callable[..., None])
 def offered_names(what: str) -> list[str]:
     """Names that a shell is offered for a setting, or `scenario`: what comes with the package, and how others begin."""
     if what == "scenario":
-        from apo_bench.generated import FAMILIES
-
-        return [*_stems("scenarios", "*.toml"), *(f"generated:{family}:0" for family in FAMILIES)]
+        return _stems("scenarios", "*.toml")
     if what == "noise":
         from apo_bench.observation.noise import NOISES
 
