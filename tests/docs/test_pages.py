@@ -172,7 +172,7 @@ def test_printed_numbers_are_compared_to_rounding_and_words_exactly(printed: str
 
 
 def test_pages_and_notebooks_use_what_the_package_exports() -> None:
-    """But for quantiles of two estimators' noise, the tools that make part files, dm_env, touches, and own tests."""
+    """But for quantiles of two estimators' noise, the tools that make parts, dm_env, touches, pairs, own tests."""
     code = {page: [block.text for block in blocks(page) if block.language == "python"] for page in PAGES}
     for path in (ROOT / "notebooks").glob("*.ipynb"):
         cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
@@ -186,6 +186,7 @@ def test_pages_and_notebooks_use_what_the_package_exports() -> None:
     assert sum(map(len, code.values())) > 10
     assert inner == {
         "apo_bench.correction.touches",
+        "apo_bench.datasets",
         "apo_bench.envs",
         "apo_bench.observation.fitting.quantiles",
         "apo_bench.parts",
