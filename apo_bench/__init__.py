@@ -1,6 +1,6 @@
 """Does a robot's replay of an observed assembly fit, with and without correction by face contacts?
 
-Importing the package registers `APOReplay-v0` with Gymnasium and does nothing else: what is exported is imported when
+Importing the package registers its environments with Gymnasium and does nothing else: what is exported is imported when
 it is first asked for. `demonstrate`, `replay`, `run_trial`, `run_sweep` and pictures need MuJoCo; the rest does not.
 Static types are those of `__init__.pyi`.
 """
@@ -20,6 +20,7 @@ import gymnasium
 __version__ = "0.1.0"
 
 gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.envs.apo_replay:APOReplay")
+gymnasium.register(id="APOTrack-v0", entry_point="apo_bench.envs.apo_track:APOTrack")
 
 _EXPORTS = MappingProxyType(
     {

@@ -10,7 +10,7 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Poses, Step
 from apo_bench.envs.episode import Episode, Scenes, Settings, watch_human, with_options
-from apo_bench.envs.infos import step_info
+from apo_bench.envs.infos import VERDICTS, step_info, verdicts
 from apo_bench.envs.robot import RobotSettings, carried_out
 from apo_bench.envs.spaces import Action, Seen, action_space, as_seen_entries, moved, observation_space
 from apo_bench.errors import InputError
@@ -249,9 +249,9 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             raise gymnasium.error.ResetNeeded("one step is one whole replay; call reset() for the next demonstration.")
         plan = moved(self._aim, action, self.action_space)
         self._over = True
-        verdicts, end, predicted, promised = self._replayed(plan)
-        info = step_info(verdicts, end, predicted, promised)
-        return as_seen_entries(self.seen), float(verdicts["is_success"]), True, False, info
+        said, end, predicted, promised = self._replayed(plan)
+        info = step_info(said, end, predicted, promised)
+        return as_seen_entries(self.seen), float(said["is_success"]), True, False, info
 
     def aim(
         self,
@@ -315,7 +315,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         """The verdicts, where it ended, what the plan had said, and how likely it had called its success."""
         episode = self._current("there is no trial")
         simulated = episode.simulated
-        failed = dict.fromkeys(("is_success", "as_demonstrated", "loose_success"), False)
+        failed = dict.fromkeys(VERDICTS, False)
         if simulated.demonstration.code != "ok":
             return failed, demonstration_failure(simulated.demonstration), None, None
         if self._refused is not None:
@@ -329,9 +329,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         attempt = carried_out(robot, plan, self._scene, simulated.layout.goals, episode.trial, self._watch())
         if attempt.result.reached.final is not None:
             self._poses = attempt.result.reached.final.poses
-        judged = attempt.verdict
-        verdicts = (judged.success, judged.as_demonstrated, judged.loose_success)
-        return dict(zip(failed, verdicts, strict=True)), trial_outcome(attempt), predicted, promised
+        return verdicts(attempt.verdict), trial_outcome(attempt), predicted, promised
 
     def _watch(self) -> Any:
         """What looks on at a replay: in mode `human` a new window, since every replay has its own data."""

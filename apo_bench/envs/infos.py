@@ -8,7 +8,11 @@ from collections.abc import Mapping
 from typing import Any, final
 
 from apo_bench.assembly import Outcome
+from apo_bench.judging.verdict import Verdict
 from apo_bench.records import Predicted
+
+VERDICTS = ("is_success", "as_demonstrated", "loose_success")
+"""Keys of what the judge says."""
 
 
 @final
@@ -31,6 +35,11 @@ def nullable(x: float | None) -> float | None:
 def predicted_info(predicted: Mapping[str, Any]) -> dict[str, Any]:
     """What a plan said about itself, as in a row, fit for infos."""
     return {**predicted, **{name: nullable(predicted[name]) for name in ("operation", "size_mm")}}
+
+
+def verdicts(verdict: Verdict) -> dict[str, bool]:
+    """What the judge says."""
+    return dict(zip(VERDICTS, (verdict.success, verdict.as_demonstrated, verdict.loose_success), strict=True))
 
 
 def step_info(

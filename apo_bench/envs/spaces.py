@@ -43,6 +43,17 @@ def action_space(n: int) -> spaces.Space[Action]:
     return spaces.Box(-twist, twist, dtype=np.float64)
 
 
+def track_spaces(n: int) -> tuple[spaces.Dict, spaces.Dict]:
+    """What is seen and done by who follows a human through `n` operations."""
+    seen = observation_space(n)
+    several = spaces.MultiBinary(n)
+    twist = spaces.Box(-_LARGEST_TWIST, _LARGEST_TWIST, dtype=np.float64)
+    return (
+        spaces.Dict({**seen.spaces, "shown": several, "done": several, "placed": seen["goals"]}),
+        spaces.Dict({"act": spaces.Discrete(3), "twist": twist}),
+    )
+
+
 def as_seen_entries(observation: Observation) -> Seen:
     """Fresh copies of what was seen."""
     return {

@@ -62,7 +62,7 @@ def track_operations(observation: Observation, sets: _Sets) -> Correction:
     targets = list[Array]()
     steps = list[TrackedOperation]()
     for n in range(len(now)):
-        steps.append(_next(observation, now[: n + 1], sets))
+        steps.append(next_operation(observation, now[: n + 1], sets))
         if steps[-1].status != "converged":
             return _report(observation, now, steps)
         back = reached_back(n, steps[-1].freed)
@@ -78,8 +78,8 @@ def reached_back(n: int, freed: Iterable[int]) -> list[Step]:
     return [Step(k, undo=True) for k in reversed(range(i, n))] + [Step(k) for k in range(i, n + 1)]
 
 
-def _next(observation: Observation, goals: Array, sets: _Sets) -> TrackedOperation:
-    """The last of these goals has just been observed; the others are in force."""
+def next_operation(observation: Observation, goals: Array, sets: _Sets) -> TrackedOperation:
+    """What one more operation asks for: the last of these goals has just been observed, the others are in force."""
     n = len(goals) - 1
     system = equations(observation.assembly.first(n + 1), observation.start, goals)
     failing = ~(system.gaps(goals) <= observation.gap_m)
