@@ -6,11 +6,11 @@ from pathlib import Path
 from typing import Any, final
 
 import gymnasium
-import numpy as np
 
-from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Poses, Step
+from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Step
 from apo_bench.envs.episode import Episode, Scenes, Settings, watch_human, with_options
 from apo_bench.envs.infos import VERDICTS, step_info, verdicts
+from apo_bench.envs.rendering import FPS, MODES, Rendering
 from apo_bench.envs.robot import RobotSettings, carried_out
 from apo_bench.envs.spaces import Action, Seen, action_space, as_seen_entries, moved, observation_space
 from apo_bench.errors import InputError
@@ -24,6 +24,7 @@ from apo_bench.records import (
     TrialSettings,
     check,
     check_squares,
+    check_together,
     level_pair,
     refuse_noise,
 )
@@ -41,8 +42,6 @@ from apo_bench.trial.stages import (
     range_sensor,
     trial_outcome,
 )
-
-PICTURE = (480, 640)
 
 
 @final
@@ -78,14 +77,14 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     demonstration began.
 
     `reset(options={...})` takes `level`, `careless` and `clearance_mm`, with the meaning of the arguments below and for
-    that episode alone; any other key is refused.
+    that episode alone; any other key is refused, but for `lerobot_new_rollout`, which means nothing here.
 
     ## Episode End
-    Every step terminates. `info` then holds `is_success`, `as_demonstrated` (each contact was also made when and where
-    it was shown), `loose_success`, `stage` and `code` (`done` and `ok`, or out of `apo_bench.records.outcomes`),
-    `operation` (numbered from 1, or None), `sentence` and, if a plan was carried out, `predicted`: what it said about
-    itself before, `fails`, `operation`, `code`, `size_mm`, and `promised`, the probability of success that it stated.
-    Never the truth, and nothing from which it can be drawn.
+    Every step terminates. `info` then holds `is_success` and, the same, `success`; `as_demonstrated` (each contact was
+    also made when and where it was shown), `loose_success`, `stage` and `code` (`done` and `ok`, or out of
+    `apo_bench.records.outcomes`), `operation` (numbered from 1, or None), `sentence` and, if a plan was carried out,
+    `predicted`: what it said about itself before, `fails`, `operation`, `code`, `size_mm`, and `promised`, the
+    probability of success that it stated. Never the truth, and nothing from which it can be drawn.
     A replay that takes more than 1000 s of simulated time, which only a schedule of a great many steps does, begins no
     further step: code `time_limit`. Wall time has no limit.
     A demonstration that went wrong itself (at most one in a hundred) is passed over by `reset()`; `reset(seed=k)`
@@ -109,8 +108,9 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     - `looks`: how often `env.unwrapped.look(operations)`, or a corrector that can ask, may look at operations again.
     - `abstain`: a plan that promises to succeed with less than this probability is not carried out: reward 0, stage
       `promise`, code `abstained`. 0 carries out everything.
+    - `fidelity`: `full`, or `contact`, which simulates only where parts may touch: a third of the time.
     - `render_mode`: `rgb_array` shows arm and parts before the step and where the replay ended after it, without a
-      display; `human` opens a window when the replay begins.
+      display; `rgb_array_list` the pictures of the whole replay; `human` opens a window when the replay begins.
 
     ## Copies
     An environment can be pickled and copied (`copy.deepcopy`) at any time, and the copy goes on exactly as the original
@@ -120,7 +120,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
     - v0: first version.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array", "human"], "render_fps": 25}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": [*MODES], "render_fps": FPS}  # noqa: RUF012
 
     def __init__(
         self,
@@ -139,14 +139,20 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         wrench: str = TrialSettings.wrench,
         stated_error: str = TrialSettings.stated_error,
         abstain: float = TrialSettings.abstain,
+        fidelity: str = TrialSettings.fidelity,
         render_mode: str | None = None,
     ) -> None:
         if render_mode not in (None, *self.metadata["render_modes"]):
-            raise InputError(f"the render mode '{render_mode}' was given; use rgb_array, human or None.")
+            raise InputError(
+                f"the render mode '{render_mode}' was given; use rgb_array, rgb_array_list, human or None."
+            )
         check("eye", eye)
         check("looks", looks)
         check("abstain", abstain)
+        check("fidelity", fidelity)
+        check_together(fidelity, grasp)
         self._abstain = abstain
+        self._fidelity = fidelity
         self._robot = RobotSettings(robot_error, feels, wrench, stated_error).checked()
         check_squares(self._robot.feels, grasp)
         self.render_mode = render_mode
@@ -168,9 +174,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._correction: Correction | None = None
         self._refused: Outcome | None = None
         self._over = False
-        self._poses: Poses = self._scene.scenario.start
-        self._state: Array | None = None
-        self._window: Any = None
+        self._rendering = Rendering(self._scene.scenario.start)
 
     @property
     def assembly(self) -> Assembly:
@@ -234,8 +238,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self.aim(seen.goals)
         self._refused = observation_failure(seen)
         self._over = False
-        self._poses = simulated.layout.start
-        self._state = None
+        self._rendering.begin(simulated.layout.start)
         return as_seen_entries(seen), {"demonstration": simulated.demonstration.code}
 
     def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
@@ -286,22 +289,14 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._refused = Outcome("correct", code, None, why)
 
     def render(self) -> Any:
-        """The scene as an array (480, 640, 3) of uint8; None in mode `human`, which shows the replay itself."""
-        if self.render_mode != "rgb_array":
-            return None
-        from apo_bench.simulation.scene.render import picture_with_arm
-
-        return picture_with_arm(self._scene, self._poses, self._state, PICTURE[1], PICTURE[0])
+        """The scene as an array (480, 640, 3) of uint8; in mode `rgb_array_list` those of the replay, (240, 320, 3), in
+        `human`, which shows the replay itself, None.
+        """
+        return self._rendering.shown(self._scene, self.render_mode)
 
     def close(self) -> None:
         """Close the window, if one is open."""
-        if self._window is not None:
-            self._window.close()
-            self._window = None
-
-    def __getstate__(self) -> dict[str, Any]:
-        """All but the window."""
-        return {**self.__dict__, "_poses": dict(self._poses), "_window": None}
+        self._rendering.close()
 
     def _set(self, now: Settings) -> None:
         """Have noise and scene of these settings, or raise an `InputError` and change nothing."""
@@ -326,19 +321,9 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         promised = promised_success(plan, self.seen, self._correction, self._scene, *told)
         if promised < self._abstain:
             return failed, abstained(promised, self._abstain), predicted, promised
-        attempt = carried_out(robot, plan, self._scene, simulated.layout.goals, episode.trial, self._watch())
+        watch = self._rendering.watch(self._scene, self.render_mode)
+        truth = simulated.layout.goals
+        attempt = carried_out(robot, plan, self._scene, truth, episode.trial, watch, self._fidelity)
         if attempt.result.reached.final is not None:
-            self._poses = attempt.result.reached.final.poses
+            self._rendering.poses = attempt.result.reached.final.poses
         return verdicts(attempt.verdict), trial_outcome(attempt), predicted, promised
-
-    def _watch(self) -> Any:
-        """What looks on at a replay: in mode `human` a new window, since every replay has its own data."""
-        if self.render_mode == "human":
-            from apo_bench.simulation.scene.render import ReplayWindow
-
-            self.close()
-            self._window = ReplayWindow(self._scene)
-        return self._remember if self.render_mode == "rgb_array" else self._window
-
-    def _remember(self, data: Any) -> None:
-        self._state = np.array(data.qpos)

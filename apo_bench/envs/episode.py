@@ -49,11 +49,13 @@ class Episode:
     """None where no looks are allowed."""
 
 
+_OF_TOOLS = frozenset({"lerobot_new_rollout"})
+"""Options that evaluation tools pass to every environment; they mean nothing here."""
 _OPTIONS = tuple(field.name for field in fields(Settings))
 
 
 def with_options(usual: Settings, options: object, eye: str) -> Settings:
-    """The settings of an episode: the usual ones, but for what the options say.
+    """The settings of an episode: the usual ones, but for what the options say; those of tools say nothing.
 
     Raises:
         InputError: An option that there is not, or a value that is not allowed.
@@ -64,7 +66,7 @@ def with_options(usual: Settings, options: object, eye: str) -> Settings:
         raise InputError(
             f"the options {options!r} were given to reset(); a dict with {', '.join(_OPTIONS)} is allowed."
         )
-    changes: dict[str, Any] = dict(options)
+    changes: dict[str, Any] = {name: value for name, value in options.items() if name not in _OF_TOOLS}
     for name in changes:
         if name not in _OPTIONS:
             raise InputError(unknown("option of reset()", str(name), _OPTIONS))

@@ -48,6 +48,7 @@ def step_info(
     """What is said after a step: the verdicts, where the replay ended, and what the plan had said of itself."""
     return {
         **verdicts,
+        "success": verdicts["is_success"],
         "stage": end.stage,
         "code": end.code,
         "operation": nullable(None if end.operation is None else end.operation + 1),

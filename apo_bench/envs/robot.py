@@ -40,12 +40,15 @@ class RobotSettings(NamedTuple):
         )
 
 
-def carried_out(robot: RobotSettings, plan: Plan, scene: Scene, reference: Array, trial: int, watch: Any) -> Attempt:
+def carried_out(
+    robot: RobotSettings, plan: Plan, scene: Scene, reference: Array, trial: int, watch: Any, fidelity: str
+) -> Attempt:
     """One replay by this robot, and the verdict on it.
 
     Args:
         reference: As in `replay_and_judge`.
         trial: Its number; the robot's errors, and the noise of what it feels, are those of this trial.
+        watch, fidelity: As in `replay_and_judge`.
     """
     told = told_error(robot.stated_error, robot.robot_error)
     return replay_and_judge(
@@ -53,6 +56,7 @@ def carried_out(robot: RobotSettings, plan: Plan, scene: Scene, reference: Array
         scene,
         reference,
         watch,
+        fidelity,
         searches=robot.feels,
         most_s=LONGEST_REPLAY_S,
         error=draw_robot_error(robot.robot_error, scene, trial),

@@ -13,7 +13,9 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.spaces import Box
 from gymnasium.utils.env_checker import check_env
+from gymnasium.wrappers import FlattenObservation, RescaleAction, TransformObservation
 
 import apo_bench
 from apo_bench import Correction, InputError, Observation, Scene, TrialSettings, correct, run_trial
@@ -115,7 +117,7 @@ def test_an_episode_is_the_row_of_its_trial(small: APOReplay) -> None:
     row = run_trial(TrialSettings("block_on_block", grasp="weld", method="paper", seed=SEED), small._scene)
     assert row["success"] is True
     _check_episode(apo_bench.Corrected(small, "paper"), row)
-    reached = {part: [*(pose.pack(T)[:3] * 1e3), *pose.pack(T)[3:]] for part, T in small._poses.items()}
+    reached = {part: [*(pose.pack(T)[:3] * 1e3), *pose.pack(T)[3:]] for part, T in small._rendering.poses.items()}
     assert reached == row["reached"]
 
 
@@ -271,7 +273,8 @@ def test_info_never_holds_the_truth(watched: APOReplay) -> None:
     said = info.pop("predicted")
     assert set(said) == {"fails", "operation", "code", "size_mm"}
     assert 0.0 <= info.pop("promised") <= 1.0
-    assert set(info) == {"is_success", "as_demonstrated", "loose_success", "stage", "code", "operation", "sentence"}
+    verdicts = {"is_success", "success", "as_demonstrated", "loose_success"}
+    assert set(info) == verdicts | {"stage", "code", "operation", "sentence"}
     assert set(first) == {"demonstration"}
     assert info["stage"] in (*outcomes.STAGES, "done")
     assert info["code"] in outcomes.CODES
@@ -404,7 +407,9 @@ def test_poses_may_be_measured_in_depth_images() -> None:
         ({"grasp": "glue"}, "unknown grasp 'glue'"),
         ({"clearance_mm": -1.0}, "clearance of -1"),
         ({"arm": "seven_axis"}, "did you mean 'six_axis'"),
-        ({"render_mode": "ansi"}, "use rgb_array, human or None"),
+        ({"fidelity": "ful"}, "did you mean 'full'"),
+        ({"fidelity": "contact", "grasp": "weld"}, "the fidelity 'contact' was given together with the grasp 'weld'"),
+        ({"render_mode": "ansi"}, "use rgb_array, rgb_array_list, human or None"),
     ],
 )
 def test_wrong_arguments_are_refused(arguments: dict[str, Any], words: str) -> None:
@@ -443,9 +448,61 @@ def test_a_picture_without_a_display(small: APOReplay) -> None:
         small.render_mode = None
     assert (before.shape, before.dtype) == ((480, 640, 3), np.uint8)
     assert before.std() > 10
-    assert small._state is not None
-    assert small._state.shape == small._scene.work.model.qpos0.shape
+    assert small._rendering.state is not None
+    assert small._rendering.state.shape == small._scene.work.model.qpos0.shape
     assert np.abs(before.astype(int) - after.astype(int)).max() > 50
+
+
+def test_a_film_of_the_replay() -> None:
+    made = gymnasium.make("APOReplay-v0", scenario="block_on_block", grasp="weld", render_mode="rgb_array_list")
+    made.reset(seed=SEED)
+    (before,) = made.render()
+    made.step(zeros(made))
+    frames = made.render()
+    assert len(frames) > 20
+    assert {frame.shape for frame in (before, *frames)} == {(240, 320, 3)}
+    assert np.abs(frames[0].astype(int) - frames[-1].astype(int)).max() > 50
+    assert len(copy.deepcopy(made.unwrapped).render()) == len(frames)
+    made.reset(seed=SEED)
+    assert len(made.render()) == 1
+
+
+def test_the_fidelity_is_that_of_the_replay(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+    true = robot.replay_and_judge
+
+    def replay_and_judge(*args: Any, **more: Any) -> Any:
+        asked.append(args[4])
+        return true(*args, **more)
+
+    monkeypatch.setattr(REPLAY, replay_and_judge)
+    row = run_trial(TrialSettings("block_on_block", fidelity="contact", method="none", seed=SEED))
+    made = APOReplay("block_on_block", fidelity="contact")
+    made.reset(seed=SEED)
+    *_, info = made.step(zeros(made))
+    assert (asked, info["code"]) == (["contact"], "ok")
+    assert info["is_success"] is info["success"] is row["success"]
+
+
+def test_what_evaluation_tools_pass_is_no_option(small: APOReplay) -> None:
+    first, _ = small.reset(seed=SEED, options={"lerobot_new_rollout": True, "level": 2.0})
+    again, _ = small.reset(seed=SEED, options={"level": 2.0})
+    np.testing.assert_array_equal(first["goals"], again["goals"])
+
+
+def test_wrappers_of_gymnasium_make_it_flat_and_float32() -> None:
+    base = gymnasium.make("APOReplay-v0", scenario="block_on_block", grasp="weld")
+    flat = FlattenObservation(base)
+    bounds = Box(np.float32(flat.observation_space.low), np.float32(flat.observation_space.high))
+    env = RescaleAction(TransformObservation(flat, np.float32, bounds), np.float64(-1), np.float64(1))
+    seen, _ = env.reset(seed=SEED)
+    assert env.observation_space.contains(seen)
+    assert seen.dtype == np.float32
+    rng = np.random.default_rng(1)
+    for _ in range(100):
+        action = rng.choice([-1.0, 1.0, 0.3], env.action_space.shape).astype(np.float32)
+        assert base.action_space.contains(np.asarray(env.action(action), dtype=np.float64))
+    np.testing.assert_array_equal(env.action(zeros(env).astype(np.float32)), zeros(base))
 
 
 def test_the_human_mode_watches_the_replay_and_closes(watched: APOReplay, monkeypatch: pytest.MonkeyPatch) -> None:

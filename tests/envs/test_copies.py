@@ -135,8 +135,8 @@ def test_a_window_is_not_copied(monkeypatch: pytest.MonkeyPatch) -> None:
     env = APOReplay(SMALL, grasp="weld", level=40, render_mode="human")
     env.reset(seed=SEED)
     env.step(NEAR)
-    assert env._window is not None
-    assert WAYS["deepcopy"](env)._window is None
+    assert env._rendering.window is not None
+    assert WAYS["deepcopy"](env)._rendering.window is None
 
 
 @pytest.mark.parametrize("options", [{"level": (0.5, 0.25), "careless": 0}, {"clearance_mm": 0.5}])
