@@ -16,6 +16,7 @@ from apo_bench import __version__
 from apo_bench.cli import (
     arm,
     correction,
+    dataset,
     noise,
     part,
     perception,
@@ -122,7 +123,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
 }
 for _name, _command in _COMMANDS.items():
     app.command(_name, cls=GroupedOptions if _name in _LONG else None)(_command)
-for _group in (noise.noise, arm.arm, part.part, power.power, scenario.scenario, recording.recording):
+for _group in (dataset.dataset, noise.noise, arm.arm, part.part, power.power, scenario.scenario, recording.recording):
     app.add_typer(_group)
 
 if __name__ == "__main__":

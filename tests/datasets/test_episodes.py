@@ -1,0 +1,107 @@
+"""Whole trials as tables: their numbers are those of the trials, and the card says what each column is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from pyarrow import parquet
+
+from apo_bench import TrialSettings, load_scenario, run_trial
+from apo_bench.cli.app import main
+from apo_bench.datasets.episodes import EPISODES, FRAMES, make_dataset
+from apo_bench.geometry import pose
+
+
+def read(path: Path) -> list[dict[str, Any]]:
+    return parquet.read_table(path).to_pylist()
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("dataset") / "data"
+    assert main(["dataset", "make", "block_on_block", "dovetail", "--episodes", "1", "--out", str(out)]) == 0
+    return out
+
+
+def test_an_episode_is_a_trial(made: Path) -> None:
+    episodes = read(made / "episodes.parquet")
+    assert [(each["scenario"], each["seed"]) for each in episodes] == [
+        ("block_on_block", 1000000),
+        ("dovetail", 1000000),
+    ]
+    clearance_mm = load_scenario("dovetail").clearance_mm
+    row = run_trial(TrialSettings("dovetail", seed=1000000, level_mm=1.0, level_deg=1.0, clearance_mm=clearance_mm))
+    one = episodes[1]
+    assert {name: one[name] for name in ("spec_hash", "success", "sentence", "method", "sim_seconds")} == {
+        name: row[name] for name in ("spec_hash", "success", "sentence", "method", "sim_seconds")
+    }
+    goals = [pose.unpack(np.reshape(one[f"{name}_goals"], (-1, 7))) for name in ("seen", "true", "planned")]
+    errors = [np.linalg.norm((T - goals[1])[:, :3, 3]) for T in goals]
+    assert errors[2] < errors[0]
+    assert np.reshape(one["covariance"], (2, 6, 6)).shape[0] == len(one["seen"]) == len(one["main_parts"])
+    assert one["schedule"] == [1, 2]
+
+
+def test_frames_end_where_the_replay_did(made: Path) -> None:
+    one = read(made / "episodes.parquet")[1]
+    frames = read(made / "frames" / "000001.parquet")
+    assert len(frames) == one["frames"] > 100
+    assert {frame["episode"] for frame in frames} == {1}
+    assert np.all(np.diff([frame["t_s"] for frame in frames]) < 0.1)
+    assert {frame["operation"] for frame in frames} - {None} == {1, 2}
+    assert max(frame["force_n"] for frame in frames) > 0.1
+    last = dict(zip(one["parts"], np.reshape(frames[-1]["part_poses"], (-1, 7)), strict=True))
+    planned = dict(zip(one["main_parts"], np.reshape(one["planned_goals"], (-1, 7)), strict=True))
+    for part, at in planned.items():
+        np.testing.assert_allclose(last[part][:3], at[:3], atol=1e-3)
+    assert len(frames[0]["joints"]) == 6
+
+
+def test_the_card_says_what_every_column_is(made: Path) -> None:
+    card = (made / "README.md").read_text(encoding="utf-8")
+    assert set(parquet.read_schema(made / "episodes.parquet").names) == EPISODES.keys()
+    assert set(parquet.read_schema(made / "frames" / "000000.parquet").names) == FRAMES.keys()
+    for column, meaning in (EPISODES | FRAMES).items():
+        assert f"| `{column}` | " in card
+        assert meaning in card
+    assert "2 simulated trials, 2 of them right" in card
+    assert "Licence: Apache-2.0" in card
+
+
+def test_the_same_trials_give_the_same_tables_and_one_without_a_plan_has_no_frames(tmp_path: Path) -> None:
+    trials = [TrialSettings("block_on_block", method=method, level_mm=40, level_deg=40) for method in ("none", "paper")]
+    for name in ("a", "b"):
+        make_dataset(trials, tmp_path / name, "by hand")
+    files = [sorted(path.relative_to(tmp_path / name) for path in (tmp_path / name).rglob("*.*")) for name in "ab"]
+    assert files[0] == files[1]
+    for path in files[0]:
+        assert (tmp_path / "a" / path).read_bytes() == (tmp_path / "b" / path).read_bytes()
+    for each in read(tmp_path / "a" / "episodes.parquet"):
+        frames = tmp_path / "a" / "frames" / f"{each['episode']:06}.parquet"
+        assert frames.exists() == (each["frames"] > 0)
+        assert (each["planned_goals"] is not None) or not each["frames"]
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["--out", "."], "is there already and not an empty folder"),
+        (["--out", "new", "--format", "csv"], "parquet is allowed"),
+        (["--out", "new", "--episodes", "0"], "a whole number from 1 is allowed"),
+        (["--out", "new", "--method", "contcat"], "did you mean 'contact'"),
+    ],
+)
+def test_what_is_wrong_is_said(
+    words: list[str],
+    complaint: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "mine.txt").write_text("kept")
+    assert main(["dataset", "make", "block_on_block", *words]) == 2
+    assert complaint in capsys.readouterr().err
