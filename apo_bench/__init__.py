@@ -21,6 +21,7 @@ __version__ = "0.1.0"
 
 gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.envs.apo_replay:APOReplay")
 gymnasium.register(id="APOTrack-v0", entry_point="apo_bench.envs.apo_track:APOTrack")
+gymnasium.register(id="APOInsert-v0", entry_point="apo_bench.envs.apo_insert:APOInsert")
 
 _EXPORTS = MappingProxyType(
     {

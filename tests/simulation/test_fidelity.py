@@ -10,7 +10,7 @@ import pytest
 
 from apo_bench import InputError, Plan, TrialSettings, build_scene, load_scenario, replay, run_trial
 from apo_bench.geometry import intrusion_depths, pose
-from apo_bench.simulation.execution.controller import LOOK_S, PATIENCE_S, _until_rest
+from apo_bench.simulation.execution.controller import LOOK_S, PATIENCE_S, until_rest
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
 from apo_bench.simulation.robot import obstacles, robot
@@ -283,7 +283,7 @@ def test_what_rocks_on_is_followed_in_parts_of_a_step_with_bounded_patience():
     forever = Restless(np.inf)
     soon = Restless(3)
     for case in (forever, soon):
-        _until_rest(case)
+        until_rest(case)
     assert len(forever.parts) == round(PATIENCE_S / LOOK_S)
     lengths = [parts for parts, _ in groupby(forever.parts)]
     assert lengths == [1, 4, 8, 2, 3]

@@ -4,7 +4,9 @@ Each is a sequence of straight motions of the tip, by `Robot.follow` and `Robot.
 the plan are carried out in force: guarded where contacts close, by position along those that stay closed.
 """
 
+import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -85,13 +87,87 @@ def bring(robot: Robot, t: Transfer, i: int, lay: Callable[[Transfer, Grip], Gri
     Raises:
         Halt: Something went wrong; the stage and code say what.
     """
+    grip, second = before_attach(robot, t, i, lay)
+    robot.macro = ", ".join(macro.name for macro in t.macros if macro.name != "slide-to-contact")
+    left, grip = _attach(robot, t, grip, second)
+    _leave_there(robot, t, grip, left)
+
+
+def before_attach(
+    robot: Robot, t: Transfer, i: int, lay: Callable[[Transfer, Grip], Grip] | None
+) -> tuple[Grip, Grip | None]:
+    """Carry the part to where the guarded motion begins; returns the grip, and the next if it is to be changed.
+
+    Args:
+        lay: As in `bring`.
+
+    Raises:
+        Halt: Something went wrong; the stage and code say what.
+    """
     grip = t.grips[i]
     if lay is not None and not t.into.level:
         grip = lay(t, grip)
     _carry(robot, t, grip)
     if lay is not None and t.into.level:
         grip = lay(t, grip)
-    left, grip = _attach(robot, t, grip, t.grips[i + 1] if t.into.left is not None else None)
+    robot.stage = "attach"
+    return grip, t.grips[i + 1] if t.into.left is not None else None
+
+
+def after_attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None, T_found: Array) -> None:
+    """What comes after a guarded motion to `end_of_attach` that somebody else has led: the rest of the operation.
+
+    Args:
+        T_found: What brings the poses that were meant to those that were found, (4, 4), world.
+
+    Raises:
+        Halt: Something went wrong; the stage and code say what.
+    """
+    left = 0.0
+    rise = t.floats
+    if second is not None:
+        grip, rise = _with_other_grip(robot, t, grip, second, T_found)
+        left = _to_goal(robot, t, grip, rise, T_found)
+    lower = rise if t.into.level else 0.0
+    guard = Guard(-UP, t.place_n) if t.into.level else Guard(t.into.way, t.place_n)
+    robot.follow(steady(robot.T, shifted(robot.T, guard.way, lower + _OVERTRAVEL_M), _TOUCH), guard)
+    robot.stand()
+    _slides(robot, t, left)
+    _leave_there(robot, t, grip, left)
+
+
+def end_of_attach(t: Transfer, grip: Grip, second: Grip | None) -> Array:
+    """The tip pose at which the guarded motion ends, or the first of two with a change of the grip between, (4, 4)."""
+    goal = first_contact_pose(t)
+    if second is not None and t.into.left is not None:
+        goal = shifted(t.T_world_goal, t.into.way, -t.into.left)
+    return shifted(goal, UP, t.floats if t.into.level else 0.0) @ grip.T_part_tip
+
+
+class Pace(NamedTuple):
+    """How fast a guarded motion goes in, by how far it is from the goal."""
+
+    quick: float
+    """[m/s], apart from the stretches."""
+    stretches: tuple[tuple[float, float, float], ...]
+    """From and to so far before the goal, [m], at most so fast, [m/s]."""
+    end: float
+    """It ends so far before the goal, [m]; beyond it, where it is felt for."""
+
+
+def pace(t: Transfer, second: Grip | None) -> Pace:
+    """The pace of the motion to `end_of_attach`: slow where a mouth or contact may be."""
+    bottom = any(macro.name == "move-to-bottom" for macro in t.macros)
+    if not t.into.level:
+        return Pace(_PLACE, ((t.slow, -math.inf, _TOUCH),), -_OVERTRAVEL_M)
+    mouths = tuple((at + _BEFORE_M, at - _BEHIND_M, _INSERT) for at in t.mouths)
+    if second is not None and t.into.left is not None:
+        return Pace(_THROUGH, mouths, t.into.left)
+    return Pace(_THROUGH, (*mouths, (_BOTTOM_M, -math.inf, _TOUCH)) if bottom else mouths, -_OVERTRAVEL_M * bottom)
+
+
+def _leave_there(robot: Robot, t: Transfer, grip: Grip, left: float) -> None:
+    """Let go and depart; `left` [m] is what is left of an insertion."""
     release(robot, t, grip)
     depart(robot, t)
     if left > _ARRIVED_M:
@@ -123,46 +199,58 @@ def _attach(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple
 
     Those that lead along the line of attach are one motion, which ends where the last of them does.
     """
-    robot.macro = ", ".join(macro.name for macro in t.macros if macro.name != "slide-to-contact")
-    robot.stage = "attach"
     left = 0.0
     if t.into.level:
         left, grip = _insert(robot, t, grip, second)
     else:
         _come_down(robot, t, grip)
+    _slides(robot, t, left)
+    return left, grip
+
+
+def _slides(robot: Robot, t: Transfer, left: float) -> None:
+    """Against each of its sides, if an insertion came as far as that."""
     for i, side in enumerate(t.sides if left <= _ARRIVED_M else ()):
         _slide(robot, t, side, t.sides[:i])
-    return left, grip
 
 
 def _insert(robot: Robot, t: Transfer, grip: Grip, second: Grip | None) -> tuple[float, Grip]:
     """The guarded level line, pushed to where the grip changes and pulled from there; returns what is left of it."""
-    guard = Guard(t.into.way, t.insert_n)
     rise = t.floats
     T_search = None
     if t.into.left is not None and second is not None:
-        there = shifted(shifted(t.T_world_goal, t.into.way, -t.into.left), UP, rise)
-        line = _into(robot, t, there @ grip.T_part_tip, t.into.left)
-        left, T_search = press_in(robot, t, grip, line, guard, _ARRIVED_M)
+        line = _into(robot, t, end_of_attach(t, grip, second), t.into.left)
+        left, T_search = press_in(robot, t, grip, line, Guard(t.into.way, t.insert_n), _ARRIVED_M)
         if left > _ARRIVED_M:
             return left + t.into.left, grip
-        change_grip(robot, t, grip, second, after_search(T_search, shifted(there, UP, -rise) @ second.T_part_tip))
-        grip = second
-        rise = t.clearance
-        robot.follow(smooth(robot.T, shifted(robot.T, UP, rise), 0.01))
-    goal = after_search(T_search, shifted(first_contact_pose(t) @ grip.T_part_tip, UP, rise))
-    if any(macro.name == "move-to-bottom" for macro in t.macros):
-        line = _into(robot, t, shifted(goal, t.into.way, -_BOTTOM_M), _BOTTOM_M)
-        left, T_search = press_in(robot, t, grip, line, guard, _ARRIVED_M)
-        if left == 0.0:
-            beyond = after_search(T_search, shifted(goal, t.into.way, _OVERTRAVEL_M))
-            robot.follow(steady(robot.T, beyond, _TOUCH), guard)
-    else:
-        left, _ = press_in(robot, t, grip, _into(robot, t, goal, 0.0), guard, _ARRIVED_M)
+        grip, rise = _with_other_grip(robot, t, grip, second, T_search)
+    left = _to_goal(robot, t, grip, rise, T_search)
     lower = shifted(robot.T, UP, -rise - _OVERTRAVEL_M)
     robot.follow(steady(robot.T, lower, _TOUCH), Guard(-UP, t.place_n))
     robot.stand()
     return left, grip
+
+
+def _with_other_grip(robot: Robot, t: Transfer, grip: Grip, second: Grip, T_search: Array | None) -> tuple[Grip, float]:
+    """Take the part at its second place, and lift it off the floor; returns that grip, and how far up the part is."""
+    there = shifted(shifted(t.T_world_goal, t.into.way, -(t.into.left or 0.0)), UP, t.floats)
+    change_grip(robot, t, grip, second, after_search(T_search, shifted(there, UP, -t.floats) @ second.T_part_tip))
+    robot.follow(smooth(robot.T, shifted(robot.T, UP, t.clearance), 0.01))
+    return second, t.clearance
+
+
+def _to_goal(robot: Robot, t: Transfer, grip: Grip, rise: float, T_search: Array | None) -> float:
+    """The guarded level line to the goal, and against a bottom; returns what is left of it, [m]."""
+    guard = Guard(t.into.way, t.insert_n)
+    goal = after_search(T_search, shifted(first_contact_pose(t) @ grip.T_part_tip, UP, rise))
+    if not any(macro.name == "move-to-bottom" for macro in t.macros):
+        return press_in(robot, t, grip, _into(robot, t, goal, 0.0), guard, _ARRIVED_M)[0]
+    line = _into(robot, t, shifted(goal, t.into.way, -_BOTTOM_M), _BOTTOM_M)
+    left, T_search = press_in(robot, t, grip, line, guard, _ARRIVED_M)
+    if left == 0.0:
+        beyond = after_search(T_search, shifted(goal, t.into.way, _OVERTRAVEL_M))
+        robot.follow(steady(robot.T, beyond, _TOUCH), guard)
+    return left
 
 
 def _come_down(robot: Robot, t: Transfer, grip: Grip) -> None:

@@ -70,7 +70,7 @@ def replay(
     """
     feeling = None if feels is None else Feeling(feels, plan, scene, error)
     acts = () if feels is None else feels.acts
-    prepared = partial(_todo, plan, scene, searches or "search" in acts, acts)
+    prepared = partial(moves_of, plan, scene, searches or "search" in acts, acts)
     start = plan.start if parts_at is None else parts_at
     if len(plan.schedule) * _SHORTEST_STEP_S > most_s:
         todo: tuple[Move, ...] = ()
@@ -88,7 +88,7 @@ def replay(
     robot = Robot(scene, start, hooks, fidelity, error)
     progress = Progress([None] * len(plan.assembly), [])
     with sleeping(scene.work, scene.grasp == "friction"), left_out(scene.work):
-        outcome = refused or _run_schedule(plan, robot, todo, progress, cache, keys, most_s, feeling, prepared)
+        outcome = refused or run_schedule(plan, robot, todo, progress, cache, keys, most_s, feeling, prepared)
         final = _settled(robot, plan) if outcome.code != "unstable_simulation" else None
     result = ReplayResult(
         reached=Reached(after=tuple(progress.after), final=final),
@@ -104,10 +104,10 @@ def replay(
     return result
 
 
-def _todo(
+def moves_of(
     plan: Plan, scene: Scene, searches: bool, acts: tuple[str, ...], error: RobotError | None
 ) -> tuple[Move, ...]:
-    """The transfers of a plan, as a robot carries them out whose base and tool are not where it believes them."""
+    """The moves of a plan, as a robot carries them out whose base and tool are not where it believes them."""
     if error is None:
         return moves(plan, scene, searches, acts)
     planned = moves(error.plan(plan), scene, searches, acts)
@@ -126,7 +126,7 @@ def _refusal(plan: Plan, scene: Scene, todo: tuple[Move, ...]) -> Outcome | None
     return None
 
 
-def _run_schedule(
+def run_schedule(
     plan: Plan,
     robot: Robot,
     todo: tuple[Move, ...],
@@ -171,7 +171,7 @@ def _run_schedule(
                     lay = partial(lay_down, robot, feeling, step.operation)
             bring(robot, transfer, grip, lay)
             _note_hold(robot, step)
-            _until_rest(robot)
+            until_rest(robot)
         except Halt as halt:
             if halt.code != "unstable_simulation":
                 _note_hold(robot, step)
@@ -193,7 +193,7 @@ def _note_hold(robot: Robot, step: Step) -> None:
     robot.hold_watch = HoldWatch(finished=watch.finished) if step.undo else watch.finish(step.operation)
 
 
-def _until_rest(robot: Robot) -> None:
+def until_rest(robot: Robot) -> None:
     """The arm stands by until nothing moves at two looks in a row, with bounded patience; then the judge looks.
 
     Meanwhile nothing sleeps: a stick in its slot that is put to sleep and wakes in turn would rock on. What still moves
@@ -215,7 +215,7 @@ def _until_rest(robot: Robot) -> None:
 def _settled(robot: Robot, plan: Plan) -> Snapshot | None:
     try:
         robot.wait(_SETTLE_S)
-        _until_rest(robot)
+        until_rest(robot)
     except Halt as halt:
         if halt.code == "unstable_simulation":
             return None

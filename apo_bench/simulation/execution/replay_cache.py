@@ -43,6 +43,26 @@ class SavedState(NamedTuple):
     progress: Progress
 
 
+def saved_state(robot: Robot, grip: int, progress: Progress) -> SavedState:
+    """The present state; nothing sleeps in it, nor now."""
+    model = robot.model
+    data = robot.data
+    awaken(robot.scene.work, data)
+    state = np.zeros(mujoco.mj_stateSize(model, _STATE))
+    mujoco.mj_getState(model, data, state, _STATE)
+    reached = Progress([*progress.after], [*progress.timeline])
+    return SavedState(state, data.sensordata.copy(), model.eq_data.copy(), robot.memory(), grip, reached)
+
+
+def take_up(saved: SavedState, robot: Robot) -> None:
+    """Bring a robot, and all around it, to a state that was saved."""
+    robot.model.eq_data[:] = saved.welds
+    mujoco.mj_setState(robot.model, robot.data, saved.state, _STATE)
+    robot.data.sensordata[:] = saved.sensors
+    awaken(robot.scene.work, robot.data)
+    robot.remember(saved.robot)
+
+
 @final
 class ReplayCache:
     """What the replays of one scene have in common, kept for the trials of one seed; they run in one process."""
@@ -62,16 +82,11 @@ class ReplayCache:
 
     def keep(self, key: bytes, robot: Robot, grip: int, progress: Progress) -> None:
         """Keep the present state under what has led to it; nothing sleeps in it."""
-        awaken(robot.scene.work, robot.data)
         if key not in self._states:
-            model = robot.model
-            data = robot.data
-            state = np.zeros(mujoco.mj_stateSize(model, _STATE))
-            mujoco.mj_getState(model, data, state, _STATE)
-            reached = Progress([*progress.after], [*progress.timeline])
-            welds = model.eq_data.copy()
-            self._states[key] = SavedState(state, data.sensordata.copy(), welds, robot.memory(), grip, reached)
+            self._states[key] = saved_state(robot, grip, progress)
             _drop_oldest(self._states)
+        else:
+            awaken(robot.scene.work, robot.data)
 
     def resume(self, keys: Sequence[bytes], robot: Robot, progress: Progress) -> tuple[int, int]:
         """Take up the furthest state that was kept.
@@ -82,11 +97,7 @@ class ReplayCache:
         for i in range(len(keys), 0, -1):
             saved = self._states.get(keys[i - 1])
             if saved is not None:
-                robot.model.eq_data[:] = saved.welds
-                mujoco.mj_setState(robot.model, robot.data, saved.state, _STATE)
-                robot.data.sensordata[:] = saved.sensors
-                awaken(robot.scene.work, robot.data)
-                robot.remember(saved.robot)
+                take_up(saved, robot)
                 progress.after[:] = saved.progress.after
                 progress.timeline[:] = saved.progress.timeline
                 return i, saved.grip

@@ -6,6 +6,7 @@ of the part where it believes it to be, and how the hand is turned by its encode
 that gains 1 m/s in a second feels 1 N.
 """
 
+import copy
 import math
 from collections.abc import Callable, Mapping
 from typing import NamedTuple, final
@@ -103,6 +104,7 @@ class WristSensor:
         """
         model = scene.work.model
         first = [int(model.sensor_adr[model.sensor(name).id]) for name in WRIST_SENSORS]
+        self._raw_at = first[0]
         self._raw = sensordata[first[0] : first[1] + 3]
         self._kinematics = scene.kinematics
         self._encoders = encoders
@@ -161,6 +163,15 @@ class WristSensor:
             self._readings.append(reading)
         return True
 
+    def at(self, sensordata: Array, encoders: Callable[[], Array], rng: np.random.Generator) -> "WristSensor":
+        """The same sensor, as it is zeroed, in another simulation of its robot and with other noise; begin anew."""
+        other = copy.copy(self)
+        other._raw = sensordata[self._raw_at : self._raw_at + 6]
+        other._encoders = encoders
+        other._rng = rng
+        other.begin(self._hand)
+        return other
+
     def start_zero(self) -> None:
         """From now on the arm stands still in free air."""
         self._readings = []
@@ -184,6 +195,10 @@ class WristSensor:
         f, t = out
         t += pose.hat(T[:3, 3] - about) @ f
         return np.asarray(out.ravel())
+
+    def wrench_there(self) -> Array:
+        """As `wrench`, about the sensor itself: the flange."""
+        return self.wrench(self._sensor()[:3, 3])
 
     def stops(self, guard: Guard | None) -> bool:
         """Whether the hand is pushed back along the way of a guard by more than it allows."""

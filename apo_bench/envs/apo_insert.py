@@ -1,0 +1,342 @@
+"""One operation for learners: `APOInsert-v0`. It is long, as the docstring of the class is its page for learners."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, final
+
+import gymnasium
+import numpy as np
+from gymnasium import spaces
+from numpy.typing import NDArray
+
+from apo_bench.assembly import Outcome, Poses
+from apo_bench.envs.robot import RobotSettings
+from apo_bench.envs.starts import Begun, Trials, judged
+from apo_bench.errors import InputError, require, unknown
+from apo_bench.geometry import Array
+from apo_bench.names import resolve
+from apo_bench.observation.noise import Level, make_noise
+from apo_bench.records import CORRECTOR, CORRECTORS, SIMULATED, USUAL, TrialSettings, check, level_pair, sentence
+from apo_bench.scenario import Scenario, load_scenario
+from apo_bench.simulation.arms.arm import Arm
+from apo_bench.simulation.robot.robot import Halt
+from apo_bench.simulation.scene.scene import build_scene
+from apo_bench.simulation.task.tip_control import PERIOD_S, TipControl
+
+Seen = dict[str, Any]
+Action = NDArray[np.float32]
+MM_DEG = np.repeat([1e3, 180.0 / math.pi], 3)
+PIXELS = 96
+LETS_GO = 0.5
+"""Of the seventh number of an action: above, the hand lets go; below its negative, it holds."""
+MOST_TRIES = 100
+"""So many trials in a row may never come to the operation before `reset()` gives up."""
+_REWARDS = ("judge", "progress")
+_PLANS = ("none", "oracle", "by-heart")
+_FAR = np.repeat([500.0, 180.0], 3)
+_SEEN = {
+    "agent_pos": np.array([*_FAR, *_FAR, 100.0]),
+    "wrench": np.repeat([1000.0, 1000.0], 3),
+    "plan": np.array([1.0, 1.0, 1.0, 500.0, 500.0, 1e4, *_FAR, *np.ones(7)]),
+}
+"""No number that is seen is larger."""
+
+
+@final
+class APOInsert(gymnasium.Env[Seen, Action]):
+    """Insert one part that the robot holds before its mouth.
+
+    ## Description
+    A trial of the bench is demonstrated, seen with errors and corrected; a robot with errors of its own carries out all
+    operations before one, takes its part and holds it before where it goes in. From there on the learner leads the tip,
+    at 20 Hz, until the hand lets go. Then the judge says whether all that stands is right.
+
+    ## Observation Space
+    A `Dict` of float32, in the frame of the way in: its third axis leads in, the fingers close along its first.
+    Lengths are in mm, angles in degrees (rotation vectors), forces in N and Nm.
+
+    - `agent_pos`, `Box(13)`: where the front of the part is less where it is believed to end (3), the turn (3), by the
+      encoders; what is commanded less that (3, 3); the opening of each finger less half the width of the part.
+    - `wrench`, `Box(6)`: force and torque on the hand and what is in it, about the flange, by the sensor of robots that
+      feel, with its noise, its offset that was zeroed, and its low pass.
+    - `plan`, `Box(19)`: the way in, in the world (3); what is left of it and the least that was left so far; time left,
+      [s]; standard deviations that are stated of the front and its turn (6); the last action (7).
+    - `pixels`, `Box(96, 96, 3)` of uint8, if asked for.
+
+    ## Action Space
+    `Box(-1, 1, (7,))` of float32: a shift (3) and a turn (3) about the front of the part, in the same frame, of at most
+    `shift_mm` and `turn_deg` per axis and action; above 0.5, the last number opens the hand, which ends the episode.
+    With `residual` they are added to the approach of the bench, which goes in, stops where it strikes, goes on under a
+    light push, and lets go where it arrived; a last number below -0.5 has it hold on. The tip gives way to forces by
+    0.5 mm/s for each newton. It is led 15 mm and 10 degrees off the approach at most.
+
+    ## Rewards
+    1.0 at the end if the judge finds the operation, and those before it, right; else 0.0. With `reward="progress"` also
+    the share of the way in by which the least that was left has become less, by the encoders; 1.0 in all.
+
+    ## Starting State
+    One of `layouts` trials from `first_trial` on, each made when it is first drawn and kept. Trials that fail before
+    the operation begins are passed over. `reset(seed=k)` draws the same, and the same noise of the sensor, whatever
+    came before. `reset(options={"trial": t})` is trial t, of which nothing is kept.
+
+    ## Episode End
+    It terminates when the hand lets go: by the learner, by the approach, or after `horizon` actions; where the force
+    on the part exceeds `fails_above_n`, behind a filter of 8 Hz; where something is struck or lost. `info` then holds
+    `success` and `is_success`, `code` and `sentence`. Nothing is truncated, as the time that is left is seen.
+
+    ## Arguments
+    - `scenario`, `level`, `careless`, `noise`, `grasp`, `clearance_mm`, `arm`, `timestep_s`: as of `APOReplay-v0`.
+    - `operation`: counted from 1; None: the last one.
+    - `corrector`: what the plan is made by: a corrector, or `none`, `oracle`, `by-heart`.
+    - `robot_error`, `feels`, `wrench`, `stated_error`: as of `APOReplay-v0`. A robot that feels does all that it
+      does before the approach.
+    - `residual`: whether actions are added to the approach; False: they are all that moves the tip.
+    - `shift_mm`, `turn_deg`: of an action of 1.
+    - `horizon`: actions of an episode.
+    - `fails_above_n`: see above.
+    - `reward`: `judge` or `progress`.
+    - `layouts`, `first_trial`: the pool of starts. What you report should start at 0.
+    - `pixels`: whether pictures are seen; they make a step slow.
+    - `render_mode`: `rgb_array`.
+
+    What is privileged is in `env.unwrapped` alone: `trial`, `poses` of all parts, and `truth`, the true goals.
+
+    ## Version History
+    - v0: first version.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": round(1 / PERIOD_S)}  # noqa: RUF012
+
+    def __init__(
+        self,
+        scenario: str | Path | Scenario = "stick_in_tower",
+        operation: int | None = None,
+        level: float | Sequence[float] = 1.0,
+        careless: float = TrialSettings.careless,
+        noise: str | Callable[..., Any] | None = None,
+        corrector: Any = CORRECTOR,
+        grasp: str = TrialSettings.grasp,
+        clearance_mm: float | None = None,
+        arm: str | Arm = TrialSettings.arm,
+        timestep_s: float = TrialSettings.timestep_s,
+        robot_error: str = "hand_eye:0.5/0.1",
+        feels: bool = False,
+        wrench: str = TrialSettings.wrench,
+        stated_error: str = TrialSettings.stated_error,
+        residual: bool = True,
+        shift_mm: float = 1.0,
+        turn_deg: float = 0.5,
+        horizon: int = 200,
+        fails_above_n: float = 60.0,
+        reward: str = "judge",
+        layouts: int = 16,
+        first_trial: int = 1_000_000,
+        pixels: bool = False,
+        render_mode: str | None = None,
+    ) -> None:
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise InputError(f"the render mode '{render_mode}' was given; use rgb_array or None.")
+        if reward not in _REWARDS:
+            raise InputError(unknown("reward", str(reward), _REWARDS))
+        for name, size in (("shift_mm", shift_mm), ("turn_deg", turn_deg), ("fails_above_n", fails_above_n)):
+            require(0.0 < size < math.inf, f"{name} {size!r} was given; a number above 0 is allowed.")
+        for name, count in (("horizon", horizon), ("layouts", layouts)):
+            require(count == int(count) > 0, f"{name} {count!r} was given; a whole number above 0 is allowed.")
+        check("seed", int(first_trial))
+        check("careless", careless)
+        self.render_mode = render_mode
+        planner = corrector if corrector in _PLANS else resolve(corrector, {**CORRECTORS, **SIMULATED}, "corrector")
+        loaded = load_scenario(scenario)
+        n = len(loaded.assembly)
+        k = n if operation is None else operation
+        require(k in range(1, n + 1), f"operation {operation} was given; {loaded.name} has 1 to {n}.")
+        self._trials = Trials(
+            build_scene(loaded, clearance_mm=clearance_mm, grasp=grasp, arm=arm, timestep_s=timestep_s),
+            int(k) - 1,
+            careless,
+            make_noise(USUAL if noise is None else noise, Level(*level_pair(level, "noise"))),
+            planner,
+            RobotSettings(robot_error, feels, wrench, stated_error).checked(),
+        )
+        self._residual = bool(residual)
+        self._scale = np.repeat([1e-3 * shift_mm, math.radians(turn_deg)], 3)
+        self._horizon = int(horizon)
+        self._fails_above_n = fails_above_n
+        self._progress = reward == "progress"
+        self._layouts = int(layouts)
+        self._first = int(first_trial)
+        self._pixels = bool(pixels)
+        self._pool: dict[int, Begun | Outcome] = {}
+        self._begun: Begun | None = None
+        self._control: TipControl | None = None
+        self._wrist_seed = 0
+        self._actions: list[Action] = []
+        self._over = True
+        self._best = 0.0
+        seen: dict[str, spaces.Space[Any]] = {
+            name: spaces.Box(-most.astype(np.float32), most.astype(np.float32), dtype=np.float32)
+            for name, most in _SEEN.items()
+        }
+        if pixels:
+            seen["pixels"] = spaces.Box(0, 255, (PIXELS, PIXELS, 3), np.uint8)
+        self.observation_space = spaces.Dict(seen)
+        self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
+
+    @property
+    def trial(self) -> int:
+        """The number of the trial of this episode: whoever sees it can draw the truth."""
+        return self._now().trial
+
+    @property
+    def truth(self) -> Array:
+        """The true goals up to this operation, (k, 4, 4), world frame, [m]."""
+        return self._now().reference
+
+    @property
+    def poses(self) -> Poses:
+        """Where all parts are, world frame, [m]."""
+        return self._at_work().poses()
+
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
+        """Begin at one of the starts.
+
+        Args:
+            options: `trial`: the number of the trial to begin with.
+
+        Raises:
+            InputError: Another option, a trial that never comes to the operation, or none of the pool does.
+        """
+        if seed is not None:
+            check("seed", int(seed))
+        if not isinstance(options or {}, Mapping) or set(options or {}) - {"trial"}:
+            raise InputError(f"the options {options!r} were given to reset(); a dict with trial is allowed.")
+        super().reset(seed=seed)
+        self._over = True
+        self._begun = self._drawn((options or {}).get("trial"))
+        self._wrist_seed = int(self.np_random.integers(2**63))
+        self._actions = []
+        self._control = None
+        self._over = False
+        self._best = self._at_work().begins
+        return self._seen(), {}
+
+    def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
+        """Lead the tip for 50 ms, or let go.
+
+        Raises:
+            ResetNeeded: The episode is over, or there is none.
+            InputError: The action is not in the action space.
+        """
+        if self._over:
+            raise gymnasium.error.ResetNeeded("the episode is over; call reset() for the next one.")
+        given = np.asarray(action, dtype=np.float32)
+        if not self.action_space.contains(given):
+            raise InputError(f"the action {action!r} was given; seven numbers from -1 to 1 are allowed.")
+        control = self._at_work()
+        self._actions.append(given.copy())
+        before = self._best
+        try:
+            self._lead(control, given)
+            self._best = min(before, -float(control.feel.tip[2]))
+            info = self._end(control, float(given[6]))
+        except Halt as halt:
+            info = self._said(halt.code, halt.part)
+        self._over = bool(info)
+        won = float(info.get("success", False))
+        shared = (before - max(self._best, 0.0)) / control.begins if self._progress else 0.0
+        return self._seen(), won + max(shared, 0.0), self._over, False, info
+
+    def render(self) -> Any:
+        """Arm and parts, (480, 640, 3) of uint8."""
+        return self._picture(640, 480) if self.render_mode == "rgb_array" else None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """All but the simulation, which is made again by the same actions."""
+        return {**self.__dict__, "_control": None}
+
+    def _now(self) -> Begun:
+        if self._begun is None:
+            raise gymnasium.error.ResetNeeded("there is no episode yet; call reset() first.")
+        return self._begun
+
+    def _drawn(self, trial: int | None) -> Begun:
+        if trial is not None:
+            check("seed", int(trial))
+            begun = self._trials.begin(int(trial))
+            if isinstance(begun, Outcome):
+                raise InputError(f"trial {trial} does not come to this operation: {begun.sentence}.")
+            return begun
+        why = ""
+        for _ in range(MOST_TRIES):
+            drawn = self._first + int(self.np_random.integers(self._layouts))
+            if drawn not in self._pool:
+                self._pool[drawn] = self._trials.begin(drawn)
+            found = self._pool[drawn]
+            if isinstance(found, Begun):
+                return found
+            why = found.sentence
+        raise InputError(
+            f"{MOST_TRIES} draws of {self._layouts} layouts did not come to this operation, the last one since "
+            f"{why}; give more layouts, a lower level or a smaller robot error."
+        )
+
+    def _at_work(self) -> TipControl:
+        """The simulation of this episode, made anew after a reset and in a copy."""
+        begun = self._now()
+        if self._control is None:
+            rng = np.random.default_rng(self._wrist_seed)
+            self._control = TipControl(self._trials.scene, begun.start, rng, self._residual)
+            if not self._over:
+                for action in self._actions:
+                    self._lead(self._control, action)
+        return self._control
+
+    def _lead(self, control: TipControl, action: Action) -> None:
+        control.act(*np.split(self._scale * action[:6].astype(np.float64), 2))
+
+    def _end(self, control: TipControl, grip: float) -> dict[str, Any]:
+        """What is said at the end, or nothing if it goes on."""
+        if control.force_n > self._fails_above_n:
+            return self._said("force_stop")
+        last = len(self._actions) == self._horizon
+        if not (last or grip > LETS_GO or (self._residual and control.arrived and grip >= -LETS_GO)):
+            return {}
+        reached = control.let_go()
+        begun = self._now()
+        verdict = judged(self._trials.scene, (*begun.start.after, reached), reached, begun.reference)
+        found = verdict.rests_on
+        return self._said("ok" if verdict.success else found.code, why=found.why)
+
+    def _said(self, code: str, part: str = "", why: str = "") -> dict[str, Any]:
+        success = code == "ok"
+        k = self._trials.operation
+        main = self._trials.scene.scenario.assembly.operations[k].main
+        said = sentence(code, part=part or main, operation=k) + (f": {why}" if why else "")
+        return {"success": success, "is_success": success, "code": code, "sentence": said}
+
+    def _seen(self) -> Seen:
+        control = self._at_work()
+        feel = control.feel
+        left = -1e3 * float(feel.tip[2])
+        actions = self._actions
+        plan = (
+            control.start.way,
+            [left, 1e3 * self._best, PERIOD_S * (self._horizon - len(actions))],
+            control.sigmas(self._now().covariance) * MM_DEG,
+            actions[-1] if actions else np.zeros(7),
+        )
+        seen: Seen = {
+            "agent_pos": [*feel.tip * MM_DEG, *feel.lag * MM_DEG, 1e3 * feel.opening],
+            "wrench": feel.wrench,
+            "plan": np.concatenate(plan),
+        }
+        seen = {name: np.clip(seen[name], -most, most).astype(np.float32) for name, most in _SEEN.items()}
+        return {**seen, "pixels": self._picture(PIXELS, PIXELS)} if self._pixels else seen
+
+    def _picture(self, width: int, height: int) -> Any:
+        from apo_bench.simulation.scene.render import picture_with_arm
+
+        control = self._at_work()
+        state = np.array(control.robot.data.qpos)
+        return picture_with_arm(self._trials.scene, control.start.parts, state, width, height)

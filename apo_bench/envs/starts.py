@@ -1,0 +1,96 @@
+"""The starts of `APOInsert-v0`: trials as the bench draws them, carried out up to where the learner takes over."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple, final
+
+import numpy as np
+
+from apo_bench.assembly import Correction, Observation, Outcome, Reached, Snapshot
+from apo_bench.envs.robot import RobotSettings
+from apo_bench.geometry import Array
+from apo_bench.judging.verdict import Verdict, judge
+from apo_bench.observation.noise import Noise
+from apo_bench.records import NO_ROBOT_ERROR, robot_sigmas, told_error
+from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.task.start import Start, prepare
+from apo_bench.trial.feeling import feels_of
+from apo_bench.trial.planning import apply_method
+from apo_bench.trial.stages import (
+    WRENCH,
+    demonstration_failure,
+    draw_robot_error,
+    observe_demonstration,
+    simulate_demonstration,
+    stream_key,
+)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Begun:
+    """A trial up to where the learner takes over, with its truth."""
+
+    trial: int
+    start: Start
+    reference: Array
+    """(k + 1, 4, 4), the true goals up to this operation, world frame, [m]."""
+    covariance: Array
+    """(6, 6), stated, of the twist by which the part may be wrong at its goal, in its own frame, [m, rad]."""
+
+
+class Trials(NamedTuple):
+    """All that a start is made of but its trial."""
+
+    scene: Scene
+    operation: int
+    careless: float
+    noise: Noise
+    corrector: Any
+    robot: RobotSettings
+
+    def begin(self, trial: int) -> Begun | Outcome:
+        """Demonstrate, observe, correct, and carry out what comes before; or what failed on the way there."""
+        scene, k, careless, noise, corrector, robot = self
+        simulated = simulate_demonstration(scene, careless, trial)
+        if simulated.demonstration.code != "ok":
+            return demonstration_failure(simulated.demonstration)
+        seen = observe_demonstration(simulated, noise, trial)
+        made = apply_method(corrector, seen, simulated.layout.goals, where=scene)
+        if made.plan is None:
+            assert made.failure is not None
+            return made.failure
+        key = stream_key(trial, WRENCH)
+        told = told_error(robot.stated_error, robot.robot_error)
+        feels = feels_of(made.plan, scene, told, key, robot.wrench) if robot.feels else None
+        error = draw_robot_error(robot.robot_error, scene, trial)
+        start = prepare(made.plan, scene, k, error, feels, (robot.wrench, (*key, 1)))
+        if isinstance(start, Outcome):
+            return start
+        truth = simulated.layout.goals
+        before = judged(scene, start.after, start.after[-1], truth[:k]) if k else None
+        if before is not None and not before.success:
+            code = before.rests_on.code
+            return Outcome("judge", code, None, f"what was put before is not right: {before.rests_on.why or code}")
+        return Begun(trial, start, truth[: k + 1], _stated(seen, made.correction, told, k))
+
+
+def judged(scene: Scene, after: tuple[Snapshot | None, ...], final: Snapshot | None, reference: Array) -> Verdict:
+    """The judge's verdict on the first operations alone.
+
+    Args:
+        after: After each of them.
+        reference: (k, 4, 4), their true goals, world frame, [m].
+    """
+    assembly = scene.scenario.assembly.first(len(after))
+    return judge(assembly, Reached(after, final), reference, scene.criteria)
+
+
+def _stated(seen: Observation, correction: Correction | None, told: str | None, k: int) -> Array:
+    """What the corrector leaves of the noise, and what is said of the robot, but for its joints."""
+    posterior = None if correction is None else correction.covariance
+    covariance = (seen.covariance if posterior is None else posterior)[k]
+    sigmas = robot_sigmas(told or NO_ROBOT_ERROR)
+    mm = math.hypot(sigmas.hand_eye[0], sigmas.tool_mm, sigmas.in_hand[0])
+    deg = math.hypot(sigmas.hand_eye[1], sigmas.in_hand[1])
+    return np.asarray(covariance + np.diag(np.repeat([1e-3 * mm, math.radians(deg)], 3) ** 2))

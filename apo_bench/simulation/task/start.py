@@ -1,0 +1,120 @@
+"""Where an episode starts: the operations before it are done, and the robot holds the part before its mouth.
+
+A start is a state of the physics and what the robot knows; made once, it is taken up again as often as wanted.
+"""
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly import Outcome, Plan, Poses, Snapshot
+from apo_bench.geometry import Array, pose
+from apo_bench.insertion.surroundings import WALL_MARGIN_M
+from apo_bench.records import sentence
+from apo_bench.simulation.execution.carry_out import before_attach, take
+from apo_bench.simulation.execution.controller import moves_of, run_schedule
+from apo_bench.simulation.execution.feel.feeling import Feeling, Feels
+from apo_bench.simulation.execution.feel.laying import lay
+from apo_bench.simulation.execution.replay_cache import Progress, ReplayCache, SavedState, saved_state
+from apo_bench.simulation.execution.transfer import Grip, Transfer
+from apo_bench.simulation.hooks import Hooks
+from apo_bench.simulation.robot.by_wrist import wrist_of, zero
+from apo_bench.simulation.robot.robot import Halt, Robot
+from apo_bench.simulation.robot.robot_error import RobotError
+from apo_bench.simulation.robot.wrist import WristSensor, part_loads
+from apo_bench.simulation.scene.apart import left_out
+from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene.world import sleeping
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Start:
+    """One start; nothing changes it."""
+
+    operation: int
+    """Counted from 0."""
+    parts: Poses
+    """Where the parts stood at first."""
+    transfer: Transfer
+    """With what is wrong with the robot in its poses: where the robot really goes."""
+    grip: Grip
+    second: Grip | None
+    """The grip after the guarded motion, if it is changed then."""
+    way: Array
+    """The way in as the robot believes it, unit vector, (3,), world."""
+    off: Array
+    """(joints,), by how much each joint is off its encoder, [rad]."""
+    saved: SavedState
+    wrist: WristSensor
+    """Zeroed here."""
+    after: tuple[Snapshot | None, ...]
+    """After each operation before."""
+
+
+def prepare(
+    plan: Plan,
+    scene: Scene,
+    k: int,
+    error: RobotError | None = None,
+    feels: Feels | None = None,
+    wrench: tuple[str, tuple[int, ...]] = ("none", (0,)),
+) -> Start | Outcome:
+    """Carry out a plan up to where the guarded motion of an operation begins; or say what failed before.
+
+    Args:
+        k: The operation, counted from 0; the last time that it is done.
+        feels: How the robot finds out first what is wrong with it; None: it does not.
+        wrench: The sensor at the wrist, by name, and the seed of its noise.
+    """
+    feeling = None if feels is None else Feeling(feels, plan, scene, error)
+    acts = () if feels is None else feels.acts
+    at = max(i for i, step in enumerate(plan.schedule) if step.operation == k and not step.undo)
+    moves = partial(moves_of, plan, scene, True, acts)
+    robot = Robot(scene, plan.start, Hooks(), "contact", error)
+    progress = Progress([None] * len(plan.assembly), [])
+    keys = [b"%d" % i for i in range(2 * at)]
+    with sleeping(scene.work, scene.grasp == "friction"), left_out(scene.work):
+        before = moves(error)[:at]
+        again = lambda error: moves(error)[:at]  # noqa: E731
+        outcome = run_schedule(plan, robot, before, progress, ReplayCache(), keys, math.inf, feeling, again)
+        if outcome.failed:
+            return outcome
+        left = error if feeling is None else feeling.residual
+        robot.step, t = moves(left)[at]
+        if not t.into.level and t.mouths:
+            t = replace(t, in_last=True, slow=max(t.slow, max(t.mouths) + WALL_MARGIN_M))
+        try:
+            i = take(robot, t, again="square" in acts)
+            robot.slip(k)
+            laying = None
+            if feeling is not None:
+                feeling.taken(k)
+                laying = None if t.flush is None else partial(lay, robot, feeling, k)
+            grip, second = before_attach(robot, t, i, laying)
+            wrist = wrist_of(robot, wrench[0], np.random.default_rng(wrench[1]))
+            wrist.hold(*part_loads(scene, {t.part: pose.inverse(grip.T_part_tip)}))
+            zero(robot, wrist)
+        except Halt as halt:
+            return Outcome(halt.stage, halt.code, k, sentence(halt.code, part=halt.part or t.part, operation=k))
+        saved = saved_state(robot, i, progress)
+    return Start(
+        operation=k,
+        parts=dict(plan.start),
+        transfer=t,
+        grip=grip,
+        second=second,
+        way=t.into.way if left is None else left.hand_eye[:3, :3].T @ t.into.way,
+        off=np.zeros(len(scene.arm.joints)) if left is None else left.joints,
+        saved=saved,
+        wrist=wrist.at(np.zeros(len(robot.data.sensordata)), _nowhere, np.random.default_rng(0)),
+        after=tuple(progress.after[:k]),
+    )
+
+
+def _nowhere() -> Array:
+    """The encoders of no robot."""
+    return np.zeros(0)

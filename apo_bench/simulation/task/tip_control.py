@@ -1,0 +1,263 @@
+"""The arm between two actions: the tip is moved as asked, gives way to what it feels, and stops where it struck.
+
+The robot knows what it commands, its encoders, its opening, the force on the part in its hand and the wrench at its
+wrist; nothing here reads where a part is.
+"""
+
+import math
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import NamedTuple, final
+
+import numpy as np
+
+from apo_bench.assembly import Poses, Snapshot
+from apo_bench.geometry import Array, pose
+from apo_bench.simulation.execution.carry_out import after_attach, end_of_attach, pace
+from apo_bench.simulation.execution.controller import until_rest
+from apo_bench.simulation.execution.fingers import check_hold, depart, release
+from apo_bench.simulation.execution.replay_cache import take_up
+from apo_bench.simulation.hooks import Hooks
+from apo_bench.simulation.robot.forces import LowPass
+from apo_bench.simulation.robot.paths import shifted
+from apo_bench.simulation.robot.robot import Robot
+from apo_bench.simulation.scene.apart import left_out
+from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene.world import part_pose, sleeping, snapshot, wrist_felt
+from apo_bench.simulation.task.start import Start
+
+PERIOD_S = 0.05
+"""From one action to the next: 20 Hz."""
+_YIELD = 0.0005
+"""How fast the tip gives way to a newton, [m/s/N], as in a search."""
+_FELT_S = 0.01
+"""Forces are averaged over this time."""
+_GAIN = 0.6
+_SOFT = 0.05
+"""How fast the approach gains speed, [m/s^2]: in free air, and after a first touch."""
+_FEED = 0.005
+_EASE = 0.03
+"""Its greatest speeds, [m/s]: where it was stopped, and on from there."""
+_DEEP_M = 0.001
+"""What goes so much deeper than where it was stopped is stopped no longer."""
+_STRUCK = 0.03
+"""Faster than this, [m/s], it stops by the force of a single step; else by the average."""
+_ACROSS_M = 0.015
+_TURN_RAD = math.radians(10.0)
+"""How far the tip is led off the line of the approach."""
+_BACK_M = 0.01
+_BEYOND_M = 0.003
+"""How far behind its start, and beyond the end of the line, the tip is led along it."""
+_ARRIVED_M = 0.0002
+_PUSHED = 4
+_NEAR_M = 0.002
+"""The approach has arrived at its end, or where it was pushed back at so many actions running and is this near."""
+
+
+class Feel(NamedTuple):
+    """What the robot knows after an action, in the frame of the way in; the third axis leads in."""
+
+    tip: Array
+    """(6,), measured less where the line ends, [m, rad]: of the believed front of the part, and its turn."""
+    lag: Array
+    """(6,), commanded less measured, [m, rad]."""
+    opening: float
+    """Of each finger less half the width of the part, [m]."""
+    wrench: Array
+    """(6,), on the hand and what is in it, about the flange, [N, Nm]."""
+
+
+@final
+class TipControl:
+    """One episode: the arm from its start until it lets go."""
+
+    def __init__(self, scene: Scene, start: Start, rng: np.random.Generator, nominal: bool = True) -> None:
+        """Take up a start.
+
+        Args:
+            rng: Of the noise of the wrist.
+            nominal: Whether the arm goes in by itself, and actions are added to that.
+        """
+        self.start = start
+        self.nominal = nominal
+        self.arrived = False
+        """Whether the approach is over and would let go."""
+        self.robot = robot = Robot(scene, start.parts, Hooks(), "contact")
+        robot.compensate(start.off)
+        take_up(start.saved, robot)
+        robot.stage, robot.macro = "attach", "insert"
+        t = start.transfer
+        self._wrist = start.wrist.at(robot.data.sensordata, robot.encoders, rng)
+        self._end = end_of_attach(t, start.grip, start.second)
+        front = np.zeros(3) if t.front is None else t.front
+        self._front = pose.apply(pose.inverse(start.grip.T_part_tip), front[None])[0]
+        self._R = frame_of_way(t.into.way, self._end)
+        self._pace = pace(t, start.second)
+        self._guard = t.insert_n if t.into.level else t.place_n
+        self._left = 0.0 if start.second is None else float(t.into.left or 0.0)
+        self._stuck = max(_NEAR_M, 0.0 if t.into.level else t.stuck)
+        self._felt = LowPass(_FELT_S)
+        self._force = robot.forces.net()
+        self._speed = 0.0
+        self._stopped: float | None = None
+        self._most = math.inf
+        self._pushed = 0
+        self._passed = 0
+        self._turn: Array = np.zeros(3)
+        self.begins = -float(self._off(robot.T)[2])
+        """How far before the end of the line it begins, [m]."""
+        with self._stepping():
+            self.feel = self._feel()
+
+    def act(self, shift: Array, turn: Array) -> None:
+        """One period: move the tip as asked, and go on with the approach.
+
+        Args:
+            shift: (3,), of the front of the part in the frame of the way in, [m].
+            turn: (3,), a rotation vector about the front in that frame, [rad].
+
+        Raises:
+            Halt: Something was struck, or fell out of the hand.
+        """
+        with self._stepping():
+            self._move(shift, turn)
+            check_hold(self.robot, self.start.grip)
+            self.feel = self._feel()
+
+    def let_go(self) -> Snapshot:
+        """Open the fingers, do what the operation still has after an approach that arrived, and wait until parts rest.
+
+        Raises:
+            Halt: Something went wrong; what was reached then is never judged.
+        """
+        robot = self.robot
+        t = self.start.transfer
+        with sleeping(robot.scene.work, robot.scene.grasp == "friction"), left_out(robot.scene.work):
+            robot.stand()
+            if self.arrived:
+                at_end = shifted(robot.T, t.into.way, -float(self._off(robot.T)[2]))
+                after_attach(robot, t, self.start.grip, self.start.second, at_end @ pose.inverse(self._end))
+            else:
+                release(robot, t, self.start.grip)
+                depart(robot, t)
+            until_rest(robot)
+            return snapshot(robot.scene.work, robot.data, self.start.parts)
+
+    def sigmas(self, covariance: Array) -> Array:
+        """Standard deviations in the frame of the way in, of the front and of the turn, (6,), [m, rad].
+
+        Args:
+            covariance: (6, 6), of the twist of the part in its own frame, [m, rad].
+        """
+        t = self.start.transfer
+        R = self._R.T @ t.T_world_goal[:3, :3]
+        front = np.zeros(3) if t.front is None else t.front
+        # A twist (v, w) of the part shifts its front by v + w x front.
+        J = np.block([[R, -R @ pose.hat(front)], [np.zeros((3, 3)), R]])
+        return np.asarray(np.sqrt(np.diag(J @ covariance @ J.T)))
+
+    def poses(self) -> Poses:
+        """Where all parts are, (4, 4) each, world: for whoever watches, nothing is decided by it."""
+        work = self.robot.scene.work
+        return {**self.start.parts, **{part: part_pose(work, self.robot.data, part) for part in work.free}}
+
+    @property
+    def force_n(self) -> float:
+        """On what is in the hand, behind a filter of 8 Hz, [N]."""
+        return math.hypot(*self.robot.forces.wrist.force)
+
+    @contextmanager
+    def _stepping(self) -> Iterator[None]:
+        work = self.robot.scene.work
+        with sleeping(work, self.robot.scene.grasp == "friction"), left_out(work), wrist_felt(work.model):
+            yield
+
+    def _move(self, shift: Array, turn: Array) -> None:
+        robot = self.robot
+        dt = robot.step_s
+        steps = round(PERIOD_S / dt)
+        way = self.start.transfer.into.way
+        weigh = self.start.transfer.slide_n
+        T = robot.T
+        off = self._off(T)
+        low = np.array([-_ACROSS_M, -_ACROSS_M, -self.begins - _BACK_M])
+        high = np.array([_ACROSS_M, _ACROSS_M, _BEYOND_M])
+        asked = self._R @ (np.clip(off[:3] + shift, low, high) - off[:3]) / PERIOD_S
+        self._turn = np.clip(self._turn + turn, -_TURN_RAD, _TURN_RAD)
+        # The tip turns about the front: v_tip = v_front + w x (tip - front), all in the frame of the tip.
+        R = T[:3, :3]
+        w = R.T @ self._R @ (self._turn - off[3:]) / PERIOD_S
+        twist = np.concatenate([np.cross(w, -self._front), w])
+        back = np.linalg.pinv(robot.scene.kinematics.jacobian(robot.q))
+        turning = back @ twist
+        shifting = back[:, :3] @ R.T
+        q = robot.q
+        left = self._left - float(off[2])
+        for _ in range(steps):
+            force = self._felt(self._force, dt)
+            f = np.array(force)
+            push = -float(f @ way)
+            v = asked + _YIELD * f
+            if self.nominal:
+                struck = -float(np.dot(self._force, way)) if self._speed > _STRUCK else push
+                if self._stopped is None and struck > self._guard:
+                    q = robot.encoders()
+                    self._speed, self._stopped, self._most = 0.0, left, _EASE
+                v = v + (_YIELD * push + self._ahead(left, push, weigh, dt)) * way
+            left -= dt * float(v @ way)
+            q = q + dt * (turning + shifting @ v)
+            self._passed += 1
+            self._force = robot.nudge(q, self._passed)
+            self._wrist.take(dt)
+        robot.q = q
+        robot.T = robot.scene.kinematics.forward(q)
+        push = -float(np.dot(self._felt.force, way))
+        self._pushed = self._pushed + 1 if push > weigh / 2 else 0
+        here = left - self._pace.end
+        self.arrived = here < _ARRIVED_M or (self._pushed >= _PUSHED and left - self._left < self._stuck)
+
+    def _ahead(self, left: float, push: float, weigh: float, dt: float) -> float:
+        """How fast the approach goes on, [m/s], so far before the goal, [m]: as it may, or under a light push."""
+        lightly = self._stopped is not None
+        if lightly and push > weigh / 4:
+            self._speed = _YIELD * (weigh - push)
+        else:
+            gain = _SOFT if self._most < math.inf else _GAIN
+            self._speed = min(max(self._speed, 0.0) + gain * dt, _FEED if lightly else self._most, self._limit(left))
+        if self._stopped is not None and left < self._stopped - _DEEP_M:
+            self._stopped = None
+        return self._speed
+
+    def _limit(self, left: float) -> float:
+        """The speed from which slow stretches are reached slowly: v^2 = v_slow^2 + 2 a d."""
+        most = min(self._pace.quick, math.sqrt(2 * _GAIN * max(left - self._pace.end, 0.0)))
+        for begin, end, slow in self._pace.stretches:
+            if left > begin:
+                most = min(most, math.sqrt(slow**2 + 2 * _GAIN * (left - begin)))
+            elif left >= end:
+                most = min(most, slow)
+        return most
+
+    def _off(self, T: Array) -> Array:
+        """Where a tip pose is, less where the line ends, (6,), in the frame of the way in, [m, rad]; of the front."""
+        shift = pose.apply(T, self._front[None])[0] - pose.apply(self._end, self._front[None])[0]
+        turn = pose.log(pose.rigid(T[:3, :3] @ self._end[:3, :3].T, np.zeros(3)))[3:]
+        return np.concatenate([shift @ self._R, turn @ self._R])
+
+    def _feel(self) -> Feel:
+        robot = self.robot
+        T = robot.scene.kinematics.forward(robot.encoders())
+        tip = self._off(T)
+        wrench = self._wrist.wrench_there().reshape(2, 3) @ self._R
+        return Feel(tip, self._off(robot.T) - tip, robot.opening() - self.start.grip.half_width, wrench.ravel())
+
+
+def frame_of_way(way: Array, T_tip: Array) -> Array:
+    """A frame whose third axis leads along a way, as columns in the world, (3, 3).
+
+    The first axis is that along which the fingers close, as far as it is square to the way.
+    """
+    first = T_tip[:3, 0] if abs(T_tip[:3, 0] @ way) < 0.7 else T_tip[:3, 1]
+    first = first - (first @ way) * way
+    first = first / np.linalg.norm(first)
+    return np.column_stack([first, np.cross(way, first), way])

@@ -1,0 +1,169 @@
+"""APOInsert-v0 as Gymnasium and its users expect it."""
+
+from __future__ import annotations
+
+import copy
+import pickle
+from collections.abc import Iterator
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from apo_bench.envs.apo_insert import APOInsert
+from apo_bench.errors import InputError
+
+TRIAL = {"trial": 3}
+STILL = np.zeros(7, dtype=np.float32)
+OPEN = np.array([0, 0, 0, 0, 0, 0, 1], dtype=np.float32)
+
+
+@pytest.fixture(scope="module")
+def env() -> Iterator[APOInsert]:
+    """The first block on the table: nothing has to be found."""
+    made = gymnasium.make("APOInsert-v0", scenario="block_on_block", grasp="weld", layouts=2).unwrapped
+    assert isinstance(made, APOInsert)
+    yield made
+    made.close()
+
+
+def run(env: Any, *actions: Any) -> list[Any]:
+    """What is seen after each action; the last one of them for ever."""
+    said = []
+    for action in actions:
+        said.append(env.step(action))
+    return said
+
+
+def same(a: Any, b: Any) -> bool:
+    return all(np.array_equal(a[name], b[name]) for name in a)
+
+
+def test_it_passes_the_check_of_gymnasium(env: APOInsert) -> None:
+    check_env(env, skip_render_check=True)
+
+
+def test_the_approach_alone_puts_a_block_where_it_belongs(env: APOInsert) -> None:
+    seen, info = env.reset(options=TRIAL)
+    assert info == {}
+    assert env.observation_space.contains(seen)
+    left = [float(seen["plan"][3])]
+    over = False
+    reward = 0.0
+    while not over:
+        seen, reward, over, truncated, info = env.step(STILL)
+        left.append(float(seen["plan"][3]))
+    assert reward == 1.0
+    assert info["success"] is info["is_success"] is True
+    assert info["code"] == "ok"
+    assert not truncated
+    assert left[0] > 10.0
+    assert abs(left[-1]) < 2.5
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        env.step(STILL)
+
+
+def test_a_hand_that_opens_in_the_air_drops_the_part(env: APOInsert) -> None:
+    env.reset(options=TRIAL)
+    _, reward, over, _, info = env.step(OPEN)
+    assert over
+    assert reward == float(info["success"])
+
+
+def test_the_same_seed_gives_the_same_bytes(env: APOInsert) -> None:
+    actions = [env.action_space.sample() * 0.2 for _ in range(4)]
+    first = [env.reset(seed=11)[0], *(step[0] for step in run(env, *actions))]
+    env.reset(seed=4)
+    again = [env.reset(seed=11)[0], *(step[0] for step in run(env, *actions))]
+    assert all(same(a, b) for a, b in zip(first, again, strict=True))
+
+
+def test_a_copy_goes_on_as_the_original_would(env: APOInsert) -> None:
+    env.reset(seed=2)
+    run(env, STILL, STILL)
+    copies = [pickle.loads(pickle.dumps(env)), copy.deepcopy(env)]
+    there = env.step(STILL)[0]
+    assert all(same(other.step(STILL)[0], there) for other in copies)
+
+
+def test_actions_move_the_tip_in_the_frame_of_the_way_in() -> None:
+    env = APOInsert("block_on_block", grasp="weld", residual=False, robot_error="none")
+    before, _ = env.reset(options=TRIAL)
+    aside = np.array([1, 0, 0, 0, 0, 1, -1], dtype=np.float32)
+    after = run(env, *[aside] * 5, *[STILL] * 3)[-1][0]
+    moved = after["agent_pos"] - before["agent_pos"]
+    np.testing.assert_allclose(moved[:6], [5, 0, 0, 0, 0, 2.5], atol=0.15)
+    np.testing.assert_array_equal(after["plan"][12:], STILL)
+
+
+def test_progress_is_rewarded_by_what_the_robot_itself_knows() -> None:
+    env = APOInsert("block_on_block", grasp="weld", reward="progress")
+    seen, _ = env.reset(options=TRIAL)
+    begins = float(seen["plan"][3])
+    over = False
+    rewards = []
+    while not over:
+        seen, reward, over, _, info = env.step(STILL)
+        rewards.append(reward)
+    share = 1.0 - max(float(seen["plan"][4]), 0.0) / begins
+    assert sum(rewards) == pytest.approx(share + info["success"], abs=1e-3)
+
+
+def test_what_pushes_too_hard_fails() -> None:
+    env = APOInsert("block_on_block", grasp="weld", fails_above_n=1e-3)
+    env.reset(options=TRIAL)
+    over = False
+    while not over:
+        _, reward, over, _, info = env.step(STILL)
+    assert (reward, info["code"]) == (0.0, "force_stop")
+
+
+def test_the_hand_lets_go_when_the_time_is_over() -> None:
+    env = APOInsert("block_on_block", grasp="weld", horizon=2)
+    env.reset(options=TRIAL)
+    first, second = run(env, STILL, STILL)
+    assert not first[2]
+    assert second[2]
+    assert second[4]["code"] != ""
+
+
+def test_many_environments_and_a_history() -> None:
+    made = {"scenario": "block_on_block", "grasp": "weld", "layouts": 1}
+    many = gymnasium.make_vec("APOInsert-v0", num_envs=2, vectorization_mode="sync", **made)
+    seen, _ = many.reset(seed=0)
+    assert seen["agent_pos"].shape == (2, 13)
+    many.step(np.zeros((2, 7), dtype=np.float32))
+    many.close()
+    history = gymnasium.wrappers.FrameStackObservation(gymnasium.make("APOInsert-v0", **made), 6)
+    seen, _ = history.reset(seed=0)
+    assert {name: each.shape for name, each in seen.items()} == {
+        "agent_pos": (6, 13),
+        "wrench": (6, 6),
+        "plan": (6, 19),
+    }
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"),
+    [
+        ({"operation": 3}, "operation 3"),
+        ({"reward": "depth"}, "reward"),
+        ({"horizon": 0}, "horizon"),
+        ({"shift_mm": -1.0}, "shift_mm"),
+        ({"corrector": "nobody"}, "corrector"),
+        ({"render_mode": "human"}, "render mode"),
+    ],
+)
+def test_wrong_arguments_are_refused_in_one_sentence(wrong: dict[str, Any], said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        APOInsert("block_on_block", **wrong)
+
+
+def test_wrong_calls_are_refused_in_one_sentence(env: APOInsert) -> None:
+    env.reset(options=TRIAL)
+    with pytest.raises(InputError, match="seven numbers"):
+        env.step(np.full(7, 2.0, dtype=np.float32))
+    with pytest.raises(InputError, match="options"):
+        env.reset(options={"level": 2})
