@@ -32,6 +32,7 @@ BREACHES = {
         ("apo_bench.simulation.human.hands", "apo_bench.simulation.execution.fingers"),
         ("apo_bench.simulation.execution.controller", "apo_bench.simulation.film.still"),
         ("apo_bench.simulation.execution.prepare", "apo_bench.simulation.arm_checks.plan_check"),
+        ("apo_bench.simulation.arm_checks.plan_check", "apo_bench.simulation.task.start"),
     ],
     "simulation-loose": [
         ("apo_bench.simulation.physics", "apo_bench.simulation.scene.world"),

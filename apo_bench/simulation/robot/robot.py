@@ -157,13 +157,14 @@ class Robot:
         for T in waypoints_unwound(self._rest, self.T, end):
             self.follow(smooth(self.T, T, speed, turn_speed))
 
-    def nudge(self, q: Array, passed: int) -> list[float]:
-        """One physics step towards joint angles, (joints,), [rad]; whenever a tick of them has passed, a look.
+    def nudge(self, q: Array, passed: int, velocity: Array | None = None) -> list[float]:
+        """One physics step towards joint angles, [rad], led by a velocity, [rad/s]; whenever a tick has passed, a look.
 
         Returns:
             The force on the part in the hand, (3,) world, [N].
         """
-        self.data.ctrl[self._drives] = q + self._off
+        to = q if velocity is None else led(q, velocity, self._lead, self._stick)
+        self.data.ctrl[self._drives] = to + self._off
         mujoco.mj_step(self.model, self.data)
         force = self.forces.feel(self.step_s)
         if passed % self._steps_of_tick == 0:

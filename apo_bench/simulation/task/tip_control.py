@@ -33,13 +33,14 @@ _YIELD = 0.0005
 _FELT_S = 0.01
 """Forces are averaged over this time."""
 _GAIN = 0.6
-_SOFT = 0.05
+_SOFT = 0.02
 """How fast the approach gains speed, [m/s^2]: in free air, and after a first touch."""
 _FEED = 0.005
-_EASE = 0.03
-"""Its greatest speeds, [m/s]: where it was stopped, and on from there."""
+_EASE = 0.02
 _DEEP_M = 0.001
-"""What goes so much deeper than where it was stopped is stopped no longer."""
+"""Its greatest speeds once it was stopped, [m/s]: up to so much deeper than there, and from there on."""
+_MET = 0.8
+"""The light push is met from this part of it on."""
 _STRUCK = 0.03
 """Faster than this, [m/s], it stops by the force of a single step; else by the average."""
 _ACROSS_M = 0.015
@@ -100,11 +101,11 @@ class TipControl:
         self._force = robot.forces.net()
         self._speed = 0.0
         self._stopped: float | None = None
-        self._most = math.inf
         self._pushed = 0
         self._passed = 0
         self._turn: Array = np.zeros(3)
-        self.begins = -float(self._off(robot.T)[2])
+        self._at: Array = self._off(robot.T)[:3]
+        self.begins = -float(self._at[2])
         """How far before the end of the line it begins, [m]."""
         with self._stepping():
             self.feel = self._feel()
@@ -182,7 +183,10 @@ class TipControl:
         off = self._off(T)
         low = np.array([-_ACROSS_M, -_ACROSS_M, -self.begins - _BACK_M])
         high = np.array([_ACROSS_M, _ACROSS_M, _BEYOND_M])
-        asked = self._R @ (np.clip(off[:3] + shift, low, high) - off[:3]) / PERIOD_S
+        # What the linear kinematics of the last period left behind is made up for.
+        asked = self._R @ (np.clip(off[:3] + shift, low, high) + self._at - 2 * off[:3]) / PERIOD_S
+        from_there = off[:3]
+        moved = np.zeros(3)
         self._turn = np.clip(self._turn + turn, -_TURN_RAD, _TURN_RAD)
         # The tip turns about the front: v_tip = v_front + w x (tip - front), all in the frame of the tip.
         R = T[:3, :3]
@@ -197,18 +201,26 @@ class TipControl:
             force = self._felt(self._force, dt)
             f = np.array(force)
             push = -float(f @ way)
-            v = asked + _YIELD * f
+            led = asked
+            yields = _YIELD * f
             if self.nominal:
+                side = math.sqrt(max(float(f @ f) - push * push, 0.0))
                 struck = -float(np.dot(self._force, way)) if self._speed > _STRUCK else push
-                if self._stopped is None and struck > self._guard:
+                if self._stopped is None and max(struck, side) > self._guard:
                     q = robot.encoders()
-                    self._speed, self._stopped, self._most = 0.0, left, _EASE
-                v = v + (_YIELD * push + self._ahead(left, push, weigh, dt)) * way
-            left -= dt * float(v @ way)
-            q = q + dt * (turning + shifting @ v)
+                    from_there = self._off(robot.scene.kinematics.forward(q))[:3]
+                    moved = np.zeros(3)
+                    self._speed, self._stopped = 0.0, left
+                led = asked + self._ahead(left, push, side, dt) * way
+                yields = yields + _YIELD * push * way
+            moved = moved + dt * (led + yields)
+            left = self._left - float(from_there[2] + moved @ way)
+            leads = turning + shifting @ led
+            q = q + dt * (leads + shifting @ yields)
             self._passed += 1
-            self._force = robot.nudge(q, self._passed)
+            self._force = robot.nudge(q, self._passed, leads)
             self._wrist.take(dt)
+        self._at = from_there + moved @ self._R
         robot.q = q
         robot.T = robot.scene.kinematics.forward(q)
         push = -float(np.dot(self._felt.force, way))
@@ -216,16 +228,17 @@ class TipControl:
         here = left - self._pace.end
         self.arrived = here < _ARRIVED_M or (self._pushed >= _PUSHED and left - self._left < self._stuck)
 
-    def _ahead(self, left: float, push: float, weigh: float, dt: float) -> float:
+    def _ahead(self, left: float, push: float, side: float, dt: float) -> float:
         """How fast the approach goes on, [m/s], so far before the goal, [m]: as it may, or under a light push."""
-        lightly = self._stopped is not None
-        if lightly and push > weigh / 4:
+        weigh = self.start.transfer.slide_n
+        if self._stopped is None:
+            self._speed = min(self._speed + _GAIN * dt, self._limit(left))
+        elif push > _MET * weigh:
             self._speed = _YIELD * (weigh - push)
-        else:
-            gain = _SOFT if self._most < math.inf else _GAIN
-            self._speed = min(max(self._speed, 0.0) + gain * dt, _FEED if lightly else self._most, self._limit(left))
-        if self._stopped is not None and left < self._stopped - _DEEP_M:
-            self._stopped = None
+        elif push < weigh / 4:
+            most = _FEED if left > self._stopped - _DEEP_M else _EASE
+            most *= max(0.0, 1.0 - side / (2 * weigh))
+            self._speed = min(max(self._speed, 0.0) + _SOFT * dt, most, self._limit(left))
         return self._speed
 
     def _limit(self, left: float) -> float:
