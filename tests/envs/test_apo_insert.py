@@ -65,6 +65,19 @@ def test_the_approach_alone_puts_a_block_where_it_belongs(env: APOInsert) -> Non
         env.step(STILL)
 
 
+def test_where_nothing_is_wrong_the_approach_alone_inserts_a_stick_along_its_line() -> None:
+    env = APOInsert(corrector="oracle", robot_error="none")
+    seen, _ = env.reset(options=TRIAL)
+    aside = []
+    over = False
+    while not over:
+        seen, reward, over, _, _ = env.step(STILL)
+        aside.append(seen["agent_pos"][:2])
+    assert reward == 1.0
+    assert np.abs(aside).max() < 0.3
+    assert env.truth.shape == (3, 4, 4)
+
+
 def test_a_hand_that_opens_in_the_air_drops_the_part(env: APOInsert) -> None:
     env.reset(options=TRIAL)
     _, reward, over, _, info = env.step(OPEN)
