@@ -2,8 +2,9 @@
 
 FOLDER holds the repositories of the list as git has them, each at OWNER+NAME/repo, OWNER+NAME or OWNER/NAME; nothing is
 loaded from elsewhere, and every file must have the hash of the list. Each assembly has a process of its own: its files
-are imported, a scenario is drafted from the poses without a hand and checked, and `oracle`, `contact`, `snap` and
-`none` are run at 1 mm and 1 degree. Lines are kept in --out; what is there is not done again. The table is printed.
+are imported together, so that pieces are fine where parts come near; a scenario is drafted from the poses without a
+hand and checked; `oracle`, `contact`, `snap` and `none` are run at 1 mm and 1 degree. Lines are kept in --out; what is
+there is not done again. The table is printed.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -27,13 +28,17 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 
 from apo_bench.assembly import contact_kind
-from apo_bench.cad.solids.naming import free_name
+from apo_bench.cad.assembled import coming_near
+from apo_bench.cad.import_report import named_places, write_places
+from apo_bench.cad.solids.raw_solid import RawSolid, SolidPlace
 from apo_bench.drafting.checking import check_file
-from apo_bench.drafting.posed import PosedPart, import_assembly, read_posed
+from apo_bench.drafting.from_cad import import_solid, solids_at
+from apo_bench.drafting.posed import read_posed
 from apo_bench.drafting.upright import drafted
 from apo_bench.drafting.writing import write_scenario
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
+from apo_bench.parts import load_part
 from apo_bench.records import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.trial.stages import scene_of
@@ -112,47 +117,54 @@ def taken_out(folder: Path, each: Foreign, to: Path) -> list[Path]:
     return paths
 
 
-def imported(each: Foreign, paths: Sequence[Path], folder: Path) -> tuple[list[dict[str, Any]], list[PosedPart]]:
-    """What became of each file, and all parts at their places, [m]."""
-    lines: list[dict[str, Any]] = []
-    parts: list[PosedPart] = []
-    for file, path in zip(each.files, paths, strict=True):
-        begin = time.process_time()
-        line: dict[str, Any] = {"file": path.name}
-        try:
-            poses, said = import_assembly(path, folder / path.stem, file.unit, fewest=1)
-            found = read_posed(poses, fewest=1)
-        except InputError as error:
-            line["refused"] = str(error).replace(f"{path.parent}/", "")
-        except Exception as error:  # a failure of ours, and said as one
-            line["refused"] = f"{type(error).__name__}: {error}"
-        else:
-            solids = {part.file: part.solid for part in found}.values()
-            line |= {
-                "solids": len(solids),
-                "flat": sum(len(solid.faces) for solid in solids),
-                "round": sum(len(solid.rounds) for solid in solids),
-                "no_contact": sum("can make no contact" in sentence for sentence in said),
-            }
-            for T in file.places:
-                for part in found:
-                    name = free_name(part.name, {other.name for other in parts})
-                    parts.append(replace(part, name=name, T=T @ part.T))
-        lines.append(line | {"seconds": round(time.process_time() - begin, 1)})
-    return lines, parts
+def imported(each: Foreign, paths: Sequence[Path], folder: Path) -> tuple[list[dict[str, Any]], Path | None]:
+    """What became of each file, and where all parts are; None if a file was refused."""
+    lines: list[dict[str, Any]] = [
+        {"file": path.name, "solids": 0, "flat": 0, "round": 0, "no_contact": 0, "seconds": 0.0} for path in paths
+    ]
+    found: list[tuple[int, RawSolid]] = []
+    for k, file in enumerate(each.files):
+        places = [np.concatenate([T[:3] * [1.0, 1.0, 1.0, 1e3], T[3:]]) for T in file.places]
+        with _said_of(lines[k], paths[k]):
+            found += [(k, raw) for raw in solids_at(paths[k], file.unit, places)]
+    near = coming_near([raw for _, raw in found])
+    made: dict[str, list[SolidPlace]] = {}
+    for (k, raw), others in zip(found, near, strict=True):
+        with _said_of(lines[k], paths[k]):
+            part = import_solid(raw, others, folder, paths[k].name, made)
+            made[part.name] = part.places
+            solid = load_part(folder / f"{part.name}.xml")
+            for key, more in (("solids", 1), ("flat", len(solid.faces)), ("round", len(solid.rounds))):
+                lines[k][key] += more
+            lines[k]["no_contact"] += sum("can make no contact" in sentence for sentence in part.said)
+    if any("refused" in line for line in lines):
+        return lines, None
+    return lines, write_places(named_places(made), folder, each.repository)
+
+
+@contextmanager
+def _said_of(line: dict[str, Any], path: Path) -> Iterator[None]:
+    begin = time.process_time()
+    try:
+        yield
+    except InputError as error:
+        line["refused"] = str(error).replace(f"{path.parent}/", "")
+    except Exception as error:  # a failure of ours, and said as one
+        line["refused"] = f"{type(error).__name__}: {error}"
+    line["seconds"] = round(line["seconds"] + time.process_time() - begin, 1)
 
 
 def became(each: Foreign, mirror: Path, folder: Path, seeds: int) -> Iterator[dict[str, Any]]:
     """All that is tried with one assembly, line after line, until it ends."""
     paths = taken_out(mirror, each, folder / "files")
-    lines, parts = imported(each, paths, folder)
+    lines, poses = imported(each, paths, folder)
     yield from lines
-    if any("refused" in line for line in lines):
+    if poses is None:
         return
     begin = time.process_time()
     path = folder / f"{each.name}.toml"
     try:
-        made = drafted(parts)
+        made = drafted(read_posed(poses))
         write_scenario(made, path, each.name, each.repository)
         scenario = load_scenario(path)
     except (InputError, RuntimeError) as error:
@@ -166,7 +178,7 @@ def became(each: Foreign, mirror: Path, folder: Path, seeds: int) -> Iterator[di
     yield {
         "draft": "",
         "up": made.up,
-        "parts": len(parts),
+        "parts": len(made.parts),
         "contacts": {kind: contacts.count(kind) for kind in sorted(set(contacts))},
         "notes": list(made.notes),
         "seconds": round(time.process_time() - begin, 1),

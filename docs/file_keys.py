@@ -88,6 +88,8 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
             "follows_site": "`true`: a fixed part that stands where the assembly stands",
             "start": "pose in the world before the first operation; every part that is not fixed needs one",
             "color": "red, green, blue, 0 to 1",
+            "fit": "faces that recede by the clearance although the part file does not say so: FACE = how far it lies "
+            "inside of where the file has it, 0 to 1 mm",
         },
         "pose: start, goal": POSE,
         "operations": {

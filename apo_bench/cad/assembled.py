@@ -1,14 +1,13 @@
 """Solids where an assembly has them: what comes near to each, in its place and on straight ways out, [mm]."""
 
 from collections.abc import Iterator, Sequence
-from itertools import combinations
 from typing import Any
 
 import numpy as np
 
 from apo_bench.cad.pieces.misfit import surface_points
 from apo_bench.cad.solids.bodies import body_of
-from apo_bench.cad.solids.raw_solid import RawSolid, SolidPlace
+from apo_bench.cad.solids.raw_solid import RawSolid
 from apo_bench.geometry import Array, pose
 
 _STEP_MM = 1.0
@@ -60,14 +59,3 @@ def _shifts(own: Any, other: Any, T: Array) -> Iterator[Array]:
             (own ^ other.translate(step * way)).volume() < _NONE * min(own.volume(), other.volume()) for step in looked
         ):
             yield from (step * way for step in steps)
-
-
-def in_common(raws: Sequence[RawSolid], places: Sequence[SolidPlace]) -> Iterator[tuple[int, int, float]]:
-    """Which two of the placed solids overlap as they are drawn, and by how much, [mm^3]."""
-    moved = [body_of(raw.mesh).transform(place.T[:3]) for raw, place in zip(raws, places, strict=True)]
-    boxes = [np.array(body.bounding_box()).reshape(2, 3) for body in moved]
-    for i, k in combinations(range(len(moved)), 2):
-        if (boxes[i][0] < boxes[k][1]).all() and (boxes[k][0] < boxes[i][1]).all():
-            size = float((moved[i] ^ moved[k]).volume())
-            if size > _NONE * min(moved[i].volume(), moved[k].volume()):
-                yield i, k, size

@@ -111,12 +111,13 @@ def _circle(raw: RawSolid, region: Region, beside: set[int], hole: bool) -> Arra
 def solid_moments(raw: RawSolid, cut: Cut) -> Moments:
     """[m]: of the mesh and what lies between its strips and walls that pieces are rebuilt for.
 
-    Where pieces stand for free shapes, of the pieces; where there are other curved faces, as the file has it. It is not
-    asked of flat and round solids: a kernel integrates faces that are trimmed badly up to a hundredth wrong.
+    Of the pieces where these stand for free shapes, or fill holes; where there are other curved faces, as the file has
+    it. It is not asked of flat and round solids: a kernel integrates faces that are trimmed badly up to a hundredth
+    wrong.
     """
     import manifold3d
 
-    if cut.hulls:
+    if cut.hulls or cut.filled:
         pieces = [manifold3d.Manifold.hull_points(1e3 * piece.corners) for piece in cut.pieces]
         moments = _mesh_moments(mesh_of(manifold3d.Manifold.batch_boolean(pieces, manifold3d.OpType.Add)))
     elif raw.moments is not None and not all(r.kind == "plane" or r.square for r in raw.regions):

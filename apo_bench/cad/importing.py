@@ -18,7 +18,7 @@ from apo_bench.cad.solids.drawn import keep_drawn
 from apo_bench.cad.solids.naming import with_names
 from apo_bench.cad.solids.raw_solid import RawSolid, without_copies
 from apo_bench.cad.step.step_file import STEP_SUFFIXES, read_step
-from apo_bench.cad.time_limit import time_limit
+from apo_bench.cad.time_limit import limit_of, time_limit
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Face, Hull, RoundFace, Solid
 from apo_bench.parts import load_part
@@ -26,9 +26,15 @@ from apo_bench.parts.agreement import check_faces, supported
 from apo_bench.parts.allowed import HEAVIEST_KG, LIGHTEST_KG, MOST_CORNERS_IN_ALL, MOST_FACES
 from apo_bench.parts.making import Body, solid_of, write_part
 
+_BYTES = 50
+"""Of a triangle in an STL file; in others it has more."""
 _RAYS = 720
 _LEAST_SHARE = 0.5
 """So much of a flat face must lie on the pieces where these stand for free shapes."""
+_FILLED = (
+    "the hole is filled: with all of its round holes the part would take too many convex pieces, and nothing that the "
+    "file has comes into this one, or it is one of the smallest"
+)
 
 
 @final
@@ -54,7 +60,8 @@ def raw_solids(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
     Raises:
         InputError: The file cannot be read, or holds no closed solid.
     """
-    with time_limit(f"{path}: finding the faces", "save it with fewer triangles"):
+    limit_s = limit_of(path.stat().st_size / _BYTES if path.is_file() else 0)
+    with time_limit(f"{path}: finding the faces", "save it with fewer triangles", limit_s):
         if path.suffix.lower() in STEP_SUFFIXES:
             return read_step(path, unit)
         file, meshes = read_meshes(path, unit)
@@ -83,7 +90,9 @@ def import_part(
         InputError: It has more faces or pieces than a part may have, or is too light or too heavy for one.
     """
     with time_limit(
-        f"{source}: cutting the part into convex pieces", "leave out small holes, fillets and free surfaces"
+        f"{source}: cutting the part into convex pieces",
+        "leave out small holes, fillets and free surfaces",
+        limit_of(len(raw.mesh.triangles)),
     ):
         weight = 1e-9 * density * raw.mesh.volume
         if not LIGHTEST_KG <= weight <= HEAVIEST_KG:
@@ -102,6 +111,8 @@ def import_part(
                 "most, so leave out small holes and fillets."
             )
         flats, rounds, refused = contact_faces(raw)
+        refused |= dict.fromkeys(pieces.filled, _FILLED)
+        rounds = [wall for wall in rounds if wall.name not in refused]
         if len(flats) + len(rounds) > MOST_FACES:
             raise InputError(f"{source}: the part has {len(flats) + len(rounds)} faces; {MOST_FACES} are the most.")
         body = Body(pieces.pieces, tuple(flats), tuple(rounds), solid_moments(raw, pieces))

@@ -10,11 +10,18 @@ from typing import Never
 from apo_bench.errors import InputError
 
 _LIMIT_S = 20.0
+_PER_TRIANGLE_S = 1e-3
+_MOST_S = 120.0
 """Time of the processor that reading a file may take, and cutting each solid of it."""
 
 
 class _Late(BaseException):
     """Not an `Exception`: a library that reads on after any of these must not swallow it."""
+
+
+def limit_of(triangles: float) -> float:
+    """How long what has so many triangles may take, [s]."""
+    return min(_LIMIT_S + _PER_TRIANGLE_S * triangles, _MOST_S)
 
 
 @contextmanager

@@ -76,10 +76,15 @@ def scenario_new(
         typer.Option(help="A part that is never moved; may be given again. Default: the largest of the lowest."),
     ] = None,
     clearance: Annotated[float, typer.Option(help="Room per side of faces marked as fit, mm.")] = 0.25,
+    loosen: Annotated[
+        float,
+        typer.Option(help="Parts drawn without play, or no deeper in each other, mm, get the clearance; 0: none do."),
+    ] = 0.2,
     overwrite: Annotated[bool, typer.Option(help="Make --out and its parts anew where they are.")] = False,
 ) -> None:
     """Make a scenario of parts at their final poses: contacts, an order, starts, grasps, a comment for each choice."""
-    from apo_bench.drafting.posed import UPS, import_assembly, read_posed
+    from apo_bench.drafting.from_cad import import_assembly
+    from apo_bench.drafting.posed import UPS, read_posed
     from apo_bench.drafting.upright import drafted
     from apo_bench.drafting.writing import draft_lines, write_scenario
     from apo_bench.scenario.file import load_scenario
@@ -91,6 +96,8 @@ def scenario_new(
         raise InputError(f"--up {up} was given; {', '.join(UPS)} are allowed.")
     if not 0.0 <= clearance <= 5.0:
         raise InputError(f"--clearance {clearance:g} was given; 0 to 5 mm are allowed.")
+    if not 0.0 <= loosen <= 1.0:
+        raise InputError(f"--loosen {loosen:g} was given; 0 to 1 mm are allowed.")
     named = [*(parts or []), *(more or [])]
     if assembly is not None:
         if poses is not None or named:
@@ -99,7 +106,7 @@ def scenario_new(
         typer.echo("\n".join([*lines, f"Wrote {poses} and its parts"]))
     elif poses is None:
         raise InputError("neither --assembly nor --poses was given; say where the parts are in the end.")
-    made = drafted(read_posed(poses, named), up, fixed or (), clearance)
+    made = drafted(read_posed(poses, named), up, fixed or (), clearance, loosen)
     source = str((assembly or poses).name)
     write_scenario(made, out, f"Assembly of {out.stem}", source)
     typer.echo("\n".join(draft_lines(made)))

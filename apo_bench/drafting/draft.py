@@ -80,7 +80,9 @@ def draft(
     base, why_fixed = (
         (tuple(fixed), "as asked") if fixed else (lowest(parts)[:1], "the largest of those that lie lowest")
     )
-    wrong = clashes(solids, poses, clearance_mm, {each.name: each.file for each in parts})
+    files = {each.name: each.file for each in parts}
+    given_mm = {each.name: max(each.fit.values(), default=0.0) for each in parts}
+    wrong = clashes(solids, poses, clearance_mm, files, given_mm)
     if wrong:
         raise RuntimeError("; ".join(wrong) + ".")
     poses, contacts, dropped = closed(solids, poses, found_contacts(solids, poses), (TABLE, *base))

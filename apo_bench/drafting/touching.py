@@ -16,9 +16,9 @@ from apo_bench.assembly.facing import facing
 from apo_bench.cad.solids.drawn import drawn_mesh, overlap
 from apo_bench.geometry import Array, Solid, intrusion, mate, pose
 
-_NEAR_M = 5e-5
-_NEAR_RAD = 2e-3
-_SHARE = 0.02
+NEAR_M = 5e-5
+NEAR_RAD = 2e-3
+SHARE = 0.02
 """A contact at the poses that were given."""
 _CLOSED_M = 5e-7
 _CLOSED_RAD = 1e-4
@@ -28,7 +28,7 @@ _ARM_M = 0.05
 """Turns count as what they move at this distance."""
 _DEEP_M = 2e-5
 """Parts that are deeper in each other do not only touch."""
-_NO_PLAY_MM = 1e-3
+NO_PLAY_MM = 1e-3
 _COAXIAL_M = 1e-4
 _THREAD_M = 2.5e-3
 """A shaft that is so much thicker than the hole around it is pressed in, or has a thread."""
@@ -39,7 +39,7 @@ def found_contacts(solids: Mapping[str, Solid], poses: Poses) -> tuple[Contact, 
     return tuple(
         Contact(PartFace(a, each.a), PartFace(b, each.b))
         for a, b in combinations(solids, 2)
-        for each in facing(solids[a], poses[a], solids[b], poses[b], gap_m=_NEAR_M, angle_rad=_NEAR_RAD, share=_SHARE)
+        for each in facing(solids[a], poses[a], solids[b], poses[b], gap_m=NEAR_M, angle_rad=NEAR_RAD, share=SHARE)
     )
 
 
@@ -60,31 +60,38 @@ def closed(
 
 
 def clashes(
-    solids: Mapping[str, Solid], poses: Poses, clearance_mm: float, files: Mapping[str, Path] = MappingProxyType({})
+    solids: Mapping[str, Solid],
+    poses: Poses,
+    clearance_mm: float,
+    files: Mapping[str, Path] = MappingProxyType({}),
+    given_mm: Mapping[str, float] = MappingProxyType({}),
 ) -> list[str]:
     """Press fits, threads, and other parts that are inside each other, one sentence each.
 
     Args:
         files: Part files; overlaps are those of the solids as drawn where an import kept these beside them.
+        given_mm: By how much faces of a part lie inside of those of its file at most, since they were drawn too thick.
     """
     sentences = list[str]()
     for a, b in combinations(solids, 2):
         deep = intrusion(solids[a], poses[a], solids[b], poses[b])
         tight = next(_tight(solids, poses, a, b, clearance_mm), "")
         if tight or deep > _DEEP_M:
-            sentences.append(tight or _inside(poses, a, b, deep, files))
+            sentences.append(
+                tight or _inside(poses, a, b, deep, files, max(given_mm.get(a, 0.0), given_mm.get(b, 0.0)))
+            )
     return sentences
 
 
-def _inside(poses: Poses, a: str, b: str, deep_m: float, files: Mapping[str, Path]) -> str:
+def _inside(poses: Poses, a: str, b: str, deep_m: float, files: Mapping[str, Path], given_mm: float) -> str:
     """What is wrong with two parts whose pieces are so deep in each other."""
     meshes = [drawn_mesh(files[part]) if part in files else None for part in (a, b)]
     drawn = overlap(meshes[0], poses[a], meshes[1], poses[b]) if meshes[0] and meshes[1] else None
-    if drawn is not None and drawn.depth_m <= _DEEP_M:
+    if drawn is not None and drawn.depth_m <= _DEEP_M + 1e-3 * given_mm:
         return (
             f"'{a}' and '{b}' are {1e3 * drawn.depth_m:.3g} mm inside each other as drawn, but the convex pieces that "
-            f"stand for them are so by {1e3 * deep_m:.3g} mm: an error of the import, not of the file; draw what is "
-            "there simpler, or leave one of them out"
+            f"stand for them are so by {1e3 * deep_m:.3g} mm: an error of the import, not of the file, whose pieces of "
+            "a free shape are coarser there than their play; draw it simpler, or with more play"
         )
     where = ""
     if drawn is not None:
@@ -123,10 +130,10 @@ def _tight(solids: Mapping[str, Solid], poses: Poses, a: str, b: str, clearance_
     """What shafts are that have no play in the holes around them."""
     for wall, other in product(solids[a].rounds.values(), solids[b].rounds.values()):
         play = play_mm(wall, other, clearance_mm) if contact_kind(wall, other) == "shaft in hole" else None
-        if play is None or play > _NO_PLAY_MM or geometric_play(wall, other) < -_THREAD_M:
+        if play is None or play > NO_PLAY_MM or geometric_play(wall, other) < -_THREAD_M:
             continue
         fit = mate(wall, poses[a], other, poses[b])
-        if fit.gap_m < _COAXIAL_M and fit.angle_rad < _NEAR_RAD and fit.length_m > 1e-4:
+        if fit.gap_m < _COAXIAL_M and fit.angle_rad < NEAR_RAD and fit.length_m > 1e-4:
             pair = ((a, wall), (b, other))
             (inner, shaft), (outer, hole) = reversed(pair) if wall.hole else pair
             yield (
@@ -174,9 +181,9 @@ def _facing(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> Faci
         poses[a.part],
         solids[b.part],
         poses[b.part],
-        gap_m=10 * _NEAR_M,
-        angle_rad=10 * _NEAR_RAD,
-        share=_SHARE / 2,
+        gap_m=10 * NEAR_M,
+        angle_rad=10 * NEAR_RAD,
+        share=SHARE / 2,
     )
     return next((pair for pair in pairs if (pair.a, pair.b) == (a.face, b.face)), None)
 

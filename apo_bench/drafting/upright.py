@@ -5,6 +5,7 @@ from contextlib import suppress
 from dataclasses import replace
 
 from apo_bench.drafting.draft import Draft, NoOrder, draft, lowest
+from apo_bench.drafting.loosening import LOOSEN_MM, loosened
 from apo_bench.drafting.posed import PosedPart, on_the_table
 from apo_bench.errors import InputError
 
@@ -13,18 +14,24 @@ _MOST_BASES = 3
 
 
 def drafted(
-    parts: Sequence[PosedPart], up: str | None = None, fixed: Sequence[str] = (), clearance_mm: float = 0.25
+    parts: Sequence[PosedPart],
+    up: str | None = None,
+    fixed: Sequence[str] = (),
+    clearance_mm: float = 0.25,
+    loosen_mm: float = LOOSEN_MM,
 ) -> Draft:
     """The draft of an assembly, with an axis of its poses up.
 
     Args:
         up: An axis of `posed.UPS`; None: z, unless parts then find no order, do not stand, or cannot be held, and
             another axis is better.
+        loosen_mm: Parts without play are given some where they are no deeper in each other; 0: none are.
 
     Raises:
         InputError: No part has that name, or there is no room on the table.
         RuntimeError: Parts are inside each other, or there is no order in which they can be put together.
     """
+    parts, said = loosened(parts, clearance_mm, loosen_mm)
     tried: dict[str, Draft] = {}
     failed: dict[str, NoOrder | InputError] = {}
     for axis in (up,) if up else _FIRST:
@@ -38,6 +45,7 @@ def drafted(
     if not tried:
         first = next(iter(failed.values()))
         raise first if up else type(first)(f"{str(first).rstrip('.')}; nor is there one with another axis up.")
+    tried = {axis: replace(made, notes=(*said, *made.notes)) for axis, made in tried.items()}
     best = min(tried, key=lambda axis: len(tried[axis].unfit))
     if up or best == "z":
         return replace(tried[best], up=f"{best}, as asked" if up else best)

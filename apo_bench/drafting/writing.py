@@ -109,12 +109,15 @@ def _part(draft: Draft, each: PosedPart, folder: Path) -> Iterator[str]:
         yield f"fixed = true  # {draft.why_fixed}"
         yield "follows_site = true  # it stands where the assembly stands"
         yield f"start = {_pose(draft.starts[each.name])}"
-        return
-    stance = draft.stances[each.name]
-    why = "as in the assembly; it may roll" if stance.rolls else "stands as in the assembly"
-    if not stance.stands:
-        why = "as in the assembly, in its nest"
-    yield f"start = {_pose(draft.starts[each.name])}  # {why}"
+    else:
+        stance = draft.stances[each.name]
+        why = "as in the assembly; it may roll" if stance.rolls else "stands as in the assembly"
+        if not stance.stands:
+            why = "as in the assembly, in its nest"
+        yield f"start = {_pose(draft.starts[each.name])}  # {why}"
+    if each.fit:
+        yield f"[parts.{each.name}.fit]  # faces that recede by the clearance, from so many mm inside of the file's"
+        yield from (f"{face} = {inside_mm:g}" for face, inside_mm in each.fit.items())
 
 
 def _operation(draft: Draft, placing: Placing) -> Iterator[str]:

@@ -14,6 +14,7 @@ from apo_bench.insertion.line import Preference
 from apo_bench.io.documents import JsonNode
 from apo_bench.parts import load_part, part_path
 from apo_bench.parts.allowed import FACE_OR_PART_NAME
+from apo_bench.parts.receding import with_fit
 from apo_bench.scenario.contacts import ContactGaps, check_kinds, read_contacts
 from apo_bench.scenario.grasps import read_grasp
 from apo_bench.scenario.keys import (
@@ -32,6 +33,7 @@ _MOST_OPERATIONS = 100
 _MOST_CONTACTS = 50
 _MOST_SHIFTS = 20
 """In a scenario, in a scenario, of an operation, in a scenario: what is checked in a moment."""
+_MOST_UNDERSIZE_MM = 1.0
 _ARM = "arm"
 """What the robot is called in a scene."""
 
@@ -80,7 +82,7 @@ def _part(node: JsonNode, name: str, folder: Path, solids: dict[Path, Solid], ch
         f"a part cannot be called '{name}'; use a letter, then letters, digits and underscores",
     )
     refuse_unless(name != _ARM, node, f"a part cannot be called '{_ARM}', as the robot is; give it another name")
-    keys = node.fields(("file",), ("fixed", "follows_site", "start", "color"))
+    keys = node.fields(("file",), ("fixed", "follows_site", "start", "color", "fit"))
     fixed = "fixed" in keys and keys["fixed"].flag()
     follows = "follows_site" in keys and keys["follows_site"].flag()
     refuse_unless(
@@ -94,6 +96,8 @@ def _part(node: JsonNode, name: str, folder: Path, solids: dict[Path, Solid], ch
         "the key 'start' is missing; say where the part stands, such as start = { at_mm = [0, 260, 0] }",
     )
     path, solid = _solid(keys["file"], folder, solids, checked)
+    if "fit" in keys:
+        solid = _with_fit(keys["fit"], solid)
     start = read_pose(keys["start"]) if "start" in keys else np.eye(4)
     return PartEntry(path, solid, fixed, follows, start, _color(keys["color"]) if "color" in keys else None)
 
@@ -109,6 +113,16 @@ def _solid(node: JsonNode, folder: Path, solids: dict[Path, Solid], checked: boo
             raise
         raise InputError(f"{node.file}, {node.key}: {error}") from error
     return path, solids[path]
+
+
+def _with_fit(node: JsonNode, solid: Solid) -> Solid:
+    """A part with faces that recede here: face -> by how much it lies deeper in the part than its file says, mm."""
+    keys = node.fields((), (*solid.faces, *solid.rounds))
+    undersizes = {name: key.number(0.0, _MOST_UNDERSIZE_MM) for name, key in keys.items()}
+    try:
+        return with_fit(solid, undersizes)
+    except InputError as error:
+        raise InputError(f"{node.file}, {node.key}: {error}") from error
 
 
 def _color(node: JsonNode) -> tuple[float, float, float]:

@@ -306,16 +306,6 @@ def test_a_brep_that_crosses_itself_is_refused_and_rounding_of_arcs_is_not(tmp_p
     raw_of(tmp_path / "a.step", solid("sphere", thin))
 
 
-def test_more_holes_than_a_part_may_have_pieces_are_refused_at_once(tmp_path: Path) -> None:
-    from manifold3d import Manifold, OpType
-
-    holes = [rod(1.5, 5, (5 * x, 5 * y, 0), n=16) for x in range(15) for y in range(10)]
-    plate = block(85, 60, 5, (35, 22.5, 0)) - Manifold.batch_boolean(holes, OpType.Add)
-    _, (raw,) = raw_solids(write_stl(plate, tmp_path / "a.stl"), None)
-    with pytest.raises(InputError, match=r"a.stl: its 150 round holes take [\d,]+ convex pieces; 2,000 are the most"):
-        import_part(raw, "a", tmp_path, "a.stl")
-
-
 def test_what_takes_too_long_is_given_up() -> None:
     def wait() -> None:
         with time_limit("a.stl", "leave out holes", 0.05):

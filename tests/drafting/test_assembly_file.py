@@ -10,7 +10,8 @@ import trimesh
 from manifold3d import Manifold
 
 from apo_bench import InputError
-from apo_bench.drafting.posed import import_assembly, read_posed
+from apo_bench.drafting.from_cad import import_assembly
+from apo_bench.drafting.posed import read_posed
 from apo_bench.geometry import pose
 from tests.cad.made import block, rod
 

@@ -1,5 +1,6 @@
 """Solids cut into convex pieces: along the planes of reflex edges, then around round holes, [mm]."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -9,12 +10,13 @@ from apo_bench.cad.pieces.halving import at_shoulders, convex_parts, settled
 from apo_bench.cad.pieces.refining import Beside
 from apo_bench.cad.pieces.round_walls import as_cylinders, bored, least_pieces, with_round_shafts
 from apo_bench.cad.solids.bodies import body_of
-from apo_bench.cad.solids.raw_solid import RawSolid
+from apo_bench.cad.solids.raw_solid import RawSolid, Region
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Hull
 from apo_bench.parts.allowed import MOST_PIECES
 
 _MOST_TRIANGLES = 20_000
+_MOUTH_MM = 1.0
 _LOSS = 1e-3
 """A piece whose volume differs by more than this part from what it stands for is said to do so."""
 
@@ -28,6 +30,8 @@ class Cut(NamedTuple):
     """By how much pieces that stand for hollow or free shapes are larger, [mm^3]; negative: smaller."""
     hulls: int
     """How many do."""
+    filled: tuple[str, ...] = ()
+    """Round holes that are not there, since the part would have too many pieces with them."""
 
 
 def cut(raw: RawSolid, others: Array | None = None) -> Cut:
@@ -47,11 +51,6 @@ def cut(raw: RawSolid, others: Array | None = None) -> Cut:
     if body.status() != manifold3d.Error.NoError or body.is_empty():
         raise InputError("the mesh makes no solid; mend it where it was drawn, and save it again.")
     bores = [r for r in raw.regions if r.is_round and r.hole and r.square]
-    if least_pieces(bores) > MOST_PIECES:
-        raise InputError(
-            f"its {len(bores)} round holes take {least_pieces(bores):,} convex pieces; {MOST_PIECES:,} are the most "
-            "in a part, so leave out small ones."
-        )
     for bore in bores:  # is filled with what was taken away, as the mesh has it
         body = body + manifold3d.Manifold.hull_points(raw.mesh.corners[np.unique(raw.mesh.triangles[bore.triangles])])
     if body.num_tri() > _MOST_TRIANGLES:
@@ -74,12 +73,35 @@ def cut(raw: RawSolid, others: Array | None = None) -> Cut:
         if abs(more) > _LOSS * true:
             grown.append(more)
         outlines.append(corners)
+    kept = sorted(bores, key=lambda bore: (_is_near(bore, others), max(bore.radii)), reverse=True)
+    pieces = _bored(outlines, kept, flats)
+    while pieces is None and kept:
+        # What nothing comes near to goes first, and what is small; others are there as they were drawn.
+        kept = kept[: min(len(kept) * 3 // 4, max(1, MOST_PIECES * len(kept) // least_pieces(kept)))]
+        pieces = _bored(outlines, kept, flats)
+    if pieces is None:
+        raise InputError(
+            f"the part takes more than {MOST_PIECES:,} convex pieces without its holes, which are the most; leave "
+            "out fillets and free surfaces."
+        )
+    filled = tuple(bore.name for bore in bores if bore not in kept)
+    return Cut(tuple(as_cylinders(pieces, shafts)), sum(grown, 0.0), len(grown), filled)
+
+
+def _bored(outlines: Sequence[Array], bores: Sequence[Region], flats: Array) -> list[Hull] | None:
+    """All pieces less holes; None if there are too many."""
     pieces: list[Hull] = []
-    for corners in outlines:
+    for corners in outlines if least_pieces(bores) <= MOST_PIECES else ():
         pieces += [Hull("", 1e-3 * each) for each in bored(corners, bores, flats, MOST_PIECES - len(pieces))]
         if len(pieces) > MOST_PIECES:
-            raise InputError(
-                f"the part takes more than {MOST_PIECES:,} convex pieces, which are the most; leave out small holes "
-                "and fillets."
-            )
-    return Cut(tuple(as_cylinders(pieces, shafts)), sum(grown, 0.0), len(grown))
+            return None
+    return pieces or None
+
+
+def _is_near(bore: Region, others: Array | None) -> bool:
+    """Whether points of others, (k, 3), come into a hole or to its mouth."""
+    if others is None or not len(others):
+        return False
+    height, distance, _ = bore.polar(others)
+    level = (height > bore.span[0] - _MOUTH_MM) & (height < bore.span[1] + _MOUTH_MM)
+    return bool((level & (distance < max(bore.radii))).any())

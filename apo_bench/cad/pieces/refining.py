@@ -54,9 +54,19 @@ class Beside:
     def most(self) -> int:
         return _ALONE if self.others is None else _TOGETHER
 
-    def allowed(self, points: Array) -> Array:
-        """How deep each point of the surface, (k, 3), may lie in a hull, (k,)."""
-        return np.where(self.near(points), _DEEP_MM, max(_FAR * self.size, _DEEP_MM))
+    def allowed(self, points: Array, mesh: Mesh, hull: Array) -> Array:
+        """How deep each point of the surface, (k, 3), of a part may lie in its hull, which has these planes, (k,)."""
+        # A hull that bridges a hollow may reach others that are not near to the bottom of it.
+        is_near = self.near(points) | (len(points) > 0 and self._reached(mesh.corners, hull))
+        return np.where(is_near, _DEEP_MM, max(_FAR * self.size, _DEEP_MM))
+
+    def _reached(self, corners: Array, hull: Array) -> bool:
+        """Whether others come into the hull of corners, (k, 3)."""
+        if self.others is None:
+            return False
+        others = self.others.data
+        inside = others[((others > corners.min(axis=0)) & (others < corners.max(axis=0))).all(axis=1)]
+        return bool(depths(inside, hull).max(initial=0.0) > _DEEP_MM)
 
     def near(self, points: Array) -> Any:
         """Where others may come by, (k,)."""
@@ -100,8 +110,8 @@ def refined(parts: Iterable[CutPart], beside: Beside, volume: float, hair: float
 
 def _worst(part: CutPart, beside: Beside) -> _Worst:
     mesh = mesh_of(part.body)
-    points, depth, _ = _hollow(mesh)
-    share = depth / beside.allowed(points)
+    points, depth, planes = _hollow(mesh)
+    share = depth / beside.allowed(points, mesh, planes)
     if len(share) and share.max() > 1.0:
         k = int(share.argmax())
         # The sides at that corner or edge, or the one around that middle, as far as they have a normal.

@@ -1,0 +1,116 @@
+"""CAD files become parts at their final poses: one file of several solids, or several files and where each is."""
+
+from collections.abc import Container, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.cad.assembled import coming_near
+from apo_bench.cad.import_report import named_places, write_places
+from apo_bench.cad.importing import import_part, raw_solids
+from apo_bench.cad.solids.naming import free_name, part_name
+from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, Region, SolidPlace
+from apo_bench.errors import InputError
+from apo_bench.geometry import Array, pose
+
+_UPRIGHT = 1.0 - 1e-9
+_NEAR = 0.005
+"""A part of the width of the box."""
+
+
+class ImportedSolid(NamedTuple):
+    """A part that was written."""
+
+    name: str
+    places: list[SolidPlace]
+    """Of its frame, [mm]."""
+    said: list[str]
+    """What is to be known of it, one sentence each."""
+
+
+def import_assembly(file: Path, folder: Path, unit: str | None = None) -> tuple[Path, tuple[str, ...]]:
+    """Write the parts of an assembly, each shape once, and where every copy of them is.
+
+    Returns:
+        The file of poses, and what was imported, one sentence each.
+
+    Raises:
+        InputError: The file cannot be read, a solid makes no part, or there is one alone.
+    """
+    raws = solids_at(file, unit)
+    if sum(len(raw.places) for raw in raws) < 2:
+        raise InputError(f"{file}: the file holds one solid; an assembly of at least two is needed.")
+    parts: dict[str, ImportedSolid] = {}
+    for raw, others in zip(raws, coming_near(raws), strict=True):
+        part = import_solid(raw, others, folder, file.name, parts)
+        parts[part.name] = part
+    copies = named_places({name: part.places for name, part in parts.items()})
+    return write_places(copies, folder, file.name), tuple(said for part in parts.values() for said in part.said)
+
+
+def solids_at(file: Path, unit: str | None = None, places: Sequence[Array] = (np.eye(4),)) -> list[RawSolid]:
+    """All solids of a file that is at some places of an assembly, (4, 4), [mm], each with all of its places there.
+
+    Raises:
+        InputError: The file cannot be read, or a solid of it makes no part.
+    """
+    source, raws = raw_solids(file, unit)
+    if source.left_out:
+        raise InputError(f"{file}: {len(source.left_out)} of its solids can be no parts: {' '.join(source.left_out)}")
+    return [
+        replace(raw, places=tuple(place._replace(T=T @ place.T) for T in places for place in raw.places))
+        for raw in raws
+    ]
+
+
+def import_solid(raw: RawSolid, others: Array, folder: Path, source: str, used: Container[str]) -> ImportedSolid:
+    """Write one solid of an assembly as a part.
+
+    Its frame lies at the part, wherever the file has its origin: a pose that is seen turned a little turns a part about
+    its own frame.
+
+    Args:
+        others: What comes near to it, as `coming_near` has it.
+        used: Names that it cannot have.
+
+    Raises:
+        InputError: It makes no part.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    name = free_name(part_name(raw.name), used)
+    foot = _foot(raw)
+    part = import_part(_shifted(raw, -foot), name, folder, f"{source}, {raw.name}", others=others - foot)
+    said = [f"{name}: {len(part.solid.faces)} flat and {len(part.solid.rounds)} round faces"]
+    said += [f"{name}.{face} can make no contact: {why}" for face, why in part.refused.items()]
+    return ImportedSolid(name, [place._replace(T=place.T @ pose.at(foot)) for place in raw.places], said)
+
+
+def _foot(raw: RawSolid) -> Array:
+    """The middle of the lower side of the box around a solid, (3,), to a micrometre, [mm].
+
+    An upright axis that goes by near there takes its place: the box around facets is off by a part of their sagitta.
+    """
+    low = raw.mesh.corners.min(axis=0)
+    high = raw.mesh.corners.max(axis=0)
+    middle = (low + high)[:2] / 2
+    near = _NEAR * (high - low)[:2].max()
+    upright = [r.point[:2] for r in raw.regions if r.is_round and abs(r.direction[2]) > _UPRIGHT]
+    middle = next((at for at in upright if np.linalg.norm(at - middle) < near), middle)
+    return np.round([*middle, low[2]], 3)
+
+
+def _shifted(raw: RawSolid, by: Array) -> RawSolid:
+    """The same solid elsewhere, [mm]."""
+    mesh = Mesh(raw.mesh.corners + by, raw.mesh.triangles)
+    moments = None if raw.moments is None else raw.moments.moved(np.eye(3), by)
+    return replace(raw, mesh=mesh, regions=tuple(_moved(region, by) for region in raw.regions), moments=moments)
+
+
+def _moved(region: Region, by: Array) -> Region:
+    """A plane is known by one of its points, an axis by the foot of the origin on it."""
+    point = region.point + by
+    along = float(point @ region.direction) if region.is_round else 0.0
+    low, high = region.span
+    return replace(region, point=point - along * region.direction, span=(low + along, high + along))

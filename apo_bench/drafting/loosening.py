@@ -1,0 +1,94 @@
+"""Play for parts that were drawn without any: mating faces of the smaller part recede.
+
+Printed and moulded parts are often drawn line to line, or a little inside each other. Physics then finds no way in. So
+faces recede to where they only touch, and by the clearance; where nothing would be left of a piece, those of the larger
+part do.
+"""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from itertools import combinations
+
+from apo_bench.assembly import Contact, PartFace, contact_kind, geometric_play
+from apo_bench.assembly.facing import facing
+from apo_bench.drafting.posed import PosedPart
+from apo_bench.drafting.touching import NEAR_M, NEAR_RAD, NO_PLAY_MM, SHARE, walls_without_play
+from apo_bench.errors import InputError
+from apo_bench.geometry import physical_pieces
+from apo_bench.parts.receding import with_fit
+
+LOOSEN_MM = 0.2
+"""Faces that are deeper in each other are not made looser."""
+_OVER_MM = 1e-5
+_DIGITS = 5
+
+
+def loosened(
+    parts: Sequence[PosedPart], clearance_mm: float, most_mm: float = LOOSEN_MM
+) -> tuple[tuple[PosedPart, ...], tuple[str, ...]]:
+    """The parts, some of whose faces are fit that their files do not mark so, and what is to be said of that.
+
+    Args:
+        clearance_mm: By how much these recede; with none, nothing is changed.
+        most_mm: Faces that are deeper in each other stay where they are; 0: all do.
+    """
+    made = {each.name: each for each in parts}
+    notes = list[str]()
+    for pair in combinations(parts, 2) if most_mm and clearance_mm else ():
+        wide, thin = sorted(pair, key=lambda each: -each.solid.volume)
+        why = ""
+        for own, other in ((thin, wide), (wide, thin)):
+            tight = _tight(own, other, most_mm)
+            before = made[own.name].fit
+            fit = {**before, **{face: max(mm, before.get(face, 0.0)) for face, mm in tight.items()}}
+            try:
+                solid = with_fit(own.solid, fit)
+                physical_pieces(solid, 1e-3 * clearance_mm)
+            except InputError as error:
+                why = why or f"'{own.name}' has no play in '{other.name}' and is given none: {str(error).rstrip('.')}"
+                continue
+            if tight:
+                made[own.name] = replace(own, solid=solid, fit=fit)
+                notes.append(_said(own.name, other.name, tight))
+            break
+        else:
+            notes.append(why)
+    return tuple(made.values()), tuple(notes)
+
+
+def _said(own: str, other: str, tight: Mapping[str, float]) -> str:
+    deepest = max(tight.values())
+    more = f", in which it is up to {deepest:.3g} mm deep" if deepest > _OVER_MM else ""
+    return (
+        f"'{own}' was drawn without play in '{other}'{more}: {len(tight)} of its faces recede to where they touch, and "
+        f"by the clearance, as stated under [parts.{own}.fit]; take them out there if a press fit is meant"
+    )
+
+
+def _tight(own: PosedPart, other: PosedPart, most_mm: float) -> Mapping[str, float]:
+    """Faces of the first part that need play, and how deep each of them is in the second one, [mm]."""
+    solids = {each.name: each.solid for each in (own, other)}
+    poses = {each.name: each.T for each in (own, other)}
+    found = {
+        Contact(PartFace(own.name, each.a), PartFace(other.name, each.b)): each.gap_m
+        for each in facing(
+            own.solid, own.T, other.solid, other.T, gap_m=1e-3 * most_mm, angle_rad=NEAR_RAD, share=SHARE
+        )
+        if each.gap_m < NEAR_M
+    }
+    held = {contact for pair in walls_without_play(solids, poses, found) for contact in pair}
+    deep = [(c.manipulated.face, -1e3 * gap) for c, gap in found.items() if c in held or gap < -NEAR_M]
+    deep += _shafts(own, other, found, most_mm)
+    # Of a face that touches several the deepest comes last.
+    return {face: round(max(0.0, mm), _DIGITS) for face, mm in sorted(deep)}
+
+
+def _shafts(
+    own: PosedPart, other: PosedPart, found: Mapping[Contact, float], most_mm: float
+) -> Iterator[tuple[str, float]]:
+    """Shafts that are as thick as the hole around them, or thicker, and the holes of such."""
+    for mine, its in found:
+        a, b = own.solid.face(mine.face), other.solid.face(its.face)
+        play_mm = 1e3 * geometric_play(a, b)
+        if contact_kind(a, b) == "shaft in hole" and -most_mm <= play_mm <= NO_PLAY_MM and not (a.fit or b.fit):
+            yield mine.face, -play_mm
