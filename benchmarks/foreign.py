@@ -4,7 +4,7 @@ FOLDER holds the repositories of the list as git has them, each at OWNER+NAME/re
 loaded from elsewhere, and every file must have the hash of the list. Each assembly has a process of its own: its files
 are imported together, so that pieces are fine where parts come near; a scenario is drafted from the poses without a
 hand and checked; `oracle`, `contact`, `snap` and `none` are run at 1 mm and 1 degree. Lines are kept in --out; what is
-there is not done again. The table is printed.
+there is not done again. The table is printed; --page writes what --out has as a page.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from apo_bench.records import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.trial.stages import scene_of
 from apo_bench.trial.trial import run_trial
-from benchmarks.foreign_table import METHODS, came_to, table
+from benchmarks.foreign_table import METHODS, came_to, page, table
 
 HALVES = ("open", "held out")
 
@@ -222,12 +222,17 @@ def main() -> None:
     asked.add_argument("--out", type=Path, default=Path("foreign.jsonl"), help="lines; parts and scenarios lie beside")
     asked.add_argument("--seeds", type=int, default=5)
     asked.add_argument("--limit", type=int, default=900, help="time of the processor of one assembly, s")
+    asked.add_argument("--page", type=Path, help="write the table as this page, of what --out has; nothing is run")
     given = asked.parse_args()
     chosen = [
         each
         for each in read_list(given.list)
         if given.half in (None, each.half) and (not given.only or each.name in given.only)
     ]
+    if given.page:
+        there = [(each.name, each.half, own) for each in chosen if (own := _own(given.out, each.name))]
+        given.page.write_text(page(there), encoding="utf-8")
+        return
     ended = {line["assembly"] for line in _lines(given.out) if line.get("ended", -1) >= given.seeds}
     for each in chosen:
         if each.name in ended:
@@ -244,9 +249,15 @@ def main() -> None:
             if child.exitcode:
                 stopped = f"stopped after {given.limit} s of the processor" if child.exitcode < 0 else "it ended"
                 file.write(json.dumps({"assembly": each.name, "failed": stopped}) + "\n")
-            file.write(json.dumps({"assembly": each.name, "ended": given.seeds}) + "\n")
+            file.write(json.dumps({"assembly": each.name, "ended": given.seeds, "code": _code()}) + "\n")
         print(f"{each.name}: {came_to(_own(given.out, each.name))}", file=sys.stderr, flush=True)
     print(table([(each.name, each.half, _own(given.out, each.name)) for each in chosen]))
+
+
+def _code() -> str:
+    """The commit that is run."""
+    asked = ["git", "-C", str(Path(__file__).parent), "rev-parse", "--short=8", "HEAD"]
+    return subprocess.run(asked, capture_output=True, check=False, text=True).stdout.strip()
 
 
 def _lines(path: Path) -> list[Mapping[str, Any]]:

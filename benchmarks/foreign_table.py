@@ -42,6 +42,23 @@ def _said(own: Own) -> Iterator[str]:
         yield from line.get("wrong", ())
 
 
+_HEAD = """# Assemblies that others drew
+
+Written by `python benchmarks/foreign.py benchmarks/foreign.json FOLDER --page docs/results/foreign.md`. The list was
+fixed before its first file was imported; where each file is from, its licence and its hash stand there, and nothing of
+the files is kept. Parts are imported at their places, a scenario is drafted without a hand and checked, and trials are
+run at 1 mm and 1 degree. What came of it: `scenario`; or `import` (a file makes no part), `draft` (no scenario),
+`check` (one that cannot be done), `grasp`, `turning` (that cannot be held, or needs turning over), `failed` (an error of this
+program). `code` is the commit that was run. An assembly that has no line was not run.
+
+"""
+
+
+def page(tried: Sequence[tuple[str, str, Own]]) -> str:
+    """The table as a page of results."""
+    return _HEAD + table(tried).rstrip() + "\n"
+
+
 def table(tried: Sequence[tuple[str, str, Own]]) -> str:
     """All of it, in Markdown.
 
@@ -63,8 +80,8 @@ def table(tried: Sequence[tuple[str, str, Own]]) -> str:
 
 
 def _rows(those: Sequence[tuple[str, Own]]) -> Iterator[str]:
-    yield f"| assembly | files | flat, round, no contact | contacts | came to | {' | '.join(METHODS)} |"
-    yield "|" + "---|" * (5 + len(METHODS))
+    yield f"| assembly | files | flat, round, no contact | contacts | came to | {' | '.join(METHODS)} | code |"
+    yield "|" + "---|" * (6 + len(METHODS))
     for name, own in those:
         files = [line for line in own if "file" in line]
         well = [line for line in files if "refused" not in line]
@@ -72,7 +89,8 @@ def _rows(those: Sequence[tuple[str, Own]]) -> Iterator[str]:
         contacts = next((line["contacts"] for line in own if "contacts" in line), {})
         kinds = ", ".join(f"{count} {kind}" for kind, count in contacts.items())
         cells = (f"{len(well)} of {len(files)}", faces, kinds, came_to(own), *(_rate(own, m) for m in METHODS))
-        yield f"| {name} | {' | '.join(cells)} |"
+        code = next((str(line.get("code", "")) for line in own if "ended" in line), "")
+        yield f"| {name} | {' | '.join(cells)} | {code} |"
 
 
 def _sums(every: Sequence[Own]) -> Iterator[str]:

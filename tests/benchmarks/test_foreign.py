@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.foreign import HALVES, read_list
-from benchmarks.foreign_table import came_to, table
+from benchmarks.foreign_table import came_to, page, table
 
 LIST = Path(__file__).parents[2] / "benchmarks" / "foreign.json"
 FILE = {"file": "a.stl", "solids": 1, "flat": 6, "round": 2, "no_contact": 0}
@@ -48,7 +48,11 @@ def test_an_assembly_is_counted_by_what_stopped_it() -> None:
     }
     for end, own in ends.items():
         assert came_to(own) == end
-    said = table([(end, "open", own) for end, own in ends.items()])
+    tried = [(end, "open", [*own, {"ended": 1, "code": "c0de"}]) for end, own in ends.items()]
+    said = table(tried)
+    assert said.count("| c0de |") == len(ends)
+    assert page(tried).startswith("# Assemblies that others drew")
+    assert said.rstrip() in page(tried)
     assert "scenarios, of those not refused for a grasp or for turning over: 1 of 5" in said
     assert "files imported: 7 of 8" in said
     assert "| scenario | 1 of 1, 6, 2, 0" not in said

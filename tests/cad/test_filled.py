@@ -11,6 +11,7 @@ from manifold3d import Manifold, OpType
 from apo_bench import InputError
 from apo_bench.cad.importing import import_part, raw_solids
 from apo_bench.cad.pieces import cutting
+from apo_bench.cad.time_limit import limit_of
 from tests.cad.made import block, rod, write_stl
 
 RADII = (1.5, 1.5, 1.5, 2.0, 2.0, 2.5)
@@ -43,6 +44,12 @@ def test_holes_that_nothing_comes_into_are_filled_where_there_are_too_many(
     )
     assert part.solid.volume - whole.solid.volume == pytest.approx(filled, rel=0.01)
     assert {len(face.holes) for face in part.solid.faces.values()} == {0, 6}
+
+
+def test_what_has_more_triangles_may_take_longer_up_to_a_limit() -> None:
+    assert limit_of(0) == 20.0
+    assert limit_of(30_000) == 50.0
+    assert limit_of(1e9) == 120.0
 
 
 def test_more_pieces_than_a_part_may_have_are_refused_where_holes_are_not_the_reason(
