@@ -48,8 +48,8 @@ Written by `python benchmarks/foreign.py benchmarks/foreign.json FOLDER --page d
 fixed before its first file was imported; where each file is from, its licence and its hash stand there, and nothing of
 the files is kept. Parts are imported at their places, a scenario is drafted without a hand and checked, and trials are
 run at 1 mm and 1 degree. What came of it: `scenario`; or `import` (a file makes no part), `draft` (no scenario),
-`check` (one that cannot be done), `grasp`, `turning` (that cannot be held, or needs turning over), `failed` (an error of this
-program). `code` is the commit that was run. An assembly that has no line was not run.
+`check` (one that cannot be done), `grasp`, `turning` (that cannot be held, or needs turning over), `failed` (an error
+of this program). `code` is the commit that was run; an assembly without a line was not run.
 
 """
 
