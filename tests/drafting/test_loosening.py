@@ -11,7 +11,7 @@ from apo_bench import InputError
 from apo_bench.drafting.loosening import loosened
 from apo_bench.drafting.posed import PosedPart
 from apo_bench.drafting.upright import drafted
-from apo_bench.drafting.writing import scenario_text
+from apo_bench.drafting.writing import scenario_text, write_scenario
 from apo_bench.geometry import Solid, intrusion, physical_pieces
 from apo_bench.parts import load_part
 from apo_bench.parts.making import bore, extrude, join, rectangle, shaft, write_part
@@ -43,7 +43,7 @@ def test_a_tongue_as_wide_as_its_slot_or_wider_gets_play_that_the_file_states(tm
     assert "as stated under [parts.tongue.fit]" in note
     path = tmp_path / "own.toml"
     found = drafted(parts)
-    path.write_text(scenario_text(found, "own", "a test", tmp_path), encoding="utf-8")
+    write_scenario(found, path, "own", "a test")
     assert note in found.notes
     assert f"# NOTE: {note}." in path.read_text(encoding="utf-8")
     read = load_scenario(path).assembly.solids["tongue"]
@@ -91,7 +91,7 @@ def test_nothing_is_left_of_what_is_too_thin(tmp_path: Path) -> None:
 def test_a_scenario_that_states_fit_faces_wrongly_is_refused(tmp_path: Path, fit: str, said: str) -> None:
     parts = slotted(tmp_path, 20.0)
     path = tmp_path / "own.toml"
-    text = scenario_text(drafted(parts), "own", "a test", tmp_path)
+    text = scenario_text(drafted(parts), "own", "a test", path)
     head, tail = text.split("\n[parts.tongue.fit]")
     path.write_text(head + "\n[parts.tongue.fit]\n" + fit + "\n\n" + tail.split("\n\n", 1)[1], encoding="utf-8")
     with pytest.raises(InputError, match=said):
