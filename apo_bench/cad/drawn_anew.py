@@ -23,6 +23,11 @@ than this part of the size."""
 _ALL = 0.998
 _MORE = 0.005
 """A mesh is drawn anew if that makes so much more of its surface faces."""
+_SMALL = 1500
+_FEW = 0.5
+_INSIDE = 0.02
+"""A mesh of so many triangles, and with faces on so much of its surface, has so many corners inside of them if it was
+remeshed; drawing anew takes long, and does not help otherwise."""
 _VOLUME = 0.02
 """... and changes its volume by no more than this part."""
 
@@ -52,7 +57,7 @@ def faces_of(mesh: Mesh) -> Faces:
         if _share(fewer) > share + _MORE:
             share = _share(fewer)
             best = fewer
-    for near in _NEAR_MM:
+    for near in _NEAR_MM if _may_be_rough(as_is, share) else ():
         if share > _ALL or near > _NEAREST * mesh.extent:
             break
         rough = rough_of(mesh, near)
@@ -68,6 +73,22 @@ def faces_of(mesh: Mesh) -> Faces:
             share = _share(anew)
             best = anew
     return best
+
+
+def _may_be_rough(faces: Faces, share: float) -> bool:
+    """Whether drawing a mesh anew may help: it is small, hardly any face is found, or faces have corners inside.
+
+    What CAD tessellates has its corners on the borders of faces; what is no face there is a free shape.
+    """
+    mesh = faces.mesh
+    if len(mesh.triangles) < _SMALL or share < _FEW:
+        return True
+    inner = 0
+    for region in faces.regions:
+        if region.kind == "plane" or region.is_round:
+            corners = np.unique(mesh.triangles[region.triangles])
+            inner += len(np.setdiff1d(corners, border_of(mesh, region.triangles)))
+    return inner > _INSIDE * len(mesh.corners)
 
 
 def _is_sound(new: Mesh, old: Mesh) -> bool:

@@ -7,10 +7,14 @@ from typing import Any
 
 import numpy as np
 import pytest
+from manifold3d import Manifold
 
+from apo_bench.cad import drawn_anew
+from apo_bench.cad.drawn_anew import faces_of
 from apo_bench.cad.importing import Imported, import_part, raw_solids
+from apo_bench.cad.solids.bodies import mesh_of
 from tests.cad.held import hold
-from tests.cad.made import MADE, write_triangles
+from tests.cad.made import MADE, block, write_triangles
 
 
 def imported(triangles: Any, folder: Path) -> Imported:
@@ -54,3 +58,14 @@ def test_corners_anywhere_on_a_wall_are_of_one_wall(tmp_path: Path) -> None:
 
 def test_what_is_fine_as_it_is_stays_as_it_is(tmp_path: Path) -> None:
     assert imported(triangles_of(MADE["bracket"]().mesh), tmp_path).raw.mended == ()
+
+
+def test_a_free_shape_among_faces_without_corners_inside_is_not_drawn_anew(monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh = mesh_of(block(40, 40, 12) - Manifold.sphere(20, 160).translate((0, 0, 26)))
+    assert len(mesh.triangles) > 1500
+
+    def never(*_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr(drawn_anew, "rough_of", never)
+    assert faces_of(mesh).mesh is mesh
