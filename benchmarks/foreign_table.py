@@ -38,7 +38,7 @@ def _wrong(own: Own) -> Iterator[str]:
 def _said(own: Own) -> Iterator[str]:
     """Every sentence that stands between an assembly and its rates."""
     for line in own:
-        yield from (str(line[key]) for key in ("failed", "refused", "draft") if line.get(key))
+        yield from (str(line[key]).splitlines()[0] for key in ("failed", "refused", "draft") if line.get(key))
         yield from line.get("wrong", ())
 
 
