@@ -9,7 +9,7 @@ import numpy as np
 from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, Solid, intrusion_depths, pose
 from apo_bench.prediction.arm import ArmMove
-from apo_bench.simulation.arm_checks.tip_error import motion_error
+from apo_bench.simulation.arm_checks.tip_error import SPEEDS, motion_error
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.execution.fingers import OPEN_TO_PICK_M, OPEN_TO_RELEASE_M
 from apo_bench.simulation.execution.prepare import Move, key_angles, moves
@@ -56,7 +56,7 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], bel
         return ArmMove(step.operation, step.undo, cast(_Refused, code), _at_limit(scene, ended))
     if scene.arm.hand is None:
         return ArmMove(step.operation, step.undo)
-    tip = scene.kinematics.forward(path[-1])[:3, 3]
+    T_tip = scene.kinematics.forward(path[-1])
     depth, struck = struck_by(scene, t, believed, after)
     low, high = scene.kinematics.range_of_joints
     return ArmMove(
@@ -65,7 +65,7 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], bel
         struck=struck,
         struck_mm=1e3 * depth,
         sag=_sag(scene, path[-1], _centroid(held), t.weight_n),
-        beside_mm=_beside_mm(scene, tip, held),
+        beside_mm=_beside_mm(scene, T_tip, held, SPEEDS[not _comes_slowly(t)]),
         margin_deg=float(np.degrees(np.min([np.minimum(q - low, high - q) for q in path]))),
     )
 
@@ -130,11 +130,18 @@ def _jacobian(kinematics: Kinematics) -> Array:
     return J[:, model.jnt_dofadr[kinematics.ids]]
 
 
-def _beside_mm(scene: Scene, tip: Array, parts: Iterable[tuple[Solid, Array]]) -> float:
-    """How far what is held goes beside its line at the speed of an insertion: the tip, and its turn at their ends."""
-    error = motion_error(scene)
+def _comes_slowly(t: Transfer) -> bool:
+    """Whether a part comes from above into all that it goes into as slowly as where it touches."""
+    return not t.into.level and t.slow > max(t.mouths, default=0.0)
+
+
+def _beside_mm(scene: Scene, T_tip: Array, parts: Iterable[tuple[Solid, Array]], speed: float) -> float:
+    """How far what is held goes beside its line at a speed [m/s]: the tip, and its turn at their ends, that about the
+    way ahead of the tip by how far aside of it they reach."""
+    error = motion_error(scene, speed)
     if error is None:
         return 0.0
-    corners = [pose.apply(T, solid.bounds) for solid, T in parts]
-    lever = max(float(np.linalg.norm(each - tip, axis=1).max()) for each in corners)
-    return error.across_mm + 1e3 * np.radians(error.turn_deg) * lever
+    ends = np.concatenate([pose.apply(pose.inverse(T_tip) @ T, solid.bounds) for solid, T in parts])
+    far, aside = (float(np.linalg.norm(each, axis=1).max()) for each in (ends, ends[:, :2]))
+    tilt, turn = np.radians((error.tilt_deg, error.turn_deg))
+    return error.across_mm + 1e3 * float(min(turn * far, tilt * far + turn * aside))

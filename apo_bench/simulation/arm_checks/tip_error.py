@@ -36,10 +36,12 @@ class TipError:
     """At most, beside the line."""
     along_mm: float
     turn_deg: float
+    tilt_deg: float
+    """How much of the turn the way ahead of the tip turns by; the rest is about that."""
 
 
 @remembered
-def motion_error(scene: Scene) -> TipError | None:
+def motion_error(scene: Scene, speed: float = SPEEDS[1]) -> TipError | None:
     """The error of the tip of an empty hand in free air at the speed of an insertion; None where it has no way there.
 
     It is found by trying, once for a scene.
@@ -47,8 +49,9 @@ def motion_error(scene: Scene) -> TipError | None:
     robot = Robot(scene, scene.scenario.start)
     try:
         rise(robot, SPEEDS[-1])
-        line = steady(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), WAY_M), SPEEDS[1])
-        return error_on(line, robot.trace(line), SPEEDS[1])
+        way = WAY_M if speed > SPEEDS[0] else WAY_M / 10
+        line = steady(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), way), speed)
+        return error_on(line, robot.trace(line), speed)
     except Halt:
         return None
 
@@ -81,4 +84,6 @@ def error_on(line: Trajectory, tips: Array, speed: float) -> TipError:
     # The trace of R_commanded^T R is 1 + 2 cos(angle between them).
     turned = np.einsum("nij,nij->n", tips[:, :3, :3], commanded[:, :3, :3])
     angle = np.degrees(np.arccos(np.clip((turned - 1.0) / 2.0, -1.0, 1.0)))
-    return TipError(speed, 1e3 * float(beside.max()), 1e3 * float(np.abs(along).max()), float(angle.max()))
+    ahead = np.linalg.norm(np.cross(tips[:, :3, 2], commanded[:, :3, 2]), axis=1)
+    tilt = float(np.degrees(np.arcsin(min(ahead.max(), 1.0))))
+    return TipError(speed, 1e3 * float(beside.max()), 1e3 * float(np.abs(along).max()), float(angle.max()), tilt)

@@ -19,6 +19,7 @@ from apo_bench.simulation.arms.description import ArmDescription, GripperDescrip
 from apo_bench.simulation.arms.home import with_home
 from apo_bench.simulation.arms.loading import check_surroundings, compiled, files_of, load_model
 from apo_bench.simulation.arms.measuring import Measured, measure
+from apo_bench.simulation.arms.pads import fill_grooves
 from apo_bench.simulation.arms.pressing import PROBE
 from apo_bench.simulation.arms.servo import Drive, add_servos, drives_of, felt_inertia, is_soft
 from apo_bench.simulation.arms.stated import stated_arm
@@ -82,6 +83,8 @@ def build_arm(description: ArmDescription) -> Arm:
         return stated_arm(description, description.gripper.slides, model, joints, last)
     _mount_gripper(spec, last, T_flange, description)
     _make_passive(spec, joints)
+    if description.gripper.pads is None:
+        fill_grooves(spec, joints)
     whole = compiled(spec, mjcf)
     drives = drives_of(whole, joints)
     home = _usual_home(model, joints) if description.home is None else description.home

@@ -12,7 +12,7 @@ PROBE = "probe"
 PROBE_WIDE = 0.5
 """How wide it is, as a part of the opening."""
 _AWAY_M = 1.0
-_SQUEEZES_M = (0.03, 0.015, 0.008, 0.004)
+_SQUEEZES_M = (0.03, 0.015, 0.008, 0.004, 0.002, 0.001)
 _MOST_N = 60.0
 """How far inside a part fingers are sent at most: less where they press harder than this."""
 _PROBE_HIGH_M = 0.006

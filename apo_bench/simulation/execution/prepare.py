@@ -44,6 +44,9 @@ _INSERT_WEIGHTS = 2.5
 _SLIDE_WEIGHTS = 0.5
 """Guards in weights: of what is put down; of the lightest part that an insertion could push along; of the lightest
 part at the side, which a friction of 0.8 holds against 0.8 of its weight."""
+_FIRM_N = 80.0
+"""Friction of both pads. Through walls that are not the last, the bore of an upper plate, a firm hand carries on at
+speed; its rim strikes the part with some 30 N, which moves it in a weaker hand, and the plate."""
 _FINGER_M = 0.01
 """How far fingers reach below their tip."""
 
@@ -146,6 +149,7 @@ def _transfer(
     mass = scene.work.model.body_subtreemass
     weight = {p: _GRAVITY * float(mass[scene.work.body[p]]) for p in scene.work.free}
     held = sum(weight[p] for p in operation.moves)
+    ways = mouths(assembly, comes, after, into.way)
     near = [weight[p] for p in neighbours(contacts, operation.moves) if p in weight]
     return Transfer(
         part=part,
@@ -160,8 +164,8 @@ def _transfer(
         macros=macros,
         over=top + OVER_M + _FINGER_M,
         safe=max(SAFE_M, top + OVER_M + hangs),
-        slow=slow_before(assembly, comes, after, into.way),
-        mouths=mouths(assembly, comes, after, into.way),
+        slow=max(slow_before(assembly, comes, after, into.way), _first_mouth(scene, ways) + WALL_MARGIN_M),
+        mouths=ways,
         weight_n=held,
         place_n=_PLACE_WEIGHTS * held,
         insert_n=_INSERT_WEIGHTS * min(near, default=held),
@@ -169,6 +173,13 @@ def _transfer(
         clearance=1e-3 * scene.clearance_mm,
         front=_front(scene, part, operation.moves, after, into.way) if searches and inserts else None,
     )
+
+
+def _first_mouth(scene: Scene, mouths: tuple[float, ...]) -> float:
+    """From where a hand that holds weakly comes slowly, [m] before the goal; zero for a firm one, and with no mouth."""
+    hand = scene.arm.hand
+    weak = hand is not None and 2.0 * hand.friction * hand.force_n < _FIRM_N
+    return max(mouths, default=0.0) if weak else 0.0
 
 
 def _with_acts(

@@ -30,7 +30,8 @@ from apo_bench.simulation.scene.world import has_failed, initial_state, part_pos
 
 _REST_RAD_S = 2e-3
 _REST_M_S = 3e-3
-"""Joints and fingers that move slower than this rest."""
+_STUCK_M = 0.002
+"""Joints and fingers that move slower than the first two rest; fingers that open not while so far from their end."""
 
 
 class Halt(Exception):
@@ -206,7 +207,8 @@ class Robot:
             fingers.command(self.data, start + (to - start) * min(1.0, i / ticks))
             self.wait(TICK_S)
             with_all_force = abs(fingers.commanded(self.data) - self.opening()) >= fingers.slack
-            if self._rests() and (i >= ticks or with_all_force):
+            sticks = max(opening, self.opening()) < to - _STUCK_M
+            if self._rests() and (i >= ticks or with_all_force) and not sticks:
                 break
         fingers.command(self.data, to)
 
