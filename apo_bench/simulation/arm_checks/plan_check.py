@@ -65,7 +65,7 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], bel
         struck=struck,
         struck_mm=1e3 * depth,
         sag=_sag(scene, path[-1], _centroid(held), t.weight_n),
-        beside_mm=_beside_mm(scene, T_tip, held, SPEEDS[not _comes_slowly(t)]),
+        beside_mm=_beside_mm(scene, T_tip, held, _speed_into(t)),
         margin_deg=float(np.degrees(np.min([np.minimum(q - low, high - q) for q in path]))),
     )
 
@@ -130,9 +130,12 @@ def _jacobian(kinematics: Kinematics) -> Array:
     return J[:, model.jnt_dofadr[kinematics.ids]]
 
 
-def _comes_slowly(t: Transfer) -> bool:
-    """Whether a part comes from above into all that it goes into as slowly as where it touches."""
-    return not t.into.level and t.slow > max(t.mouths, default=0.0)
+def _speed_into(t: Transfer) -> float:
+    """How fast a part comes into the first that it goes into, [m/s]: carried, on its way down, or where it is slow."""
+    first = max(t.mouths, default=0.0)
+    if t.into.level or t.slow <= first <= t.begins:
+        return SPEEDS[1]
+    return SPEEDS[0 if first < t.slow else -1]
 
 
 def _beside_mm(scene: Scene, T_tip: Array, parts: Iterable[tuple[Solid, Array]], speed: float) -> float:

@@ -42,7 +42,7 @@ class TipError:
 
 @remembered
 def motion_error(scene: Scene, speed: float = SPEEDS[1]) -> TipError | None:
-    """The error of the tip of an empty hand in free air at the speed of an insertion; None where it has no way there.
+    """The error of the tip of an empty hand in free air at a speed [m/s]; None where it has no way there.
 
     It is found by trying, once for a scene.
     """
@@ -50,7 +50,8 @@ def motion_error(scene: Scene, speed: float = SPEEDS[1]) -> TipError | None:
     try:
         rise(robot, SPEEDS[-1])
         way = WAY_M if speed > SPEEDS[0] else WAY_M / 10
-        line = steady(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), way), speed)
+        end = shifted(robot.T, np.array([0.0, 1.0, 0.0]), way)
+        line = smooth(robot.T, end, speed) if speed == SPEEDS[-1] else steady(robot.T, end, speed)
         return error_on(line, robot.trace(line), speed)
     except Halt:
         return None
