@@ -12,8 +12,8 @@ from apo_bench.prediction.arm import ArmMove
 from apo_bench.simulation.arm_checks.tip_error import SPEEDS, motion_error
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.execution.fingers import OPEN_TO_PICK_M, OPEN_TO_RELEASE_M
-from apo_bench.simulation.execution.prepare import Move, key_angles, moves
-from apo_bench.simulation.execution.transfer import Grip, Transfer, after_transfer
+from apo_bench.simulation.execution.prepare import Move, holds_firmly, key_angles, moves
+from apo_bench.simulation.execution.transfer import Grip, after_transfer
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.scene.scene import Scene
 
@@ -65,7 +65,7 @@ def _arm_move(scene: Scene, move: Move, held: Sequence[tuple[Solid, Array]], bel
         struck=struck,
         struck_mm=1e3 * depth,
         sag=_sag(scene, path[-1], _centroid(held), t.weight_n),
-        beside_mm=_beside_mm(scene, T_tip, held, _speed_into(t)),
+        beside_mm=_beside_mm(scene, T_tip, held, not (t.into.level or holds_firmly(scene.arm))),
         margin_deg=float(np.degrees(np.min([np.minimum(q - low, high - q) for q in path]))),
     )
 
@@ -130,21 +130,19 @@ def _jacobian(kinematics: Kinematics) -> Array:
     return J[:, model.jnt_dofadr[kinematics.ids]]
 
 
-def _speed_into(t: Transfer) -> float:
-    """How fast a part comes into the first that it goes into, [m/s]: carried, on its way down, or where it is slow."""
-    first = max(t.mouths, default=0.0)
-    if t.into.level or t.slow <= first <= t.begins:
-        return SPEEDS[1]
-    return SPEEDS[0 if first < t.slow else -1]
+def _beside_mm(scene: Scene, T_tip: Array, parts: Iterable[tuple[Solid, Array]], slowly: bool) -> float:
+    """How far what is held goes beside its line where it enters: the tip, and its turn at their ends.
 
-
-def _beside_mm(scene: Scene, T_tip: Array, parts: Iterable[tuple[Solid, Array]], speed: float) -> float:
-    """How far what is held goes beside its line at a speed [m/s]: the tip, and its turn at their ends, that about the
-    way ahead of the tip by how far aside of it they reach."""
-    error = motion_error(scene, speed)
+    Args:
+        slowly: Whether it comes as slowly as where it touches; then the turn about the way ahead of the tip counts by
+            how far aside of that the parts reach, which is nearly nothing for a peg.
+    """
+    error = motion_error(scene, SPEEDS[0 if slowly else 1])
     if error is None:
         return 0.0
-    ends = np.concatenate([pose.apply(pose.inverse(T_tip) @ T, solid.bounds) for solid, T in parts])
-    far, aside = (float(np.linalg.norm(each, axis=1).max()) for each in (ends, ends[:, :2]))
+    corners = [pose.apply(T, solid.bounds) - T_tip[:3, 3] for solid, T in parts]
+    far, aside = (
+        max(float(np.linalg.norm(each @ axes, axis=1).max()) for each in corners) for axes in (np.eye(3), T_tip[:3, :2])
+    )
     tilt, turn = np.radians((error.tilt_deg, error.turn_deg))
-    return error.across_mm + 1e3 * float(min(turn * far, tilt * far + turn * aside))
+    return error.across_mm + 1e3 * float(min(turn * far, tilt * far + turn * aside) if slowly else turn * far)

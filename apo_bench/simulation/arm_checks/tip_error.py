@@ -50,8 +50,7 @@ def motion_error(scene: Scene, speed: float = SPEEDS[1]) -> TipError | None:
     try:
         rise(robot, SPEEDS[-1])
         way = WAY_M if speed > SPEEDS[0] else WAY_M / 10
-        end = shifted(robot.T, np.array([0.0, 1.0, 0.0]), way)
-        line = smooth(robot.T, end, speed) if speed == SPEEDS[-1] else steady(robot.T, end, speed)
+        line = steady(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), way), speed)
         return error_on(line, robot.trace(line), speed)
     except Halt:
         return None

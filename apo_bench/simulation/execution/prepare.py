@@ -19,6 +19,7 @@ from apo_bench.insertion.surroundings import (
     slow_before,
 )
 from apo_bench.scenario.layout import nominal_operations
+from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.execution.beside import beside_places
 from apo_bench.simulation.execution.flush import flush_pose
 from apo_bench.simulation.execution.grips import centring_grips, squaring_grips, transfer_grips
@@ -150,6 +151,7 @@ def _transfer(
     weight = {p: _GRAVITY * float(mass[scene.work.body[p]]) for p in scene.work.free}
     held = sum(weight[p] for p in operation.moves)
     ways = mouths(assembly, comes, after, into.way)
+    first = 0.0 if holds_firmly(scene.arm) else max(ways, default=0.0)
     near = [weight[p] for p in neighbours(contacts, operation.moves) if p in weight]
     return Transfer(
         part=part,
@@ -164,7 +166,7 @@ def _transfer(
         macros=macros,
         over=top + OVER_M + _FINGER_M,
         safe=max(SAFE_M, top + OVER_M + hangs),
-        slow=max(slow_before(assembly, comes, after, into.way), _first_mouth(scene, ways) + WALL_MARGIN_M),
+        slow=max(slow_before(assembly, comes, after, into.way), first + WALL_MARGIN_M),
         mouths=ways,
         weight_n=held,
         place_n=_PLACE_WEIGHTS * held,
@@ -175,11 +177,9 @@ def _transfer(
     )
 
 
-def _first_mouth(scene: Scene, mouths: tuple[float, ...]) -> float:
-    """From where a hand that holds weakly comes slowly, [m] before the goal; zero for a firm one, and with no mouth."""
-    hand = scene.arm.hand
-    weak = hand is not None and 2.0 * hand.friction * hand.force_n < _FIRM_N
-    return max(mouths, default=0.0) if weak else 0.0
+def holds_firmly(arm: Arm) -> bool:
+    """Whether a hand may carry a part past the first of several mouths at speed; the usual arm's may."""
+    return arm.hand is None or 2.0 * arm.hand.friction * arm.hand.force_n >= _FIRM_N
 
 
 def _with_acts(
