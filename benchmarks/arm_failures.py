@@ -2,7 +2,7 @@
 
 Two arms that come with the benchmark are made worse: parts with less play, a base out of reach, weak servos, fingers
 that give way. Each tries scenarios as an oracle; a failure is caught where the trial's prediction or `arm check` said
-so before. Rewrites its section of docs/results/public-arms.md.
+so before. Rewrites its section of docs/results/public-arms.md, which benchmarks/public_arms.py leaves out: run it last.
 """
 
 from __future__ import annotations
@@ -152,7 +152,7 @@ def section(found: list[Trial], trials: int) -> str:
     return "\n".join(
         [
             SAID,
-            f"{trials} trials of each arm and scenario. Failures warned of: {share(failed)}; right trials taken for "
+            f"Trials of each arm and scenario: {trials}. Failures warned of: {share(failed)}; right trials taken for "
             f"failures: {share(right)}.",
             "",
             "| made worse | trials | failed | of these warned of | right, and warned of |",

@@ -13,7 +13,7 @@ from apo_bench.simulation.arm_checks.tip_error import SPEEDS, motion_error
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.execution.fingers import OPEN_TO_PICK_M, OPEN_TO_RELEASE_M
 from apo_bench.simulation.execution.prepare import Move, holds_firmly, key_angles, moves
-from apo_bench.simulation.execution.transfer import Grip, after_transfer
+from apo_bench.simulation.execution.transfer import Grip, Transfer, after_transfer
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.scene.scene import Scene
 

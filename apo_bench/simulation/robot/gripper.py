@@ -17,6 +17,8 @@ from apo_bench.simulation.arms.rig import below
 
 _UPRIGHT_M = 0.001
 """Room above and below: supports are where they are known to be."""
+STUCK_M = 0.002
+"""Fingers that open do not rest while they are so far from where they shall be: they stick to a part, or start late."""
 _LONGEST_S = 0.2
 """How long fingers of a stiff drive may take to rest behind their command."""
 

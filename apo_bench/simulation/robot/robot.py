@@ -18,7 +18,7 @@ from apo_bench.assembly import Poses, Step
 from apo_bench.geometry import Array, pose
 from apo_bench.simulation.hooks import TICK_S, Doing, Hooks, hooks_of
 from apo_bench.simulation.robot.forces import WRIST_S, ForceSensors, Guard
-from apo_bench.simulation.robot.gripper import fingers_of
+from apo_bench.simulation.robot.gripper import STUCK_M, fingers_of
 from apo_bench.simulation.robot.in_hand import Carried, HoldWatch, fast_forward, steadied, take_along, weld
 from apo_bench.simulation.robot.obstacles import clear, moving_with_tip, near_spans
 from apo_bench.simulation.robot.paths import Trajectory, smooth, waypoints_unwound
@@ -30,8 +30,7 @@ from apo_bench.simulation.scene.world import has_failed, initial_state, part_pos
 
 _REST_RAD_S = 2e-3
 _REST_M_S = 3e-3
-_STUCK_M = 0.002
-"""Joints and fingers that move slower than the first two rest; fingers that open not while so far from their end."""
+"""Joints and fingers that move slower than this rest."""
 
 
 class Halt(Exception):
@@ -206,9 +205,8 @@ class Robot:
         for i in range(1, ticks + round(fingers.longest_s / TICK_S)):
             fingers.command(self.data, start + (to - start) * min(1.0, i / ticks))
             self.wait(TICK_S)
-            with_all_force = abs(fingers.commanded(self.data) - self.opening()) >= fingers.slack
-            sticks = max(opening, self.opening()) < to - _STUCK_M
-            if self._rests() and (i >= ticks or with_all_force) and not sticks:
+            there = i >= ticks or abs(fingers.commanded(self.data) - self.opening()) >= fingers.slack
+            if there and self._rests() and max(opening, self.opening()) >= to - STUCK_M:
                 break
         fingers.command(self.data, to)
 
