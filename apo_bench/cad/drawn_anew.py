@@ -1,5 +1,6 @@
 """When a mesh is drawn anew: where its faces have corners inside of them, or are hidden by noise, [mm]."""
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -7,12 +8,14 @@ import numpy as np
 from apo_bench.cad.faces.facets import facets_of
 from apo_bench.cad.faces.fitting import border_of
 from apo_bench.cad.faces.parallel import regular
+from apo_bench.cad.faces.polygons import seen_from_corners, with_rings
 from apo_bench.cad.faces.redrawing import redrawn
 from apo_bench.cad.faces.regions import regions_of
 from apo_bench.cad.faces.rough import patches_of, rough_of
 from apo_bench.cad.meshes.crossings import crossings
 from apo_bench.cad.solids.bodies import body_of, mesh_of
 from apo_bench.cad.solids.raw_solid import Mesh, Region
+from apo_bench.geometry import WHOLE_TURN
 
 _EXACT = 1e-6
 """Corners this near to a flat piece, in parts of the size, are left out of it."""
@@ -41,9 +44,13 @@ class Faces(NamedTuple):
     said: tuple[str, ...] = ()
 
 
-def faces_of(mesh: Mesh) -> Faces:
-    """The faces of a closed mesh as it is, or of one drawn anew if more of the surface is faces then."""
-    as_is = Faces(mesh, *regions_of(mesh))
+def faces_of(mesh: Mesh, fewest: int) -> Faces:
+    """The faces of a closed mesh as it is, or of one drawn anew if more of the surface is faces then.
+
+    Args:
+        fewest: Of the sides that a round face has in a whole turn.
+    """
+    as_is = Faces(mesh, *regions_of(mesh, fewest))
     share = _share(as_is)
     if share > _ALL:
         return as_is
@@ -52,7 +59,9 @@ def faces_of(mesh: Mesh) -> Faces:
     plain = mesh_of(body.simplify(_EXACT * mesh.extent)) if body.num_tri() == len(mesh.triangles) else mesh
     if _is_sound(plain, mesh) and len(plain.triangles) < 0.9 * len(mesh.triangles):
         fewer = Faces(
-            plain, *regions_of(plain), (f"{len(mesh.triangles) - len(plain.triangles):,} triangles were merged",)
+            plain,
+            *regions_of(plain, fewest),
+            (f"{len(mesh.triangles) - len(plain.triangles):,} triangles were merged",),
         )
         if _share(fewer) > share + _MORE:
             share = _share(fewer)
@@ -60,9 +69,9 @@ def faces_of(mesh: Mesh) -> Faces:
     for near in _NEAR_MM if _may_be_rough(as_is, share) else ():
         if share > _ALL or near > _NEAREST * mesh.extent:
             break
-        rough = rough_of(mesh, near)
-        drawn = redrawn(rough, regular(rough, patches_of(rough)))
-        if drawn is None or not _is_sound(drawn.mesh, mesh):
+        rough = rough_of(mesh, near, fewest)
+        drawn = redrawn(rough, seen_from_corners(rough, regular(rough, with_rings(rough, patches_of(rough), fewest))))
+        if drawn is None or not _is_sound(drawn.mesh, mesh, drawn.regions):
             continue
         said = (
             f"it was drawn anew, as corners are up to {near:g} mm off its faces: {len(mesh.triangles):,} triangles "
@@ -91,9 +100,21 @@ def _may_be_rough(faces: Faces, share: float) -> bool:
     return inner > _INSIDE * len(mesh.corners)
 
 
-def _is_sound(new: Mesh, old: Mesh) -> bool:
-    """Whether a mesh is closed, does not cross itself, and stands for the same solid."""
-    return new.is_closed and abs(new.volume - old.volume) < _VOLUME * old.volume and next(crossings(new), None) is None
+def _is_sound(new: Mesh, old: Mesh, walls: Sequence[Region] = ()) -> bool:
+    """Whether a mesh is closed, does not cross itself, and stands for the same solid.
+
+    Args:
+        walls: Those that had sides, and have none any more.
+    """
+    off = new.volume - old.volume - sum(_behind_sides(wall) for wall in walls if wall.sides)
+    return new.is_closed and abs(off) < _VOLUME * old.volume and next(crossings(new), None) is None
+
+
+def _behind_sides(wall: Region) -> float:
+    """Between a round face and its sides, [mm^3]; negative for a hole."""
+    angle = WHOLE_TURN / wall.sides
+    segments = wall.turn / angle * (angle - np.sin(angle)) / 2.0 * (wall.radii[0] * wall.radii[1])
+    return float((-1.0 if wall.hole else 1.0) * (wall.span[1] - wall.span[0]) * segments)
 
 
 def _share(faces: Faces) -> float:

@@ -81,8 +81,9 @@ def _region_words(region: Region) -> str:
         offset = region.direction @ region.point
         return f"flat, looks along ({_numbers(region.direction)}), {offset:.6g} mm from the origin"
     wide = " to ".join(f"{r:.5g}" for r in dict.fromkeys(round(float(r), 6) for r in region.radii))
+    sides = f" of {region.sides} sides" if region.sides else ""
     return (
-        f"{'hole' if region.hole else 'shaft'}, {region.kind}, radius {wide} mm, axis from "
+        f"{'hole' if region.hole else 'shaft'}, {region.kind}{sides}, radius {wide} mm, axis from "
         f"({_numbers(region.ends[0])}) to ({_numbers(region.ends[1])}) mm, residual {1e3 * region.residual:.2g} um"
     )
 
@@ -140,6 +141,7 @@ def _face_form(region: Region) -> dict[str, Any]:
         "axis": region.direction.tolist(),
         "ends_mm": region.ends.tolist(),
         "radii_mm": [float(r) for r in region.radii],
+        "sides": region.sides or None,
     }
 
 

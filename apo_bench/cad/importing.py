@@ -10,6 +10,7 @@ from typing import final
 import numpy as np
 
 from apo_bench.cad.drawn_anew import faces_of
+from apo_bench.cad.faces.facets import FEWEST_SIDES
 from apo_bench.cad.from_regions import contact_faces, solid_moments
 from apo_bench.cad.meshes.mesh_file import CadFile, read_meshes
 from apo_bench.cad.meshes.shells import CROSSED_A_LITTLE, check_uncrossed, closed_solids
@@ -54,8 +55,11 @@ class Imported:
     """Free radius of each hole that is stated, as the pieces leave it."""
 
 
-def raw_solids(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
+def raw_solids(path: Path, unit: str | None, fewest_sides: int = FEWEST_SIDES) -> tuple[CadFile, list[RawSolid]]:
     """The solids of a file, with named faces: as STEP states them, or fitted to triangles.
+
+    Args:
+        fewest_sides: Of a whole turn of a round face in a mesh; what has fewer is so many flat faces.
 
     Raises:
         InputError: The file cannot be read, or holds no closed solid.
@@ -66,11 +70,11 @@ def raw_solids(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
             return read_step(path, unit)
         file, meshes = read_meshes(path, unit)
         solids = without_copies(raw for name, mesh in meshes for raw in closed_solids(path, name, mesh))
-        return file, [_with_faces(path, raw) for raw in solids]
+        return file, [_with_faces(path, raw, fewest_sides) for raw in solids]
 
 
-def _with_faces(path: Path, raw: RawSolid) -> RawSolid:
-    faces = faces_of(raw.mesh)
+def _with_faces(path: Path, raw: RawSolid, fewest_sides: int) -> RawSolid:
+    faces = faces_of(raw.mesh, fewest_sides)
     if CROSSED_A_LITTLE in raw.mended and faces.mesh is raw.mesh:
         check_uncrossed(path, raw.mesh)
     regions = with_names(faces.mesh, faces.regions)

@@ -5,10 +5,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.cad.solids.raw_solid import Mesh, connected
-from apo_bench.geometry import Array
+from apo_bench.geometry import WHOLE_TURN, Array
 
+FEWEST_SIDES = 12
+"""Flat pieces are taken for a round face if a whole turn of it has so many, or more."""
 SMOOTH_RAD = np.radians(35.0)
-"""Flat pieces of one round face meet at less: it has 11 of them in a turn, or more."""
+"""Flat pieces that meet at less may be of one free surface."""
 _SAME_RAD = 1e-3
 _NEAR_RAD = 0.02
 FLAT = 1e-6
@@ -34,10 +36,22 @@ class Facets(NamedTuple):
     """The corners of these edges, (s, 2)."""
     angle: Array
     """At them, (s,), [rad]; negative where the surface is hollow."""
+    widest: float
+    """Flat pieces of one round face meet at less, [rad]."""
 
 
-def facets_of(mesh: Mesh) -> Facets:
-    """Cut a closed mesh into flat pieces."""
+def widest_of(fewest: int) -> float:
+    """Flat pieces of a round face of so many sides meet at less, by half a side more or less, [rad]."""
+    return WHOLE_TURN / (fewest - 0.5)
+
+
+def facets_of(mesh: Mesh, fewest: int = FEWEST_SIDES) -> Facets:
+    """Cut a closed mesh into flat pieces.
+
+    Args:
+        fewest: Of the sides of a round face in a whole turn.
+    """
+    widest = max(SMOOTH_RAD, widest_of(fewest))
     normals = _normals(mesh)
     i, k = mesh.neighbours.T
     # Small angles from |n_i x n_k|, as rounding makes arccos (n_i . n_k) coarse near 1.
@@ -56,7 +70,7 @@ def facets_of(mesh: Mesh) -> Facets:
     np.add.at(centers, of, weight[:, None] * mesh.corners[mesh.triangles].mean(axis=1))
     total = np.maximum(np.bincount(of, weight, count), 1e-300)
     pairs = np.unique(np.column_stack([np.repeat(of, 3), mesh.triangles.ravel()]), axis=0)
-    bent = (of[i] != of[k]) & (angle < SMOOTH_RAD)
+    bent = (of[i] != of[k]) & (angle < widest)
     # At an edge that its left triangle i goes along, n_i x n_k points forwards where the surface bulges out.
     along = mesh.corners[mesh.edges[:, 1]] - mesh.corners[mesh.edges[:, 0]]
     sign = np.sign((np.cross(normals[i], normals[k]) * along).sum(axis=1))
@@ -70,6 +84,7 @@ def facets_of(mesh: Mesh) -> Facets:
         np.column_stack([of[i], of[k]])[bent],
         mesh.edges[bent],
         (sign * angle)[bent],
+        widest,
     )
 
 

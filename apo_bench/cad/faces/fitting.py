@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.cad.faces.facets import FLAT, SMOOTH_RAD, Facets
+from apo_bench.cad.faces.facets import FLAT, Facets
 from apo_bench.cad.solids.raw_solid import Mesh, Region, square_to
 from apo_bench.geometry import WHOLE_TURN, Array
 
@@ -132,9 +132,9 @@ def on_it(mesh: Mesh, facets: Facets, among: Any, wall: Round, tolerance: float)
     # Corners lie on the wall, or inside of it by up to the sagitta r (1 - cos(span / 2)) of a chord.
     wide = wall.radius + wall.slope * height
     off = (distance - wide) / np.hypot(1.0, wall.slope)
-    sagitta = (wide * (1.0 - np.cos(np.minimum(span, SMOOTH_RAD)[owner] / 2.0))).clip(0.0)
+    sagitta = (wide * (1.0 - np.cos(np.minimum(span, facets.widest)[owner] / 2.0))).clip(0.0)
     fine = (off < tolerance) & (off > -tolerance - sagitta)
-    good = np.logical_and.reduceat(fine, starts) & (span < SMOOTH_RAD)
+    good = np.logical_and.reduceat(fine, starts) & (span < facets.widest)
     good &= np.abs(facing) > np.cos(np.minimum(span / 2.0 + _TURNED, 1.0))
     if not good.any():
         return among[good], False, span[good]
@@ -169,7 +169,7 @@ def plane_region(mesh: Mesh, triangles: Any, normal: Array, point: Array) -> Reg
     return Region("plane", triangles, float(np.abs(points @ n - d).max()), direction=n, point=d * n)
 
 
-def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: float) -> Region:
+def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: float, sides: int = 0) -> Region:
     """Triangles on a cylinder or a cone, with the ends of it."""
     # An axis has no sense of its own: its largest component is taken as positive, and its point is the foot of the
     # origin, so that one file gives the same numbers each time.
@@ -199,6 +199,7 @@ def round_region(mesh: Mesh, triangles: Any, surface: Round, hole: bool, turn: f
         radii=(radii[0], radii[1]),
         hole=hole,
         turn=turn,
+        sides=sides,
         square=turn == WHOLE_TURN and bool(ends.max(initial=0.0) < 2.0 * FLAT * mesh.extent + 1e-9 and on.all()),
     )
 

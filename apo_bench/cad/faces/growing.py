@@ -8,7 +8,7 @@ import numpy as np
 from apo_bench.cad.faces.facets import Facets
 from apo_bench.cad.faces.fitting import ON_WALL, Round, axis_of, circle_through, on_it, refined
 from apo_bench.cad.solids.raw_solid import Mesh, connected
-from apo_bench.geometry import Array
+from apo_bench.geometry import WHOLE_TURN, Array
 
 _FEWEST = 3
 _MOST_WORK = 3_000_000
@@ -26,6 +26,11 @@ class FoundWall(NamedTuple):
     members: Any
     hole: bool
     spans: Array
+
+    @property
+    def sides(self) -> int:
+        """Of a whole turn of it."""
+        return round(WHOLE_TURN / float(np.median(self.spans)))
 
 
 def walls_of(mesh: Mesh, facets: Facets) -> list[FoundWall]:

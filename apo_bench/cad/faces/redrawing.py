@@ -20,7 +20,7 @@ _STEPS = 12
 _RANK = 0.03
 """Surfaces that meet at a smaller angle, [rad], are followed as one."""
 _FARTHEST = 0.01
-"""Corners move by no more than this part of the size."""
+"""Corners move by no more than this part of the size, beside the sagitta of sides of a round face."""
 
 
 class Redrawn(NamedTuple):
@@ -54,7 +54,10 @@ def redrawn(rough: Rough, patches: Sequence[Patch]) -> Redrawn | None:
     surfaces = [patch.surface for patch in patches]
     points = _settled(mesh, owner, surfaces)
     moved = float(np.linalg.norm(points - mesh.corners, axis=1).max())
-    if moved > _FARTHEST * mesh.extent:
+    sagittas = (
+        s.radius * (1.0 - np.cos(np.pi / p.sides)) for p in patches if isinstance(s := p.surface, Round) and p.sides
+    )
+    if moved > _FARTHEST * mesh.extent + max(sagittas, default=0.0):
         return None
     drawing = _Drawing(Mesh(points, mesh.triangles), owner, surfaces)
     drawing.draw()
@@ -72,7 +75,9 @@ def _region(mesh: Mesh, triangles: Any, patch: Patch) -> Region:
         return plane_region(mesh, triangles, patch.surface.normal, patch.surface.offset * patch.surface.normal)
     if patch.surface is None:
         return Region("other", triangles)
-    return round_region(mesh, triangles, patch.surface, patch.hole, turn_of(mesh, triangles, patch.surface))
+    return round_region(
+        mesh, triangles, patch.surface, patch.hole, turn_of(mesh, triangles, patch.surface), patch.sides
+    )
 
 
 def _settled(mesh: Mesh, owner: Any, surfaces: Sequence[Plane | Round | None]) -> Array:

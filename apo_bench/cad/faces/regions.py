@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.cad.faces.facets import FLAT, Facets, facets_of
+from apo_bench.cad.faces.facets import FEWEST_SIDES, FLAT, SMOOTH_RAD, Facets, facets_of
 from apo_bench.cad.faces.fitting import fitted_plane, round_region
 from apo_bench.cad.faces.growing import FoundWall, smooth_groups, walls_of
 from apo_bench.cad.solids.raw_solid import Mesh, Region, square_to
@@ -39,18 +39,23 @@ class _End(NamedTuple):
         )
 
 
-def regions_of(mesh: Mesh) -> tuple[tuple[Region, ...], Any]:
-    """The faces of a closed mesh in an order that its triangles give, and the flat piece of each triangle."""
-    facets = facets_of(mesh)
-    walls = _without_bands(mesh, facets, walls_of(mesh, facets))
+def regions_of(mesh: Mesh, fewest: int = FEWEST_SIDES) -> tuple[tuple[Region, ...], Any]:
+    """The faces of a closed mesh in an order that its triangles give, and the flat piece of each triangle.
+
+    Args:
+        fewest: Of the sides that a round face has in a whole turn; what has fewer is so many flat faces.
+    """
+    facets = facets_of(mesh, fewest)
+    every = _without_bands(mesh, facets, walls_of(mesh, facets))
+    walls = [wall for wall in every if wall.sides >= fewest]
     triangles = [np.flatnonzero(np.isin(facets.of, wall.members)) for wall in walls]
     regions = [
-        round_region(mesh, mine, wall.surface, wall.hole, _turn(facets, wall))
+        round_region(mesh, mine, wall.surface, wall.hole, _turn(facets, wall), wall.sides)
         for wall, mine in zip(walls, triangles, strict=True)
     ]
     left = _wall_of_pieces(facets, walls) < 0
     thin = facets.areas < (FLAT * mesh.extent) ** 2
-    free = _free(facets, left) | (thin & left)
+    free = _free(facets, left) & (_wall_of_pieces(facets, every) < 0) | (thin & left)
     regions += [fitted_plane(mesh, np.flatnonzero(facets.of == f)) for f in np.flatnonzero(left & ~free)]
     groups = smooth_groups(facets, np.flatnonzero(free))
     regions += [Region("other", np.flatnonzero(np.isin(facets.of, group))) for group in groups]
@@ -67,7 +72,7 @@ def _wall_of_pieces(facets: Facets, walls: list[FoundWall]) -> Any:
 
 def _free(facets: Facets, left: Any) -> Any:
     """Which flat pieces belong to surfaces that are neither flat nor round."""
-    pairs = facets.smooth[left[facets.smooth].all(axis=1)]
+    pairs = facets.smooth[left[facets.smooth].all(axis=1) & (np.abs(facets.angle) < SMOOTH_RAD)]
     free = np.zeros(len(left), dtype=bool)
     free[pairs] = True
     # Of each piece the areas beside it, ascending: what is far larger than the upper quartile is a plane.

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.cad.faces.facets import SMOOTH_RAD
+from apo_bench.cad.faces.facets import widest_of
 from apo_bench.cad.faces.fitting import Round, axis_of, circle_through, refined
 from apo_bench.cad.solids.raw_solid import Mesh, connected
 from apo_bench.geometry import Array
@@ -24,6 +24,8 @@ _TURNED_RAD = 0.6
 _SEEDS = 3
 _BALLS = (12, 48, 192)
 """With how many triangles a face begins."""
+_FLAT = 0.995
+"""Triangles whose normals have this product may be of one side of a coarse wall."""
 _MOST_FAILED = 5
 _LEAST = 2e-4
 """Faces are no smaller than this part of the surface."""
@@ -55,6 +57,8 @@ class Patch(NamedTuple):
     """None: neither flat nor round."""
     triangles: Any
     hole: bool = False
+    sides: int = 0
+    """Of a whole turn of it; 0: that is not known."""
 
 
 class Rough(NamedTuple):
@@ -74,7 +78,7 @@ class Rough(NamedTuple):
         return self.mesh.corners[np.unique(self.mesh.triangles[triangles])]
 
 
-def rough_of(mesh: Mesh, near: float) -> Rough:
+def rough_of(mesh: Mesh, near: float, fewest: int) -> Rough:
     """Normals of narrow triangles are those of the neighbours across their longest edges."""
     size = np.linalg.norm(mesh.across, axis=1)
     normals = mesh.across / np.maximum(size, 1e-300)[:, None]
@@ -89,7 +93,7 @@ def rough_of(mesh: Mesh, near: float) -> Rough:
     for _ in range(4):
         normals[own[take]] = normals[other[take]]
     i, k = mesh.neighbours.T
-    smooth = mesh.neighbours[(normals[i] * normals[k]).sum(axis=1) > np.cos(SMOOTH_RAD)]
+    smooth = mesh.neighbours[(normals[i] * normals[k]).sum(axis=1) > np.cos(widest_of(fewest))]
     middles = mesh.corners[mesh.triangles].mean(axis=1)
     return Rough(mesh, near, normals, weak, size / 2.0, middles, smooth)
 
@@ -158,11 +162,13 @@ def _largest(rough: Rough, left: Any) -> Patch | None:
 
 
 def _balls(rough: Rough, left: Any, seed: int) -> list[Any]:
-    """The nearest triangles to one that look about the same way, in growing numbers."""
+    """The nearest triangles to one that look the same way, then those that do so about, in growing numbers."""
     alike = left[rough.normals[left] @ rough.normals[seed] > 0.5]
     order = alike[np.argsort(((rough.middles[alike] - rough.middles[seed]) ** 2).sum(axis=1), kind="stable")]
     sizes = [n for n in _BALLS if n < len(order)]
-    return [order[:n] for n in [*sizes, len(order)][: len(_BALLS)]] or [np.array([seed])]
+    flat = order[: _BALLS[0]][rough.normals[order[: _BALLS[0]]] @ rough.normals[seed] > _FLAT]
+    sides = [flat] if 1 < len(flat) < min(len(order), _BALLS[0]) else []
+    return [*sides, *(order[:n] for n in [*sizes, len(order)][: len(_BALLS)])] or [np.array([seed])]
 
 
 def _grown(rough: Rough, kind: str, ball: Any, left: Any, seed: int) -> Patch | None:

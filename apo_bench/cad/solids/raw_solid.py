@@ -129,6 +129,8 @@ class Region:
     hole: bool = False
     turn: float = WHOLE_TURN
     """How far around the axis it reaches, [rad]."""
+    sides: int = 0
+    """How many flat ones a whole turn of it had in the file; 0: that is not known, or it is no mesh."""
     square: bool = False
     """Whether both ends are level circles, so that pieces can be rebuilt around it."""
 
