@@ -157,7 +157,7 @@ def test_what_an_import_did_is_said_in_lines(tmp_path: Path) -> None:
     assert lines[0].startswith("lid: 40.125 x 30 x 10 mm, ")
     assert "    px: flat, looks along (1, 0, 0), 20.0625 mm from the origin" in lines
     assert any(
-        line.startswith("    hole1: hole, cylinder, radius 4 mm, axis from (0, 0, 0) to (0, 0, 10) mm")
+        line.startswith("    hole1: hole, cylinder of 32 sides, radius 4 mm, axis from (0, 0, 0) to (0, 0, 10) mm")
         for line in lines
     )
 

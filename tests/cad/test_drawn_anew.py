@@ -68,4 +68,4 @@ def test_a_free_shape_among_faces_without_corners_inside_is_not_drawn_anew(monke
         raise AssertionError
 
     monkeypatch.setattr(drawn_anew, "rough_of", never)
-    assert faces_of(mesh).mesh is mesh
+    assert faces_of(mesh, 12).mesh is mesh
