@@ -6,15 +6,18 @@ that is refused, until one of them is (1 - error) / error times the other.
 """
 
 import math
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
 from itertools import count
+from numbers import Real
 from pathlib import Path
 from typing import Any, final
 
+import numpy as np
+
 from apo_bench.assembly import Correction, Observation
 from apo_bench.correction.own_code.own import OwnCorrectors
-from apo_bench.errors import InputError, require
+from apo_bench.errors import InputError, require, unknown
 from apo_bench.records import CORRECTOR, TrialSettings
 from apo_bench.scoring.track import read_track
 from apo_bench.simulation.scene.scene import Scene
@@ -48,16 +51,24 @@ def sequential_test(
         at_least: With this rate or a higher one the test passes, but in `error` of all cases.
         margin: With a rate that is lower by this or more it fails, but in `error` of all cases. Between the two rates
             it may end either way.
-        most: Outcomes after which the likelier of the two rates decides.
+        most: Outcomes after which the likelier of the two rates decides, as it does where outcomes end; the sentence
+            says so.
 
     Raises:
         InputError: Numbers that are not allowed, or no outcome.
     """
+    for name, value in (("at_least", at_least), ("margin", margin), ("error", error)):
+        require(isinstance(value, Real) and not isinstance(value, bool), f"{name}={value!r} was given; give a number.")
     require(
-        0.0 < margin < at_least <= 1.0,
-        f"at_least={at_least:g} and margin={margin:g} were given; 0 < margin < at_least <= 1 is allowed.",
+        1e-6 <= margin < at_least <= 1.0,
+        f"at_least={at_least:g} and margin={margin:g} were given; 1e-6 <= margin < at_least <= 1 is allowed.",
     )
-    require(0.0 < error < 0.5, f"error={error:g} was given; a number above 0 and below 0.5 is allowed.")
+    require(1e-9 <= error < 0.5, f"error={error:g} was given; a number from 1e-9 and below 0.5 is allowed.")
+    require(
+        isinstance(most, int) and not isinstance(most, bool) and most >= 1,
+        f"most={most!r} was given; a whole number from 1 is allowed.",
+    )
+    require(isinstance(outcomes, Iterable), f"{outcomes!r} was given as outcomes; give an iterator of successes.")
     low = at_least - margin
     success = math.log(at_least / low)
     failure = math.log((1.0 - at_least) / (1.0 - low)) if at_least < 1.0 else -math.inf
@@ -65,15 +76,17 @@ def sequential_test(
     successes = trials = 0
     evidence = 0.0
     for outcome in outcomes:
+        require(isinstance(outcome, bool | np.bool_), f"the outcome {outcome!r} was given; True or False is needed.")
         trials += 1
         successes += bool(outcome)
         evidence += success if outcome else failure
         if abs(evidence) >= bound or trials >= most:
             break
-    require(trials, "no trial counted; the demonstrations of these settings are not right themselves.")
+    require(trials, "no outcome was given; at least one is needed.")
     passed = evidence > 0.0
     verdict = f"at least {at_least:g} is believed" if passed else f"it is below {at_least:g}"
-    return Decision(passed, successes, trials, f"{successes} of {trials} trials succeeded: {verdict}")
+    undecided = f", though it is not decided after {trials}" * (abs(evidence) < bound)
+    return Decision(passed, successes, trials, f"{successes} of {trials} trials succeeded: {verdict}{undecided}")
 
 
 def assert_success_rate(
@@ -97,19 +110,26 @@ def assert_success_rate(
     Raises:
         InputError: A method, track or number that is not allowed.
     """
+    require(isinstance(method, str) or callable(method), f"{method!r} was given as method; give a name or a corrector.")
     name = method if isinstance(method, str) else CORRECTOR
     cells = _cells(trials, name)
     with OwnCorrectors() as own:
         corrector = own.find(method) if ":" in name or not isinstance(method, str) else None
-        decision = sequential_test(_outcomes(cells, seed, corrector), at_least, margin, error, most)
+        said: list[str] = []
+        decision = sequential_test(_outcomes(cells, seed, corrector, said), at_least, margin, error, most)
     if not decision.passed:
-        raise AssertionError(f"{name}, {decision.sentence}.")
+        called = name if isinstance(method, str) else getattr(method, "__name__", type(method).__name__)
+        raise AssertionError(f"{called}, {decision.sentence}{''.join(f'; the last failure: {x}' for x in said[-1:])}.")
     return decision
 
 
 def _cells(trials: Any, method: str) -> list[TrialSettings]:
     """One trial of every cell."""
     if isinstance(trials, Mapping):
+        allowed = [each.name for each in fields(TrialSettings) if each.name not in ("method", "seed")]
+        for key in trials:
+            require(key in allowed, unknown("setting", str(key), allowed))
+        require("scenario" in trials, "the settings of a cell have no scenario; name one.")
         trials = TrialSettings(**trials)
     if isinstance(trials, TrialSettings):
         return [replace(trials, method=method)]
@@ -120,7 +140,7 @@ def _cells(trials: Any, method: str) -> list[TrialSettings]:
     return [trial for grid in grids for unit in units([grid], load_all([grid])) for trial in unit.trials]
 
 
-def _outcomes(cells: list[TrialSettings], seed: int, method: Any) -> Iterator[bool]:
+def _outcomes(cells: list[TrialSettings], seed: int, method: Any, said: list[str]) -> Iterator[bool]:
     """Success of each trial that counts, cells in turn, every trial with a seed of its own."""
     scenes: dict[Any, tuple[Scene, str]] = {}
     for i in count():
@@ -134,4 +154,5 @@ def _outcomes(cells: list[TrialSettings], seed: int, method: Any) -> Iterator[bo
         more = {} if method is None else {"method": method}
         row = trial_row(settings, scene, shown, content, **more)
         if row["success"] is not None:
+            said += [str(row["sentence"])] * (not row["success"])
             yield row["success"]

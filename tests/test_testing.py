@@ -37,6 +37,8 @@ def test_a_rate_of_one_is_lost_with_the_first_failure() -> None:
 def test_where_trials_run_out_the_likelier_rate_decides() -> None:
     ends = sequential_test(itertools.repeat(True), 0.9, 0.1, most=3)
     assert (ends.passed, ends.trials) == (True, 3)
+    assert "not decided after 3" in ends.sentence
+    assert "not decided" in sequential_test(iter([True, True]), 0.9, 0.1).sentence
 
 
 @pytest.mark.parametrize(
@@ -59,3 +61,46 @@ def test_a_corrector_itself_is_taken_and_what_is_no_trials_is_refused() -> None:
     assert assert_success_rate(contact, EASY, at_least=0.95, margin=0.6, error=0.1).passed
     with pytest.raises(InputError, match="give a track"):
         assert_success_rate("contact", 3, at_least=0.9, margin=0.1)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("most", [0, -1, 1.5, "5", None])
+def test_a_number_of_trials_that_is_none_is_refused(most: object) -> None:
+    with pytest.raises(InputError, match="whole number from 1"):
+        sequential_test(iter([True]), 0.9, 0.1, most=most)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("outcome", ["yes", None, 0.5, float("nan"), 1])
+def test_what_is_no_outcome_is_refused(outcome: object) -> None:
+    with pytest.raises(InputError, match="True or False"):
+        sequential_test(iter([outcome]), 0.9, 0.1)  # type: ignore[list-item]
+
+
+def test_numbers_that_are_no_numbers_and_nothing_are_refused() -> None:
+    with pytest.raises(InputError, match=r"at_least='0\.9' was given"):
+        sequential_test(iter([True]), "0.9", 0.1)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="give an iterator"):
+        sequential_test(5, 0.9, 0.1)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="at least one is needed"):
+        sequential_test(iter([]), 0.9, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("method", "cell", "said"),
+    [
+        (None, EASY, "give a name or a corrector"),
+        ("none", {}, "name one"),
+        ("none", EASY | {"bogus": 1}, "unknown setting 'bogus'"),
+        ("none", EASY | {"seed": 1}, "unknown setting 'seed'"),
+    ],
+)
+def test_wrong_requests_are_refused(method: object, cell: object, said: str) -> None:
+    with pytest.raises(InputError, match=said):
+        assert_success_rate(method, cell, at_least=0.9, margin=0.1)  # type: ignore[arg-type]
+
+
+def test_a_corrector_that_raises_is_named_with_what_it_said() -> None:
+    def boom(_: object) -> None:
+        raise ValueError("out of luck")
+
+    with pytest.raises(AssertionError, match=r"boom, 0 of \d+ trials succeeded.*the last failure.*out of luck"):
+        assert_success_rate(boom, EASY, at_least=0.9, margin=0.5, error=0.2)  # type: ignore[arg-type]

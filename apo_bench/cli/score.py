@@ -69,7 +69,7 @@ def score_command(
 ) -> None:
     """Run a method over tracks of fixed trials, resumed where they were left: one number for each, and one over all."""
     from apo_bench.scoring.entrants import entrant, exported
-    from apo_bench.scoring.entry import form_of, write_entry
+    from apo_bench.scoring.entry import form_of, read_entry, write_entry
     from apo_bench.scoring.score import score
     from apo_bench.scoring.track import Track, read_tracks, seen_by
     from apo_bench.show.score_text import entry_lines
@@ -96,7 +96,10 @@ def score_command(
         return
     if out is None:
         raise InputError("no --out was given; name the file of the entry, such as entry.json.")
+    out.parent.mkdir(parents=True, exist_ok=True)
     check_writable(out, "--out", (".json",))
+    if out.exists():
+        read_entry(out)  # an entry is made anew; what is none is kept
     rows = out.with_suffix("")
 
     def said(track: Track) -> None:

@@ -46,6 +46,8 @@ def read_csv_log(path: Path, how: Conventions) -> LogRows:
     """The rows of a file whose columns name what they are; without a column of ids, its name is the id of all."""
     cells, units, ids, places = read_numbers(path, column, how.columns)
     T, notes = poses(cells, units, how, str(path), places)
+    if "t" not in cells and "frame" not in cells:
+        notes = [*notes, f"times counted from images, {how.rate_hz or 0:g} a second"]
     return LogRows(ids, row_times(cells, units, how, str(path), ids), T, places, notes)
 
 

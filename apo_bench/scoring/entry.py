@@ -127,8 +127,13 @@ def _check(track: TrackScore, where: str) -> None:
         f"{where}: the trials of its cells are not those that it counts; make the entry anew.",
     )
     require(
-        abs(track.score - mean_of(track.cells)) < 1e-6 and 0.0 <= track.low <= track.score <= track.high <= 100.0,
+        abs(track.score - mean_of(track.cells)) < 1e-6,
         f"{where}: the score {track.score:g} is not that of its trials, {mean_of(track.cells):g}; make the entry anew.",
+    )
+    shares = [x for x in (track.promised, track.brier) if x is not None]
+    require(
+        0.0 <= track.low <= track.score <= track.high <= 100.0 and all(0.0 <= x <= 1.0 for x in shares),
+        f"{where}: an interval or a promise is none that trials can give; make the entry anew.",
     )
 
 

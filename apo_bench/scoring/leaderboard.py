@@ -1,5 +1,6 @@
 """A table of entries: scores with intervals, paired differences from row to row, one figure of all tracks, hashes."""
 
+import re
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -9,6 +10,7 @@ import numpy as np
 
 from apo_bench.errors import require
 from apo_bench.io.figures import default_looks, save_figure
+from apo_bench.io.plain_text import clean
 from apo_bench.report.tables.table import Column, Table
 from apo_bench.scoring.entry import EXCLUDED, RIGHT, Entry, TrackScore, read_entry
 from apo_bench.statistics import Results, contrast, points
@@ -92,7 +94,7 @@ def leaderboard_table(lines: Sequence[Line]) -> Table:
         lines,
         (
             Column("place", "#"),
-            Column("name", "entry", lambda line: line.entry.name, words=True),
+            Column("name", "entry", lambda line: _plain(line.entry.name), words=True),
             Column("score", "score", lambda line: _overall(line.entry)),
             Column("tracks", "tracks", lambda line: sum(track.overall for track in line.entry.tracks.values())),
             Column("difference", "to the row above"),
@@ -108,7 +110,7 @@ def _tracks(entries: Sequence[Entry]) -> list[str]:
         for name, track in entry.tracks.items():
             first = files.setdefault(name, track)
             require(
-                first.track == track.track,
+                (first.track, first.overall) == (track.track, track.overall),
                 f"the entry '{entry.name}' is of another version of the track {name} ({track.track}, not "
                 f"{first.track}); score it anew, or leave it out.",
             )
@@ -121,13 +123,13 @@ def _page(lines: Sequence[Line], tracks: Sequence[str], picture: str) -> Iterato
     yield from ("", f"![Scores of all entries in all tracks]({picture})", "", _PAIRED, "", "## Every track", "")
     yield from (_EVERY, "")
     columns = [Column(name, name, partial(_cell_in, name)) for name in tracks]
-    yield from Table(lines, (Column("name", "entry", lambda x: x.entry.name, words=True), *columns)).markdown()
+    yield from Table(lines, (Column("name", "entry", lambda x: _plain(x.entry.name), words=True), *columns)).markdown()
     yield from ("", "## Promises", "")
     promising = [(line.entry, name) for line in lines for name in tracks if _promises(line.entry.tracks.get(name))]
     yield from Table(
         promising,
         (
-            Column("entry", "entry", lambda pair: pair[0].name, words=True),
+            Column("entry", "entry", lambda pair: _plain(pair[0].name), words=True),
             Column("track", "track", lambda pair: pair[1], words=True),
             Column("promised", "promised", lambda pair: _percent(pair[0].tracks[pair[1]].promised)),
             Column("score", "score", lambda pair: f"{pair[0].tracks[pair[1]].score:.1f}"),
@@ -140,7 +142,7 @@ def _page(lines: Sequence[Line], tracks: Sequence[str], picture: str) -> Iterato
     yield from Table(
         runs,
         (
-            Column("entry", "entry", lambda run: run[0].name, words=True),
+            Column("entry", "entry", lambda run: _plain(run[0].name), words=True),
             Column("track", "track", lambda run: run[1], words=True),
             Column("trials", "trials", lambda run: run[2].trials),
             Column("file", "track file", lambda run: f"`{run[2].track}`", words=True),
@@ -151,7 +153,8 @@ def _page(lines: Sequence[Line], tracks: Sequence[str], picture: str) -> Iterato
     yield ""
     for line in lines:
         versions = ", ".join(f"{name} {version}" for name, version in line.entry.versions.items())
-        yield f"- {line.entry.name}: `{line.entry.command}`; {versions}; {line.entry.machine}"
+        command = _plain(line.entry.command, ticks="'")
+        yield f"- {_plain(line.entry.name)}: `{command}`; {_plain(versions)}; {_plain(line.entry.machine)}"
 
 
 def _draw(lines: Sequence[Line], tracks: Sequence[str], out: Path) -> None:
@@ -175,6 +178,12 @@ def _draw(lines: Sequence[Line], tracks: Sequence[str], out: Path) -> None:
         axes.set_yticks(range(len(lines)), [line.entry.name for line in lines])
         figure.colorbar(shown, label="success [%]", shrink=0.8)
         save_figure(figure, out, dpi=110)
+
+
+def _plain(text: str, ticks: str = "\\`") -> str:
+    """What somebody wrote, on one line of a table, without meaning to Markdown or HTML."""
+    line = " ".join(clean(text).split()).replace("`", ticks)
+    return re.sub(r"([|*_<>\[\]])", r"\\\1", line) if ticks != "'" else line.replace("|", "/")
 
 
 def _is_verified(entry: Entry, salts: frozenset[str]) -> bool:

@@ -21,7 +21,7 @@ from apo_bench.errors import InputError, require
 from apo_bench.files.json_forms import observation_form
 from apo_bench.geometry import Array, Face, RoundFace, pose
 from apo_bench.io.documents import JsonNode, parse_json
-from apo_bench.io.ordinary_files import read_text
+from apo_bench.io.ordinary_files import decoded, read_text
 
 REQUEST = "apo-bench/request/1"
 _HEX = 32
@@ -67,13 +67,14 @@ class Program:
         line = request_line(observation)
         try:
             done = subprocess.run(
-                self.command, input=line + "\n", stdout=subprocess.PIPE, text=True, cwd=self.folder, check=False
+                self.command, input=f"{line}\n".encode(), stdout=subprocess.PIPE, cwd=self.folder, check=False
             )
-        except (OSError, UnicodeError) as error:
+        except OSError as error:
             raise InputError(f"the program '{self.command[0]}' cannot be run ({error}).") from error
+        answer = f"the answer of '{self.command[0]}'"
         require(done.returncode == 0, f"the program '{self.command[0]}' ended with exit code {done.returncode}.")
         require(done.stdout.strip(), f"the program '{self.command[0]}' wrote no answer; one line of JSON is needed.")
-        return goals_of(parse_json(done.stdout, f"the answer of '{self.command[0]}'"), len(observation.goals))
+        return goals_of(parse_json(decoded(done.stdout, answer, "JSON"), answer), len(observation.goals))
 
 
 @final
@@ -92,10 +93,12 @@ class Answers:
         asked = json.loads(request_line(observation))["id"]
         for number, line in enumerate(read_text(self.path, "answers").splitlines(), start=1):
             if asked in line:
-                document = parse_json(line, f"{self.path}, line {number}")
+                document = parse_json(line, f"{Path(self.path).name}, line {number}")
                 if isinstance(document.value, dict) and document.value.get("id") == asked:
                     return goals_of(document, len(observation.goals))
-        raise InputError(f"{self.path} has no answer for the request {asked}; answer every line of the export.")
+        raise InputError(
+            f"{Path(self.path).name} has no answer for the request {asked}; answer every line of the export."
+        )
 
 
 @final

@@ -19,6 +19,8 @@ def _line(track: TrackScore) -> str:
     said = f"{track.score:5.1f}  ({track.low:.1f} to {track.high:.1f})  {track.trials} trials"
     if track.executed < track.trials and track.when_executed is not None:
         said += f", {track.when_executed:.1f} % of the {track.executed} that were carried out"
+    if not track.executed:
+        said += ", none of which was carried out: the rows in the folder beside the entry say why"
     if track.brier is not None:
         said += f", Brier score of promises {track.brier:.3f}"
     return said if track.overall else f"{said}; not in the score over all"

@@ -75,7 +75,8 @@ def _of(cells: dict[str, str]) -> dict[str, object]:
         ({"score": 99.0}, "is not that of its trials"),
         ({"trials": 3}, "are not those that it counts"),
         ({"cells": {"a": "1?"}}, "are not those that it counts"),
-        ({"low": -1.0}, "is not that of its trials"),
+        ({"low": -1.0}, "none that trials can give"),
+        ({"brier": -3.0}, "none that trials can give"),
     ],
 )
 def test_a_score_by_hand_is_refused(tmp_path: Path, change: dict[str, object], said: str) -> None:
@@ -134,3 +135,14 @@ def test_entries_of_two_files_of_a_track_stand_in_no_table(tmp_path: Path) -> No
         write_leaderboard(tmp_path, tmp_path / "page.md")
     with pytest.raises(InputError, match="has no entry"):
         write_leaderboard(tmp_path / "nothing", tmp_path / "page.md")
+
+
+def test_names_of_others_mean_nothing_to_the_page(tmp_path: Path) -> None:
+    write_entry(entry("p|l/x **b**\n<script>`x`", given=track(a="10")), tmp_path / "one.json")
+    write_leaderboard(tmp_path, tmp_path / "page.md")
+    text = (tmp_path / "page.md").read_text()
+    outside_code = "".join(text.split("`")[::2])
+    assert "<script>" not in outside_code.replace("\\<", "&lt;")
+    rows = [line for line in text.splitlines() if line.startswith("| 1 |")]
+    assert len(rows) == 1
+    assert rows[0].replace("\\|", "").count("|") == 7
