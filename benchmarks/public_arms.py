@@ -19,6 +19,8 @@ from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+import mujoco
+
 from apo_bench.errors import InputError
 from apo_bench.records import Row, TrialSettings
 from apo_bench.scenario import load_scenario
@@ -54,6 +56,8 @@ MENAGERIE = (
 LAYOUTS = 3
 SAID = """\
 # Arms of public collections
+
+*Simulated with MuJoCo {mujoco}.*
 
 Written by `python benchmarks/public_arms.py MENAGERIE --trials N`: every arm with what its files say and nothing else,
 and the 2F-85 of Menagerie where it has no gripper. The check is `arm check` and what is foretold of trials: `yes` where
@@ -148,7 +152,7 @@ def page(tried: Sequence[Tried], trials: int) -> str:
     caught, wrongly = (share([bool(warned(row)) for row in of]) for of in (failed, right))
     return "\n".join(
         [
-            SAID,
+            SAID.format(mujoco=mujoco.__version__),
             f"{trials} trials of each; `oracle` where the check says yes: {yes}. Failures foretold: {caught}; right "
             f"trials taken for failures: {wrongly}.",
             "",

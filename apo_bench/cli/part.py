@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from apo_bench.cad.faces.facets import FEWEST_SIDES
 from apo_bench.cli.arguments import path_given, writing
 from apo_bench.cli.help_groups import Grouped
 from apo_bench.cli.printing import print_json
@@ -34,8 +33,9 @@ def part_import(
     ] = None,
     density: Annotated[float, typer.Option(help="In kg/m^3.")] = 1000.0,
     fewest_sides: Annotated[
-        int, typer.Option("--round", help="Of a mesh: take so many flat sides in a turn, and more, for round.")
-    ] = FEWEST_SIDES,
+        int | None,
+        typer.Option("--round", help="Of a mesh: take so many flat sides in a turn, and more, for round; default: 12."),
+    ] = None,
     as_json: AsJson = False,
 ) -> None:
     """Make part files from a CAD file: find its faces, cut it into convex pieces, and say what was done."""
@@ -46,9 +46,9 @@ def part_import(
     names = _pairs(name or [])
     if not 1.0 <= density <= 25_000.0:
         raise InputError(f"--density {density:g} was given; 1 to 25000 kg/m^3 are allowed.")
-    if not 5 <= fewest_sides <= 64:
+    if fewest_sides is not None and not 5 <= fewest_sides <= 64:
         raise InputError(f"--round {fewest_sides} was given; 5 to 64 sides are allowed.")
-    source, raws = raw_solids(file, unit, fewest_sides)
+    source, raws = raw_solids(file, unit, *(() if fewest_sides is None else (fewest_sides,)))
     if names and len(raws) > 1:
         raise InputError(
             f"--name was given, and {file} holds {len(raws)} different solids; import them from files of their own."

@@ -57,7 +57,7 @@ def test_the_environment_has_the_same_defaults() -> None:
     defaults = {name: parameter.default for name, parameter in signature(APOReplay).parameters.items()}
     here = [name for name in SETTINGS if defaults.get(name) is not None and name != "scenario"]
     robot = ["robot_error", "looks", "wrench", "stated_error", "abstain"]
-    assert here == ["careless", "eye", "grasp", "arm", *robot, "timestep_s"]
+    assert here == ["careless", "eye", "grasp", "arm", *robot, "timestep_s", "fidelity"]
     assert [defaults[name] for name in here] == [SETTINGS[name].default for name in here]
     assert defaults["level"] == TrialSettings.level_mm == TrialSettings.level_deg
 

@@ -14,7 +14,7 @@ PEG = """
 scenarios = ["peg_in_hole"]
 levels = [2]
 careless = [0]
-trials = 3
+trials = 2
 fidelity = "contact"
 
 [track]

@@ -6,9 +6,18 @@ from typing import Any, final
 
 import numpy as np
 import shapely
-from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry import WHOLE_TURN, Array, Face, Hull, RoundFace, flat_area, polygons_of, rings_of, straightened
+from apo_bench.geometry import (
+    WHOLE_TURN,
+    Array,
+    Face,
+    Hull,
+    RoundFace,
+    flat_area,
+    polygons_of,
+    rings_of,
+    straightened,
+)
 from apo_bench.parts.making.moments import Moments, summed
 
 _SAME_M = 1e-9
@@ -30,6 +39,8 @@ class Body:
 
     def moved(self, at_mm: Sequence[float] = (0.0, 0.0, 0.0), turn_deg: Sequence[float] = (0.0, 0.0, 0.0)) -> "Body":
         """Turned about x, then y, then z of the frame, in degrees, then shifted."""
+        from scipy.spatial.transform import Rotation
+
         R = Rotation.from_euler("xyz", turn_deg, degrees=True).as_matrix()
         t = 1e-3 * np.asarray(at_mm)
         R = np.where(np.abs(R) < 1e-15, 0.0, R)
