@@ -94,16 +94,22 @@ def _height(mesh: Mesh, normals: Array, i: Any, k: Any) -> Array:
     return np.asarray(np.abs((points * normals[i][:, None]).sum(axis=2)).max(axis=1))
 
 
+def edges_of(mesh: Mesh) -> tuple[Array, Array, Array, Array]:
+    """Each edge twice, once for either of its triangles: this one, the other, and its length; and the longest of each
+    triangle, [mm]."""
+    own = mesh.neighbours.T.ravel()
+    other = mesh.neighbours[:, ::-1].T.ravel()
+    length = np.tile(np.linalg.norm(mesh.corners[mesh.edges[:, 0]] - mesh.corners[mesh.edges[:, 1]], axis=1), 2)
+    longest = np.zeros(len(mesh.triangles))
+    np.maximum.at(longest, own, length)
+    return own, other, length, longest
+
+
 def _normals(mesh: Mesh) -> Array:
     """Of each triangle; of a needle, that of the neighbour across its longest edge."""
     size = np.linalg.norm(mesh.across, axis=1)
     normals = mesh.across / np.maximum(size, 1e-300)[:, None]
-    # Each edge twice, once for either of its triangles.
-    own = mesh.neighbours.T.ravel()
-    other = mesh.neighbours[:, ::-1].T.ravel()
-    length = np.tile(np.linalg.norm(mesh.corners[mesh.edges[:, 0]] - mesh.corners[mesh.edges[:, 1]], axis=1), 2)
-    longest = np.zeros(len(size))
-    np.maximum.at(longest, own, length)
+    own, other, length, longest = edges_of(mesh)
     needle = size < FLAT * mesh.extent * longest
     take = needle[own] & ~needle[other] & (length > longest[own] * (1.0 - 1e-9))
     normals[own[take]] = normals[other[take]]

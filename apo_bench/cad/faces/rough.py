@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.cad.faces.facets import widest_of
+from apo_bench.cad.faces.facets import edges_of, widest_of
 from apo_bench.cad.faces.fitting import Round, axis_of, circle_through, refined
 from apo_bench.cad.solids.raw_solid import Mesh, connected
 from apo_bench.geometry import Array
@@ -82,11 +82,7 @@ def rough_of(mesh: Mesh, near: float, fewest: int) -> Rough:
     """Normals of narrow triangles are those of the neighbours across their longest edges."""
     size = np.linalg.norm(mesh.across, axis=1)
     normals = mesh.across / np.maximum(size, 1e-300)[:, None]
-    own = mesh.neighbours.T.ravel()
-    other = mesh.neighbours[:, ::-1].T.ravel()
-    length = np.tile(np.linalg.norm(mesh.corners[mesh.edges[:, 0]] - mesh.corners[mesh.edges[:, 1]], axis=1), 2)
-    longest = np.zeros(len(size))
-    np.maximum.at(longest, own, length)
+    own, other, length, longest = edges_of(mesh)
     high = size / np.maximum(longest, 1e-300)
     weak = high < _WEAK * near
     take = weak[own] & (length > longest[own] * (1.0 - 1e-9)) & (high[other] > 1.5 * high[own])

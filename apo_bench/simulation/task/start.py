@@ -18,6 +18,7 @@ from apo_bench.simulation.execution.carry_out import before_attach, take
 from apo_bench.simulation.execution.controller import moves_of, run_schedule
 from apo_bench.simulation.execution.feel.feeling import Feeling, Feels
 from apo_bench.simulation.execution.feel.laying import lay
+from apo_bench.simulation.execution.prepare import Move
 from apo_bench.simulation.execution.replay_cache import Progress, ReplayCache, SavedState, saved_state
 from apo_bench.simulation.execution.transfer import Grip, Transfer
 from apo_bench.simulation.hooks import Hooks
@@ -78,9 +79,11 @@ def prepare(
     progress = Progress([None] * len(plan.assembly), [])
     keys = [b"%d" % i for i in range(2 * at)]
     with sleeping(scene.work, scene.grasp == "friction"), left_out(scene.work):
-        before = moves(error)[:at]
-        again = lambda error: moves(error)[:at]  # noqa: E731
-        outcome = run_schedule(plan, robot, before, progress, ReplayCache(), keys, math.inf, feeling, again)
+
+        def earlier(left: RobotError | None) -> tuple[Move, ...]:
+            return moves(left)[:at]
+
+        outcome = run_schedule(plan, robot, earlier(error), progress, ReplayCache(), keys, math.inf, feeling, earlier)
         if outcome.failed:
             return outcome
         left = error if feeling is None else feeling.residual
