@@ -30,9 +30,12 @@ from apo_bench.scenario import Scenario, scenario_path
 
 _SCHEMAS = (ROW, OBSERVATION_SCHEMA, PLAN_SCHEMA)
 ROOMS_WITHOUT_TRIALS = (
+    "cad",
     "cli",
+    "datasets",
     "drafting",
     "envs",
+    "recording",
     "report",
     "scoring",
     "show",
@@ -40,7 +43,7 @@ ROOMS_WITHOUT_TRIALS = (
     "sweeps/local",
     "sweeps/ray",
 )
-"""Commands, how work is spread, and all that is made of rows afterwards."""
+"""Commands, imports that end in files, how work is spread, and all that is made of rows afterwards."""
 
 
 def content_hash(scenario: Scenario, source: str | Path | Scenario, arm_files: Path | tuple[Path, ...]) -> str:
