@@ -23,7 +23,8 @@ Pair = tuple[list[Contact], int, Poses]
 """The contacts of two parts, the operation that makes them, and where all parts are then."""
 WALKS = 4
 STEPS = 5
-HALVINGS = 24
+HALVINGS = 14
+"""Of up to some mm: a depth is met to within its limit of 1 um."""
 FARTHEST_MM = 1.5
 FARTHEST_DEG = 1.0
 """Motions at both ends of what is tried: farther than the play of anything here, less than what leaves a slot."""

@@ -31,21 +31,21 @@ def packed(model: str) -> bytes:
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork"), reason="cases run in forks of one process")
 
 
-def test_a_hundred_cases_end_in_one_sentence_or_a_result(tmp_path: Path) -> None:
+def test_sixty_cases_end_in_one_sentence_or_a_result(tmp_path: Path) -> None:
     """In a process of its own, which has no threads."""
     out = tmp_path / "fuzz.json"
-    command = [sys.executable, "-m", "benchmarks.fuzz", "--cases", "100", "--seed", "1", "--write", str(out)]
+    command = [sys.executable, "-m", "benchmarks.fuzz", "--cases", "60", "--seed", "1", "--write", str(out)]
     root = Path(fuzz.__file__).parents[1]
     done = subprocess.run(command, cwd=root, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout
     found = json.loads(out.read_text())
     of_kinds = found["kinds"]
     counts = sum((Counter(of["endings"]) for of in of_kinds.values()), Counter())
-    assert sum(counts.values()) == found["cases"] == 100
+    assert sum(counts.values()) == found["cases"] == 60
     assert found["wrong"] == 0
     assert set(counts) <= set(fuzz.FINE)
-    assert counts["exit code 0"] > 5, "files that were changed too little to be refused"
-    assert counts["exit code 2"] > 40
+    assert counts["exit code 0"] > 3, "files that were changed too little to be refused"
+    assert counts["exit code 2"] > 24
     assert len(of_kinds) > 12
     assert {"bytes", "tokens", "structure"} <= {level for of in of_kinds.values() for level in of["levels"]}
 

@@ -12,6 +12,6 @@ SEEDS = range(2)
 
 
 def cheat(observation: Observation) -> np.ndarray:
-    scene = build_scene(load_scenario("peg_in_hole"))
+    scene = build_scene(load_scenario("l_bracket_on_plate"))
     layouts = [simulate_demonstration(scene, 0.0, seed).layout.goals for seed in SEEDS]
     return min(layouts, key=lambda goals: float(np.abs(goals - observation.goals).max()))
