@@ -181,7 +181,7 @@ def _page(lines: Sequence[Mapping[str, Any]]) -> Iterator[str]:
         rates = " | ".join(f"{count} ({100 * count / total:.0f} %)" for count in counts)
         yield f"| `{noise}` | {'' if noise in NOISES else 'never seen'} | {total} | {rates} |"
     yield ""
-    yield "`contact-robust` is told how often poses fail, and in which ways; where it has more right, that is worth as much."
+    yield "`contact-robust` is told how often poses fail, and in which ways: that is what the difference is worth."
 
 
 def main() -> None:
