@@ -22,6 +22,7 @@ __version__ = "0.1.0"
 gymnasium.register(id="APOReplay-v0", entry_point="apo_bench.envs.apo_replay:APOReplay")
 gymnasium.register(id="APOTrack-v0", entry_point="apo_bench.envs.apo_track:APOTrack")
 gymnasium.register(id="APOInsert-v0", entry_point="apo_bench.envs.apo_insert:APOInsert")
+gymnasium.register(id="APOAssemble-v0", entry_point="apo_bench.envs.apo_assemble:APOAssemble")
 
 _EXPORTS = MappingProxyType(
     {

@@ -1,9 +1,10 @@
 """Scripted policies in `APOInsert-v0` beside the search of the bench: `python benchmarks/insertion.py SCENARIO`.
 
 The last operation, by a robot whose hand and eye are off by 0.5 mm and 0.1 degrees, poses corrected by the default
-corrector; trials 0, 1, .., of which those count that come to the operation. `straight` does nothing: the approach
-alone; `spiral` looks for the hole where the approach is stopped, from what every learner sees; `search` is what
-`contact-robust+search` does in the bench in the same trials. Prints successes, and control steps a second of one core.
+corrector; trials from `--first` on, of which those count that come to the operation. `straight` does nothing, so it is
+the approach alone; `spiral` looks for the hole where the approach is stopped, from what every learner sees; `search` is
+what `contact-robust+search` does in the bench in the same trials. Prints successes, and control steps a second of a
+core.
 """
 
 from __future__ import annotations
@@ -22,16 +23,21 @@ import apo_bench
 from apo_bench import TrialSettings, build_scene, load_scenario, run_trial
 
 ERROR = "hand_eye:0.5/0.1"
-PITCH_MM = 0.4
-ACROSS_MM = 0.5
+PITCH_MM = 0.35
+ACROSS_MM = 0.2
 """Of the spiral, and how far it goes with each action."""
-RADIUS_MM = 2.5
+RADIUS_MM = 2.0
+YAWED_RADIUS_MM = 1.0
+"""How far off a hole is looked for, straight and turned about the way in."""
+YAWS_DEG = (0.0, 1.0, -1.0, 2.0, -2.0)
 STALLED = 8
 """The approach is stopped when nothing more is left behind for so many actions."""
+PATIENCE = 40
+"""Where nothing pushes back, the approach is left alone for so many actions."""
 DEEP_MM = 1.0
-SIDE_N = 0.5
-"""Held by walls harder than this, the spiral waits until the arm has given way."""
-YAWS_DEG = (0.0, 1.0, -1.0, 2.0, -2.0)
+"""So much deeper than where it was stopped, it has found the hole."""
+SIDE_N = 1.9
+"""Pushed harder than this and the press from the side, it is held by walls."""
 
 
 class Straight:
@@ -42,34 +48,42 @@ class Straight:
 
 
 class Spiral:
-    """Across in a spiral where the approach is stopped, at several turns about the way in; then on from there."""
+    """Across in a spiral where the approach is stopped, as long as something pushes back; what drops in is left alone.
+
+    The laws are those of the search in the bench, at 20 Hz: moving on across while the part drops in, or against walls
+    that hold it, pushes neighbours away that stand loose.
+    """
 
     def __init__(self) -> None:
         self.best = math.inf
-        self.stalled = 0
-        self.angle: float | None = None
-        self.yaw = 0
         self.waited = 0
+        self.stopped: float | None = None
+        self.press = 0.0
+        self.angle = 0.0
+        self.yaw = 0
         self.at = np.zeros(2)
         self.turned = 0.0
 
     def __call__(self, seen: dict[str, Any]) -> Any:
         left = float(seen["plan"][3])
-        if left < self.best - (0.05 if self.angle is None else DEEP_MM):
-            self.best, self.stalled, self.angle, self.at = left, 0, None, np.zeros(2)
-        self.stalled += 1
+        push = -float(seen["wrench"][2])
         action = np.zeros(7, dtype=np.float32)
-        if self.stalled < STALLED:
+        action[6] = -1.0 if left > 20 else 0.0
+        if self.stopped is None or left < self.stopped - DEEP_MM:
+            self.waited = 0 if left < self.best - 0.05 or self.stopped is not None else self.waited + 1
+            self.stopped = None
+            self.best = min(self.best, left)
+            if self.waited >= STALLED and left > 1.0:
+                self.stopped, self.press = left, max(push, 0.1)
+                self.waited = self.yaw = 0
+                self.angle = 0.0
+                self.at = np.zeros(2)
             return action
-        side = math.hypot(*seen["wrench"][:2])
-        if side > SIDE_N and self.waited < 20:
-            self.waited += 1
+        self.waited = self.waited + 1 if push < self.press / 4 else 0
+        if 0 < self.waited < PATIENCE:
             return action
-        self.waited = 0
-        if self.angle is None:
-            self.angle = 0.0
         r = PITCH_MM * self.angle / (2 * math.pi)
-        if r > RADIUS_MM:
+        if r > (YAWED_RADIUS_MM if self.yaw else RADIUS_MM) or math.hypot(*seen["wrench"][:2]) > push + SIDE_N:
             self.yaw = (self.yaw + 1) % len(YAWS_DEG)
             self.angle = r = 0.0
         self.angle += ACROSS_MM / max(r, 0.5)
@@ -77,10 +91,8 @@ class Spiral:
         wanted = r * np.array([math.cos(self.angle), math.sin(self.angle)])
         action[:2] = np.clip(wanted - self.at, -1, 1)
         self.at = self.at + action[:2]
-        turn = float(np.clip((YAWS_DEG[self.yaw] - self.turned) / 0.5, -1, 1))
-        action[5] = turn
-        self.turned += 0.5 * turn
-        action[6] = -1.0 if left > 20 else 0.0
+        action[5] = np.clip((YAWS_DEG[self.yaw] - self.turned) / 0.5, -1, 1)
+        self.turned += 0.5 * float(action[5])
         return action
 
 
@@ -108,6 +120,7 @@ def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("scenario")
     asked.add_argument("--trials", type=int, default=10)
+    asked.add_argument("--first", type=int, default=0)
     asked.add_argument("--horizon", type=int, default=200, help="actions of an episode")
     given = asked.parse_args()
     env = gymnasium.make(
@@ -115,7 +128,7 @@ def main() -> None:
     )
     trials: list[int] = []
     for name, policy in {"straight": Straight, "spiral": Spiral}.items():
-        found = episodes(env, policy, range(given.trials))
+        found = episodes(env, policy, range(given.first, given.first + given.trials))
         trials = list(found)
         speed = np.mean([each[2] for each in found.values()])
         print(f"{name}: {sum(each[0] for each in found.values())} of {len(trials)}, {speed:.0f} steps/s", flush=True)

@@ -3,6 +3,7 @@
 import shlex
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -18,6 +19,7 @@ dataset = typer.Typer(
 )
 _FIRST_SEED = 1_000_000
 """Seeds below are for what is reported."""
+_RECORDS = ("replays", "insertions")
 
 
 @dataset.callback(invoke_without_command=True)
@@ -36,20 +38,25 @@ def dataset_make(
     out: Annotated[Path, typer.Option(parser=path_given, metavar="<path>", help="A folder that is not there yet.")],
     episodes: Annotated[int, typer.Option(help="Trials of each scenario.")] = 10,
     seed: Annotated[int, typer.Option(help="First seed; those of tracks and of the headline are small.")] = _FIRST_SEED,
-    format: Annotated[str, typer.Option(help="parquet.")] = "parquet",
+    format: Annotated[str, typer.Option(help="parquet, lerobot or minari.")] = "parquet",
+    record: Annotated[str, typer.Option(help="replays, or insertions: APOInsert-v0 led by a policy.")] = "replays",
+    policy: Annotated[str, typer.Option(help="Of insertions: expert, straight or module:function.")] = "expert",
     **options: Any,
 ) -> None:
-    """Run trials and write what was seen, planned and true, and all frames of the replays, as Parquet with a card."""
-    from apo_bench.datasets.episodes import make_dataset
+    """Run trials and write what was seen, planned and true, and all frames, with a card for people and programs."""
+    from apo_bench.datasets.making import make_dataset
     from apo_bench.scenario.file import load_scenario
     from apo_bench.trial.request import Request, requested_settings
 
-    require(format == "parquet", f"--format {format} was given; parquet is allowed.")
+    require(record in _RECORDS, f"--record {record} was given; {' or '.join(_RECORDS)} is allowed.")
     require(episodes >= 1, f"--episodes {episodes} was given; a whole number from 1 is allowed.")
     options["seed"] = seed
     asked = [Request(scenario=name, options=options) for name in (scenario, *(more or ()))]
     several = [requested_settings(each, load_scenario(each.scenario).clearance_mm) for each in asked]
-    trials = (replace(each, seed=each.seed + k) for each in several for k in range(episodes))
+    trials = [replace(each, seed=each.seed + k) for each in several for k in range(episodes)]
+    led = policy if record == "insertions" else None
     with writing():
-        made, right = make_dataset(trials, out, shlex.join(["apo-bench", *sys.argv[1:]]))
+        made, right = make_dataset(
+            trials, out, shlex.join(["apo-bench", *sys.argv[1:]]), format, led, partial(typer.echo, err=True)
+        )
     typer.echo(f"{made} trials, {right} right; the card is {out / 'README.md'}")

@@ -3,14 +3,15 @@
 import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, final
+from typing import Any
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Outcome, Poses
+from apo_bench.assembly import Outcome, Poses, Snapshot
+from apo_bench.envs.insert_spaces import PIXELS, as_seen, insert_space
 from apo_bench.envs.robot import RobotSettings
 from apo_bench.envs.starts import Begun, Trials, judged
 from apo_bench.errors import InputError, require, unknown
@@ -21,29 +22,21 @@ from apo_bench.records import CORRECTOR, CORRECTORS, SIMULATED, USUAL, TrialSett
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.robot.robot import Halt
-from apo_bench.simulation.scene.scene import build_scene
+from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.task.tip_control import PERIOD_S, TipControl
 
 Seen = dict[str, Any]
 Action = NDArray[np.float32]
-MM_DEG = np.repeat([1e3, 180.0 / math.pi], 3)
-PIXELS = 96
+ROBOT_ERROR = "hand_eye:0.5/0.1"
+"""What is wrong with the robot as usual."""
 LETS_GO = 0.5
 """Of the seventh number of an action: above, the hand lets go; below its negative, it holds."""
 MOST_TRIES = 100
 """So many trials in a row may never come to the operation before `reset()` gives up."""
 _REWARDS = ("judge", "progress")
 _PLANS = ("none", "oracle", "by-heart")
-_FAR = np.repeat([500.0, 180.0], 3)
-_SEEN = {
-    "agent_pos": np.array([*_FAR, *_FAR, 100.0]),
-    "wrench": np.repeat([1000.0, 1000.0], 3),
-    "plan": np.array([1.0, 1.0, 1.0, 500.0, 500.0, 1e4, *_FAR, *np.ones(7)]),
-}
-"""No number that is seen is larger."""
 
 
-@final
 class APOInsert(gymnasium.Env[Seen, Action]):
     """Insert one part that the robot holds before its mouth.
 
@@ -120,7 +113,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         clearance_mm: float | None = None,
         arm: str | Arm = TrialSettings.arm,
         timestep_s: float = TrialSettings.timestep_s,
-        robot_error: str = "hand_eye:0.5/0.1",
+        robot_error: str = ROBOT_ERROR,
         feels: bool = False,
         wrench: str = TrialSettings.wrench,
         stated_error: str = TrialSettings.stated_error,
@@ -160,10 +153,12 @@ class APOInsert(gymnasium.Env[Seen, Action]):
             RobotSettings(robot_error, feels, wrench, stated_error).checked(),
         )
         self._residual = bool(residual)
-        self._scale = np.repeat([1e-3 * shift_mm, math.radians(turn_deg)], 3)
+        self.scale = np.repeat([1e-3 * shift_mm, math.radians(turn_deg)], 3)
+        """Of an action of 1, [m, rad]."""
         self._horizon = int(horizon)
         self._fails_above_n = fails_above_n
-        self._progress = reward == "progress"
+        self.share = float(reward == "progress")
+        """Of the way in, as a reward."""
         self._layouts = int(layouts)
         self._first = int(first_trial)
         self._pixels = bool(pixels)
@@ -174,13 +169,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         self._actions: list[Action] = []
         self._over = True
         self._best = 0.0
-        seen: dict[str, spaces.Space[Any]] = {
-            name: spaces.Box(-most.astype(np.float32), most.astype(np.float32), dtype=np.float32)
-            for name, most in _SEEN.items()
-        }
-        if pixels:
-            seen["pixels"] = spaces.Box(0, 255, (PIXELS, PIXELS, 3), np.uint8)
-        self.observation_space = spaces.Dict(seen)
+        self.observation_space = insert_space(self._pixels)
         self.action_space = spaces.Box(-1.0, 1.0, (7,), np.float32)
 
     @property
@@ -198,6 +187,21 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         """Where all parts are, world frame, [m]."""
         return self._at_work().poses()
 
+    @property
+    def off(self) -> Array:
+        """By how much the part is really off where it has to go, (6,), [m, rad], in the frame of the way in."""
+        return self._now().off(self._at_work())
+
+    @property
+    def scene(self) -> Scene:
+        """The compiled scene, with its scenario and its arm."""
+        return self._trials.scene
+
+    @property
+    def operation(self) -> int:
+        """The operation of this episode, from 1."""
+        return self._now().start.operation + 1
+
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
         """Begin at one of the starts.
 
@@ -213,13 +217,17 @@ class APOInsert(gymnasium.Env[Seen, Action]):
             raise InputError(f"the options {options!r} were given to reset(); a dict with trial is allowed.")
         super().reset(seed=seed)
         self._over = True
-        self._begun = self._drawn((options or {}).get("trial"))
+        self._begin(self._drawn((options or {}).get("trial")))
+        return self._seen(), {}
+
+    def _begin(self, begun: Begun) -> None:
+        """Take up a start."""
+        self._begun = begun
         self._wrist_seed = int(self.np_random.integers(2**63))
         self._actions = []
         self._control = None
         self._over = False
         self._best = self._at_work().begins
-        return self._seen(), {}
 
     def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
         """Lead the tip for 50 ms, or let go.
@@ -236,16 +244,16 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         control = self._at_work()
         self._actions.append(given.copy())
         before = self._best
+        shared = 0.0
         try:
             self._lead(control, given)
             self._best = min(before, -float(control.feel.tip[2]))
+            shared = self.share * max(before - max(self._best, 0.0), 0.0) / control.begins
             info = self._end(control, float(given[6]))
         except Halt as halt:
             info = self._said(halt.code, halt.part)
         self._over = bool(info)
-        won = float(info.get("success", False))
-        shared = (before - max(self._best, 0.0)) / control.begins if self._progress else 0.0
-        return self._seen(), won + max(shared, 0.0), self._over, False, info
+        return self._seen(), shared + float(info.get("success", False)), self._over, False, info
 
     def render(self) -> Any:
         """Arm and parts, (480, 640, 3) of uint8."""
@@ -293,7 +301,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         return self._control
 
     def _lead(self, control: TipControl, action: Action) -> None:
-        control.act(*np.split(self._scale * action[:6].astype(np.float64), 2))
+        control.act(*np.split(self.scale * action[:6].astype(np.float64), 2))
 
     def _end(self, control: TipControl, grip: float) -> dict[str, Any]:
         """What is said at the end, or nothing if it goes on."""
@@ -302,36 +310,30 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         last = len(self._actions) == self._horizon
         if not (last or grip > LETS_GO or (self._residual and control.arrived and grip >= -LETS_GO)):
             return {}
-        reached = control.let_go()
+        return self._done(control, control.let_go())
+
+    def _done(self, control: TipControl, reached: Snapshot) -> dict[str, Any]:
+        """What is said once the hand has let go."""
         begun = self._now()
         verdict = judged(self._trials.scene, (*begun.start.after, reached), reached, begun.reference)
         found = verdict.rests_on
         return self._said("ok" if verdict.success else found.code, why=found.why)
 
     def _said(self, code: str, part: str = "", why: str = "") -> dict[str, Any]:
-        success = code == "ok"
-        k = self._trials.operation
+        k = self._now().start.operation
         main = self._trials.scene.scenario.assembly.operations[k].main
         said = sentence(code, part=part or main, operation=k) + (f": {why}" if why else "")
-        return {"success": success, "is_success": success, "code": code, "sentence": said}
+        return ended(code, said)
 
     def _seen(self) -> Seen:
-        control = self._at_work()
-        feel = control.feel
-        left = -1e3 * float(feel.tip[2])
         actions = self._actions
-        plan = (
-            control.start.way,
-            [left, 1e3 * self._best, PERIOD_S * (self._horizon - len(actions))],
-            control.sigmas(self._now().covariance) * MM_DEG,
-            actions[-1] if actions else np.zeros(7),
+        seen = as_seen(
+            self._at_work(),
+            self._now().covariance,
+            self._best,
+            self._horizon - len(actions),
+            actions[-1] if actions else np.zeros(7, dtype=np.float32),
         )
-        seen: Seen = {
-            "agent_pos": [*feel.tip * MM_DEG, *feel.lag * MM_DEG, 1e3 * feel.opening],
-            "wrench": feel.wrench,
-            "plan": np.concatenate(plan),
-        }
-        seen = {name: np.clip(seen[name], -most, most).astype(np.float32) for name, most in _SEEN.items()}
         return {**seen, "pixels": self._picture(PIXELS, PIXELS)} if self._pixels else seen
 
     def _picture(self, width: int, height: int) -> Any:
@@ -340,3 +342,8 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         control = self._at_work()
         state = np.array(control.robot.data.qpos)
         return picture_with_arm(self._trials.scene, control.start.parts, state, width, height)
+
+
+def ended(code: str, sentence: str) -> dict[str, Any]:
+    """What is said at the end."""
+    return {"success": code == "ok", "is_success": code == "ok", "code": code, "sentence": sentence}

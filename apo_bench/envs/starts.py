@@ -1,19 +1,21 @@
 """The starts of `APOInsert-v0`: trials as the bench draws them, carried out up to where the learner takes over."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Observation, Outcome, Reached, Snapshot
+from apo_bench.assembly import Correction, Observation, Outcome, Plan, Reached, Snapshot
 from apo_bench.envs.robot import RobotSettings
-from apo_bench.geometry import Array
+from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import Verdict, judge
 from apo_bench.observation.noise import Noise
 from apo_bench.records import NO_ROBOT_ERROR, robot_sigmas, told_error
+from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.task.start import Start, prepare
+from apo_bench.simulation.task.start import Start, go_on, prepare
+from apo_bench.simulation.task.tip_control import TipControl
 from apo_bench.trial.feeling import feels_of
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import (
@@ -33,10 +35,37 @@ class Begun:
 
     trial: int
     start: Start
-    reference: Array
-    """(k + 1, 4, 4), the true goals up to this operation, world frame, [m]."""
-    covariance: Array
-    """(6, 6), stated, of the twist by which the part may be wrong at its goal, in its own frame, [m, rad]."""
+    plan: Plan
+    error: RobotError | None
+    goals: Array
+    """(n, 4, 4), the true goals, world frame, [m]."""
+    covariances: Array
+    """(n, 6, 6), stated, of the twist by which each part may be wrong at its goal, in its own frame, [m, rad]."""
+
+    @property
+    def reference(self) -> Array:
+        """(k + 1, 4, 4), the true goals up to this operation, world frame, [m]."""
+        return self.goals[: self.start.operation + 1]
+
+    @property
+    def covariance(self) -> Array:
+        """(6, 6), that of this operation."""
+        return np.asarray(self.covariances[self.start.operation])
+
+    def off(self, control: TipControl) -> Array:
+        """By how much the part is off where it has to go, (6,), as `TipControl.off`.
+
+        Where its neighbours are now, its goal is with them; of several, the mean.
+        """
+        assembly = self.plan.assembly
+        k = self.start.operation
+        main = assembly.operations[k].main
+        placed = {assembly.operations[i].main: self.goals[i] for i in range(k)}
+        true = {**self.start.parts, **placed}
+        now = control.poses()
+        besides = sorted({of.part for contact in assembly.operations[k].contacts for of in contact} - {main})
+        goals = [now[part] @ pose.inverse(true[part]) @ self.goals[k] for part in besides] or [self.goals[k]]
+        return np.mean([control.off(goal) for goal in goals], axis=0)
 
 
 class Trials(NamedTuple):
@@ -72,7 +101,13 @@ class Trials(NamedTuple):
         if before is not None and not before.success:
             code = before.rests_on.code
             return Outcome("judge", code, None, f"what was put before is not right: {before.rests_on.why or code}")
-        return Begun(trial, start, truth[: k + 1], _stated(seen, made.correction, told, k))
+        return Begun(trial, start, made.plan, error, truth, _stated(seen, made.correction, told))
+
+    def go_on(self, begun: Begun, control: TipControl, reached: Snapshot) -> Begun | Outcome:
+        """The start of the next operation, after somebody has done one; or what failed on the way there."""
+        key = (*stream_key(begun.trial, WRENCH), 1 + len(begun.reference))
+        start = go_on(begun.plan, control.robot, begun.start, reached, begun.error, (self.robot.wrench, key))
+        return start if isinstance(start, Outcome) else replace(begun, start=start)
 
 
 def judged(scene: Scene, after: tuple[Snapshot | None, ...], final: Snapshot | None, reference: Array) -> Verdict:
@@ -86,10 +121,10 @@ def judged(scene: Scene, after: tuple[Snapshot | None, ...], final: Snapshot | N
     return judge(assembly, Reached(after, final), reference, scene.criteria)
 
 
-def _stated(seen: Observation, correction: Correction | None, told: str | None, k: int) -> Array:
+def _stated(seen: Observation, correction: Correction | None, told: str | None) -> Array:
     """What the corrector leaves of the noise, and what is said of the robot, but for its joints."""
     posterior = None if correction is None else correction.covariance
-    covariance = (seen.covariance if posterior is None else posterior)[k]
+    covariance = seen.covariance if posterior is None else posterior
     sigmas = robot_sigmas(told or NO_ROBOT_ERROR)
     mm = math.hypot(sigmas.hand_eye[0], sigmas.tool_mm, sigmas.in_hand[0])
     deg = math.hypot(sigmas.hand_eye[1], sigmas.in_hand[1])

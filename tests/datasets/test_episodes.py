@@ -11,7 +11,8 @@ from pyarrow import parquet
 
 from apo_bench import TrialSettings, load_scenario, run_trial
 from apo_bench.cli.app import main
-from apo_bench.datasets.episodes import EPISODES, FRAMES, make_dataset
+from apo_bench.datasets.episodes import EPISODES, FRAMES
+from apo_bench.datasets.making import make_dataset
 from apo_bench.geometry import pose
 
 
@@ -50,7 +51,7 @@ def test_frames_end_where_the_replay_did(made: Path) -> None:
     frames = read(made / "frames" / "000001.parquet")
     assert len(frames) == one["frames"] > 100
     assert {frame["episode"] for frame in frames} == {1}
-    assert np.all(np.diff([frame["t_s"] for frame in frames]) < 0.1)
+    np.testing.assert_allclose(np.diff([frame["t_s"] for frame in frames]), 0.05, atol=1e-9)
     assert {frame["operation"] for frame in frames} - {None} == {1, 2}
     assert max(frame["force_n"] for frame in frames) > 0.1
     last = dict(zip(one["parts"], np.reshape(frames[-1]["part_poses"], (-1, 7)), strict=True))
@@ -58,23 +59,33 @@ def test_frames_end_where_the_replay_did(made: Path) -> None:
     for part, at in planned.items():
         np.testing.assert_allclose(last[part][:3], at[:3], atol=1e-3)
     assert len(frames[0]["joints"]) == 6
+    asked = np.array([frame["commands"][:6] for frame in frames])
+    np.testing.assert_allclose(asked, [frame["joints"] for frame in frames], atol=0.1)
+    # At rest the arm carries its hand; with a part in it, more.
+    pulls = np.linalg.norm([frame["wrench"][:3] for frame in frames], axis=1)
+    assert 1.0 < np.median(pulls) < 30.0
+    np.testing.assert_allclose(np.linalg.norm(np.reshape(frames[70]["part_poses"], (-1, 7))[:, 3:], axis=1), 1.0)
 
 
 def test_the_card_says_what_every_column_is(made: Path) -> None:
     card = (made / "README.md").read_text(encoding="utf-8")
     assert set(parquet.read_schema(made / "episodes.parquet").names) == EPISODES.keys()
     assert set(parquet.read_schema(made / "frames" / "000000.parquet").names) == FRAMES.keys()
-    for column, meaning in (EPISODES | FRAMES).items():
+    for column, meaning in EPISODES.items():
+        assert f"| `{column}` |  |  |  | {meaning} |" in card
+    for column, field in FRAMES.items():
         assert f"| `{column}` | " in card
-        assert meaning in card
+        assert f"| {field.unit} | {field.frame} | {field.meaning} |" in card
     assert "2 simulated trials, 2 of them right" in card
     assert "Licence: Apache-2.0" in card
 
 
 def test_the_same_trials_give_the_same_tables_and_one_without_a_plan_has_no_frames(tmp_path: Path) -> None:
     trials = [TrialSettings("block_on_block", method=method, level_mm=40, level_deg=40) for method in ("none", "paper")]
+    said: list[str] = []
     for name in ("a", "b"):
-        make_dataset(trials, tmp_path / name, "by hand")
+        make_dataset(trials, tmp_path / name, "by hand", say=said.append)
+    assert said == []
     files = [sorted(path.relative_to(tmp_path / name) for path in (tmp_path / name).rglob("*.*")) for name in "ab"]
     assert files[0] == files[1]
     for path in files[0]:
@@ -89,7 +100,10 @@ def test_the_same_trials_give_the_same_tables_and_one_without_a_plan_has_no_fram
     ("words", "complaint"),
     [
         (["--out", "."], "is there already and not an empty folder"),
-        (["--out", "new", "--format", "csv"], "parquet is allowed"),
+        (["--out", "new", "--format", "csv"], "unknown format 'csv'"),
+        (["--out", "new", "--record", "films"], "replays or insertions is allowed"),
+        (["--out", "new", "--record", "insertions"], "lerobot and minari are allowed for them"),
+        (["--out", "new", "--record", "insertions", "--format", "lerobot", "--policy", "expret"], "mean 'expert'"),
         (["--out", "new", "--episodes", "0"], "a whole number from 1 is allowed"),
         (["--out", "new", "--method", "contcat"], "did you mean 'contact'"),
     ],

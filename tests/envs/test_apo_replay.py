@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import copy
 import pickle
+import sys
 import warnings
 from collections.abc import Iterator
 from dataclasses import fields, replace
 from functools import cache
+from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import gymnasium
@@ -556,3 +559,18 @@ def test_vector_environments_are_the_same_trials(small: APOReplay) -> None:
             np.testing.assert_array_equal(seen["goals"][i], small.reset(seed=SEED + i)[0]["goals"])
     finally:
         many.close()
+
+
+def test_record_video_films_the_whole_replay_when_it_is_asked_to_render(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setitem(sys.modules, "moviepy", ModuleType("moviepy"))  # it is needed to write the film alone
+    made = gymnasium.make("APOReplay-v0", scenario="block_on_block", grasp="weld", render_mode="rgb_array_list")
+    films = gymnasium.wrappers.RecordVideo(made, str(tmp_path / "films"), episode_trigger=lambda episode: True)
+    films.reset(seed=7)
+    films.step(np.zeros(films.action_space.shape))
+    assert len(films.recorded_frames) == 2
+    films.render()
+    assert len(films.recorded_frames) == 2 + len(made.render()) > 20
+    assert {frame.shape for frame in films.recorded_frames} == {(240, 320, 3)}
+    films.recorded_frames.clear()

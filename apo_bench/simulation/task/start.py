@@ -19,7 +19,7 @@ from apo_bench.simulation.execution.controller import moves_of, run_schedule
 from apo_bench.simulation.execution.feel.feeling import Feeling, Feels
 from apo_bench.simulation.execution.feel.laying import lay
 from apo_bench.simulation.execution.prepare import Move
-from apo_bench.simulation.execution.replay_cache import Progress, ReplayCache, SavedState, saved_state
+from apo_bench.simulation.execution.replay_cache import Progress, ReplayCache, SavedState, saved_state, take_up
 from apo_bench.simulation.execution.transfer import Grip, Transfer
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.robot.by_wrist import wrist_of, zero
@@ -87,23 +87,63 @@ def prepare(
         if outcome.failed:
             return outcome
         left = error if feeling is None else feeling.residual
-        robot.step, t = moves(left)[at]
-        if not t.into.level and t.mouths:
-            t = replace(t, in_last=True, slow=max(t.slow, max(t.mouths) + WALL_MARGIN_M))
-        try:
-            i = take(robot, t, again="square" in acts)
-            robot.slip(k)
-            laying = None
-            if feeling is not None:
-                feeling.taken(k)
-                laying = None if t.flush is None else partial(lay, robot, feeling, k)
-            grip, second = before_attach(robot, t, i, laying)
-            wrist = wrist_of(robot, wrench[0], np.random.default_rng(wrench[1]))
-            wrist.hold(*part_loads(scene, {t.part: pose.inverse(grip.T_part_tip)}))
-            zero(robot, wrist)
-        except Halt as halt:
-            return Outcome(halt.stage, halt.code, k, sentence(halt.code, part=halt.part or t.part, operation=k))
-        saved = saved_state(robot, i, progress)
+        return _held(plan, robot, moves(left)[at], feeling, left, wrench, progress)
+
+
+def go_on(
+    plan: Plan,
+    robot: Robot,
+    start: Start,
+    reached: Snapshot,
+    error: RobotError | None,
+    wrench: tuple[str, tuple[int, ...]],
+) -> Start | Outcome:
+    """The start of the next operation, by the robot that has just let go of a part; as `prepare`, without feeling.
+
+    Args:
+        robot: As somebody else has led it from `start`; it is left as it is.
+        reached: What it has reached.
+    """
+    progress = Progress([*start.after, reached], [])
+    other = Robot(robot.scene, start.parts, Hooks(), "contact", error)
+    with sleeping(robot.scene.work, robot.scene.grasp == "friction"), left_out(robot.scene.work):
+        take_up(saved_state(robot, 0, progress), other)
+        move = moves_of(plan, robot.scene, True, (), error)[start.operation + 1]
+        return _held(plan, other, move, None, error, wrench, progress)
+
+
+def _held(
+    plan: Plan,
+    robot: Robot,
+    move: Move,
+    feeling: Feeling | None,
+    left: RobotError | None,
+    wrench: tuple[str, tuple[int, ...]],
+    progress: Progress,
+) -> Start | Outcome:
+    """Take the part of a move and hold it before its mouth.
+
+    Args:
+        left: What is wrong with the robot and not made up for.
+    """
+    scene = robot.scene
+    robot.step, t = move
+    k = robot.step.operation
+    if not t.into.level and t.mouths:
+        t = replace(t, in_last=True, slow=max(t.slow, max(t.mouths) + WALL_MARGIN_M))
+    try:
+        i = take(robot, t, again=feeling is not None and "square" in feeling.acts)
+        robot.slip(k)
+        laying = None
+        if feeling is not None:
+            feeling.taken(k)
+            laying = None if t.flush is None else partial(lay, robot, feeling, k)
+        grip, second = before_attach(robot, t, i, laying)
+        wrist = wrist_of(robot, wrench[0], np.random.default_rng(wrench[1]))
+        wrist.hold(*part_loads(scene, {t.part: pose.inverse(grip.T_part_tip)}))
+        zero(robot, wrist)
+    except Halt as halt:
+        return Outcome(halt.stage, halt.code, k, sentence(halt.code, part=halt.part or t.part, operation=k))
     return Start(
         operation=k,
         parts=dict(plan.start),
@@ -112,7 +152,7 @@ def prepare(
         second=second,
         way=t.into.way if left is None else left.hand_eye[:3, :3].T @ t.into.way,
         off=np.zeros(len(scene.arm.joints)) if left is None else left.joints,
-        saved=saved,
+        saved=saved_state(robot, i, progress),
         wrist=wrist.at(np.zeros(len(robot.data.sensordata)), _nowhere, np.random.default_rng(0)),
         after=tuple(progress.after[:k]),
     )

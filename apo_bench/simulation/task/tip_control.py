@@ -157,6 +157,17 @@ class TipControl:
         J = np.block([[R, -R @ pose.hat(front)], [np.zeros((3, 3)), R]])
         return np.asarray(np.sqrt(np.diag(J @ covariance @ J.T)))
 
+    def off(self, T_world_goal: Array) -> Array:
+        """By how much the front of the part, and its turn, are off where the part is at a pose, (6,), [m, rad].
+
+        In the frame of the way in; the third number is less than 0 before it. For whoever watches, as `poses`.
+        """
+        T = part_pose(self.robot.scene.work, self.robot.data, self.start.transfer.part)
+        front = np.zeros(3) if self.start.transfer.front is None else self.start.transfer.front
+        shift = pose.apply(T, front[None])[0] - pose.apply(T_world_goal, front[None])[0]
+        turn = pose.log(pose.rigid(T[:3, :3] @ T_world_goal[:3, :3].T, np.zeros(3)))[3:]
+        return np.concatenate([shift @ self._R, turn @ self._R])
+
     def poses(self) -> Poses:
         """Where all parts are, (4, 4) each, world: for whoever watches, nothing is decided by it."""
         work = self.robot.scene.work

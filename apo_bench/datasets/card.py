@@ -1,0 +1,133 @@
+"""The card of a data set, for people and for programs: every field with its unit and frame, the licence, every file."""
+
+import hashlib
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pyarrow import parquet
+
+from apo_bench import __version__
+from apo_bench.datasets.rollout import FPS, About, Field
+from apo_bench.io.ordinary_files import to_write
+
+LICENCE = "Apache-2.0"
+_LICENCE_URL = "https://spdx.org/licenses/Apache-2.0"
+_TYPES = {".parquet": "application/x-parquet", ".json": "application/json", ".hdf5": "application/x-hdf5"}
+_CROISSANT = "http://mlcommons.org/croissant/"
+_WORDS = (
+    *("citeAs", "column", "equivalentProperty", "extract", "field", "fileObject", "fileProperty", "fileSet", "format"),
+    *("includes", "isLiveDataset", "jsonPath", "key", "md5", "parentField", "path", "recordSet", "references", "regex"),
+    *("repeated", "replace", "samplingRate", "separator", "source", "subField", "transform"),
+)
+"""What Croissant 1.0 adds to schema.org, as far as its readers ask for it."""
+_DATA_TYPES = {"string": "sc:Text", "bool": "sc:Boolean", "int": "sc:Integer"}
+
+
+def write_card(about: About, out: Path, counted: tuple[int, int], tables: Mapping[str, Mapping[str, Any]]) -> None:
+    """Write `README.md`, and the same for programs: `croissant.json` (Croissant 1.0), with the hash of every file.
+
+    Args:
+        counted: How many episodes there are, and how many of them are right.
+        tables: Files, as a pattern -> column -> a `Field`, or in words what it is.
+    """
+    summary = f"{counted[0]} simulated trials, {counted[1]} of them right, made by apo_bench {__version__} with MuJoCo"
+    lines = [
+        *("---", "license: apache-2.0", "task_categories: [robotics]", "tags: [LeRobot, assembly, simulation]"),
+        *(f"configs: [{{config_name: {name}, data_files: '{name}'}}]" for name in [*tables][:1] if "parquet" in name),
+        "---",
+        *("# Assemblies that a robot repeats", "", f"{summary}:", "", f"    {about.command}", "", about.summary, ""),
+        f"Nothing was measured on a real robot. `seed` is the number of a trial. There are {FPS} frames in a second of",
+        f"simulated time. The robot is `{about.robot}`.",
+        *("", f"Licence: {LICENCE}, as that of apo_bench."),
+    ]
+    for title, columns in tables.items():
+        lines += ["", f"## {title}", "", "| column | size | unit | frame | what it is |", "|---|---|---|---|---|"]
+        lines += [f"| `{name}` | {' | '.join(_cells(column))} |" for name, column in columns.items()]
+        several = {name: c.names for name, c in columns.items() if isinstance(c, Field) and len(c.names) > 1}
+        lines += ["", *(f"Numbers of `{name}`: {', '.join(names)}." for name, names in several.items())]
+    files = sorted(path for path in out.rglob("*") if path.is_file())
+    with to_write(out / "README.md", "w") as card:
+        card.write("\n".join(lines) + "\n")
+    with to_write(out / "croissant.json", "w") as croissant:
+        json.dump(_croissant(about, out, files, f"{summary}. {about.summary}", tables), croissant, indent=1)
+
+
+def _cells(column: Field | str) -> tuple[str, ...]:
+    if isinstance(column, str):
+        return ("", "", "", column)
+    return (str(len(column.names)), column.unit, column.frame, column.meaning)
+
+
+def _croissant(about: About, out: Path, files: list[Path], summary: str, tables: Mapping[str, Any]) -> dict[str, Any]:
+    """The same as JSON-LD; columns of Parquet files are named one by one."""
+    distribution = [
+        {
+            "@type": "cr:FileObject",
+            "@id": path.relative_to(out).as_posix(),
+            "name": path.relative_to(out).as_posix(),
+            "contentUrl": path.relative_to(out).as_posix(),
+            "encodingFormat": _TYPES[path.suffix],
+            "sha256": hashlib.sha256(path.read_bytes()).hexdigest(),
+        }
+        for path in files
+    ]
+    records = []
+    for pattern, columns in tables.items():
+        first = min(out.glob(pattern), default=None)
+        if first is None:
+            continue
+        name = pattern.removesuffix(".parquet").rstrip("/*")
+        schema = parquet.read_schema(first)
+        distribution.append(
+            {
+                "@type": "cr:FileSet",
+                "@id": name,
+                "name": name,
+                "encodingFormat": _TYPES[".parquet"],
+                "includes": pattern,
+            }
+        )
+        fields = [
+            {
+                "@type": "cr:Field",
+                "@id": f"{name}/{column}",
+                "name": column,
+                "description": "; ".join(filter(None, _cells(each)[1:])),
+                "dataType": _data_type(schema.field(column).type),
+                "repeated": hasattr(schema.field(column).type, "value_type"),
+                "source": {"fileSet": {"@id": name}, "extract": {"column": column}},
+            }
+            for column, each in columns.items()
+        ]
+        records.append({"@type": "cr:RecordSet", "@id": f"records/{name}", "name": name, "field": fields})
+    return {
+        "@context": {
+            "@language": "en",
+            "@vocab": "https://schema.org/",
+            "sc": "https://schema.org/",
+            "cr": _CROISSANT,
+            "rai": f"{_CROISSANT}RAI/",
+            "dct": "http://purl.org/dc/terms/",
+            "conformsTo": "dct:conformsTo",
+            "dataType": {"@id": "cr:dataType", "@type": "@vocab"},
+            **{name: {"@id": f"cr:{name}", "@type": "@json"} for name in ("data", "examples")},
+            **{name: f"cr:{name}" for name in _WORDS},
+        },
+        "@type": "sc:Dataset",
+        "conformsTo": f"{_CROISSANT}1.0",
+        "name": f"apo_bench_{about.name}",
+        "description": summary,
+        "license": _LICENCE_URL,
+        "creator": {"@type": "sc:Organization", "name": "The apo_bench authors"},
+        "version": __version__,
+        "distribution": distribution,
+        "recordSet": records,
+    }
+
+
+def _data_type(kind: Any) -> str:
+    """What schema.org calls a type of Arrow, of a list its entries."""
+    name = str(getattr(kind, "value_type", kind))
+    return next((told for begins, told in _DATA_TYPES.items() if name.startswith(begins)), "sc:Float")

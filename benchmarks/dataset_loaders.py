@@ -1,0 +1,133 @@
+"""Whether the loaders of others read what `apo-bench dataset make` writes: `python benchmarks/dataset_loaders.py`.
+
+Replays and insertions are made here in every format, and read in environments made for it by pip: by LeRobot (with
+`--python312`, since it needs Python 3.12 or later; its PyTorch is some 5 GB), by Minari, and by mlcroissant. Each says
+what it found, compared with what PyArrow or h5py read here. `--envs FOLDER` keeps the environments for the next time.
+Needs h5py: `pip install apo_bench[data]`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+MADE = {
+    "replays": ("block_on_block", "dovetail", "--episodes", "2", "--level", "2", "--method", "contact"),
+    "insertions": ("block_on_block", "--episodes", "2", "--record", "insertions"),
+}
+NEEDS = {"lerobot": ("lerobot[dataset]",), "minari": ("minari[hdf5]", "pillow", "mlcroissant[parquet]")}
+LEROBOT = """
+import sys
+from importlib.metadata import version
+from pathlib import Path
+import numpy as np, torch
+from pyarrow import parquet
+from lerobot.datasets.lerobot_dataset import LeRobotDataset
+root = Path(sys.argv[1])
+data = LeRobotDataset("apo_bench/data", root=root)
+table = parquet.read_table(root / "data")
+assert len(data) == table.num_rows
+for name in table.column_names:
+    here = np.array(table[name].to_pylist())
+    read = np.stack([np.asarray(data[i][name]) for i in range(len(data))])
+    assert np.array_equal(here.reshape(read.shape).astype(read.dtype), read), name
+assert set(data.meta.stats) == set(table.column_names) and {"q01", "q99"} <= set(data.meta.stats["action"])
+assert data.meta.tasks.iloc[0].name == data[0]["task"]
+times = {"observation.state": [-0.1, 0.0], "action": [0.0, 0.05]}
+first = LeRobotDataset("apo_bench/data", root=root, episodes=[1], delta_timestamps=times)[0]
+assert first["observation.state"].shape[0] == 2 and first["observation.state_is_pad"].tolist() == [True, False]
+right = LeRobotDataset("apo_bench/data", root=root, episode_filter=lambda episode: episode["success"])
+batch = next(iter(torch.utils.data.DataLoader(data, batch_size=8, shuffle=True)))
+print(f"LeRobot {version('lerobot')}: {data.num_episodes} episodes, {len(data)} frames, {right.num_episodes} right,",
+      f"batches of {tuple(batch['action'].shape)} actions")
+"""
+MINARI = """
+import json, os, sys
+from importlib.metadata import version
+from pathlib import Path
+import h5py, numpy as np, minari
+root = Path(sys.argv[1])
+name = json.loads((root / "data" / "metadata.json").read_text())["dataset_id"]
+os.environ["MINARI_DATASETS_PATH"] = str(root.parent / "minari-root")
+link = root.parent / "minari-root" / name
+link.parent.mkdir(parents=True, exist_ok=True)
+link.symlink_to(root)
+data = minari.load_dataset(name)
+file = h5py.File(root / "data" / "main_data.hdf5")
+steps = 0
+for e, episode in enumerate(data):
+    here = file[f"episode_{e}"]
+    assert np.array_equal(episode.actions, here["actions"]) and "EpisodeData" in repr(episode)
+    for key, seen in episode.observations.items():
+        assert np.array_equal(seen, here["observations"][key])
+    for k in range(len(episode) + 1):
+        assert data.observation_space.contains({key: seen[k] for key, seen in episode.observations.items()})
+    assert all(data.action_space.contains(action) for action in episode.actions)
+    steps += len(episode)
+assert steps == data.total_steps and len(data.sample_episodes(2)) == 2
+right = data.filter_episodes(lambda episode: bool(episode.infos["success"][-1]))
+print(f"Minari {version('minari')}: {data.total_episodes} episodes, {steps} steps, {right.total_episodes} right, of",
+      data.env_spec.id if data.env_spec else "no environment")
+"""
+CROISSANT = """
+import logging, sys
+from importlib.metadata import version
+import mlcroissant
+logging.disable(logging.WARNING)
+data = mlcroissant.Dataset(jsonld=f"{sys.argv[1]}/croissant.json")
+read = [f"{sum(1 for _ in data.records(each.id))} of {each.id}" for each in data.metadata.record_sets]
+print(f"mlcroissant {version('mlcroissant')}: {len(data.metadata.distribution)} files and sets;", *read)
+"""
+
+
+def environment(folder: Path, python: str, needs: tuple[str, ...]) -> Path:
+    """The Python of an environment with these packages, made if it is not there."""
+    made = folder / "bin" / "python"
+    if not made.exists():
+        subprocess.run([python, "-m", "venv", str(folder)], check=True)
+        subprocess.run([made, "-m", "pip", "--quiet", "install", "--upgrade", "pip"], check=True)
+        subprocess.run([made, "-m", "pip", "--quiet", "install", *needs], check=True)
+    return made
+
+
+def reads(python: Path, program: str, folder: Path) -> None:
+    """Print what a loader says; end this program if it fails."""
+    alone = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    alone |= {"HF_HUB_OFFLINE": "1", "HF_HOME": str(folder.parent / "hub")}
+    done = subprocess.run([python, "-c", program, str(folder)], env=alone, capture_output=True, text=True)
+    if done.returncode:
+        sys.exit(f"{folder.name} was not read:\n{done.stderr[-2000:]}")
+    print(f"  {done.stdout.strip()}", flush=True)
+
+
+def main() -> None:
+    asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    asked.add_argument("--envs", type=Path, help="a folder where environments are kept")
+    asked.add_argument("--python312", default="python3.12", help="Python 3.12 or later, for LeRobot")
+    given = asked.parse_args()
+    with tempfile.TemporaryDirectory() as scratch:
+        here = Path(scratch)
+        envs = (given.envs or here).resolve()
+        others = environment(envs / "minari", sys.executable, NEEDS["minari"])
+        lerobot = environment(envs / "lerobot", given.python312, NEEDS["lerobot"])
+        for what, words in MADE.items():
+            for form in ("parquet", "lerobot", "minari"):
+                if (form, what) == ("parquet", "insertions"):
+                    continue
+                out = here / f"{what}-{form}"
+                make = (sys.executable, "-m", "apo_bench", "dataset", "make", *words, "--format", form, "--out", out)
+                subprocess.run(make, check=True, stdout=subprocess.DEVNULL)
+                print(f"{what}, {form}:", flush=True)
+                if form == "lerobot":
+                    reads(lerobot, LEROBOT, out)
+                if form == "minari":
+                    reads(others, MINARI, out)
+                reads(others, CROISSANT, out)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,27 @@
+"""Policies of APOInsert-v0: the teacher brings the part where it has to go, and knows more than the robot to do so."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from apo_bench import TrialSettings
+from apo_bench.envs.policies import expert, insert_env, straight
+
+
+def test_the_teacher_goes_where_the_part_really_has_to_go() -> None:
+    env = insert_env(TrialSettings("stick_in_tower", method="contact-robust", level_mm=1.0, level_deg=1.0))
+    aside = {}
+    for policy in (straight, expert):
+        seen, _ = env.reset(options={"trial": 3})
+        first = env.off
+        for _ in range(8):
+            seen, *_ = env.step(np.float32(policy(env, seen)))
+        aside[policy] = np.linalg.norm(env.off[:2])
+        assert first[2] < env.off[2] < 0.0
+    assert aside[straight] > 0.2e-3
+    assert aside[expert] < 0.3 * aside[straight]
+
+
+def test_a_robot_that_is_right_by_its_settings_gets_the_usual_error_of_the_environment() -> None:
+    wrong = {error: insert_env(TrialSettings("block_on_block", robot_error=error)).spec for error in ("none", "tool:1")}
+    assert [spec.kwargs["robot_error"] for spec in wrong.values() if spec] == ["hand_eye:0.5/0.1", "tool:1"]
