@@ -13,7 +13,6 @@ from apo_bench.datasets.rollout import FPS, About, Field
 from apo_bench.io.ordinary_files import to_write
 
 LICENCE = "Apache-2.0"
-_LICENCE_URL = "https://spdx.org/licenses/Apache-2.0"
 _TYPES = {".parquet": "application/x-parquet", ".json": "application/json", ".hdf5": "application/x-hdf5"}
 _CROISSANT = "http://mlcommons.org/croissant/"
 _WORDS = (
@@ -119,7 +118,7 @@ def _croissant(about: About, out: Path, files: list[Path], summary: str, tables:
         "conformsTo": f"{_CROISSANT}1.0",
         "name": f"apo_bench_{about.name}",
         "description": summary,
-        "license": _LICENCE_URL,
+        "license": f"https://spdx.org/licenses/{LICENCE}",
         "creator": {"@type": "sc:Organization", "name": "The apo_bench authors"},
         "version": __version__,
         "distribution": distribution,

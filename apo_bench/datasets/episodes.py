@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.assembly import Plan
 from apo_bench.datasets.card import write_card
-from apo_bench.datasets.rollout import FPS, About, Field, Rollout, in_words
+from apo_bench.datasets.rollout import FPS, About, Field, Rollout
 from apo_bench.geometry import Array, pose
 from apo_bench.io.tables import write_columns
 from apo_bench.records import Row, TrialSettings
@@ -185,7 +185,7 @@ def write_parquet(found: Iterable[Replay], about: About, out: Path) -> tuple[int
         n = len(frames.get("t_s", ()))
         episodes.append({"episode": k, **episode, "frames": n})
         if n:
-            columns = [[k] * n, *(list(map(_plain, column)) for column in frames.values())]
+            columns = [[k] * n, *(x.tolist() if isinstance(x, np.ndarray) else x for x in frames.values())]
             write_columns([*FRAMES], columns, out / "frames" / f"{k:06}.parquet")
     write_columns([*EPISODES], [[each[name] for each in episodes] for name in EPISODES], out / "episodes.parquet")
     counted = len(episodes), sum(bool(each["success"]) for each in episodes)
@@ -242,7 +242,7 @@ def replay_rollouts(found: Iterable[Replay], about: About, say: Callable[[str], 
         rewards[-1] = float(episode["success"])
         yield Rollout(
             seed=episode["seed"],
-            task=f"Repeat an assembly that was shown: {in_words(scene.scenario.title)}.",
+            task=f"{scene.scenario.title}: repeat what was shown.",
             observations={
                 "state": np.hstack([frames["joints"], frames["fingers"]]),
                 "wrench": frames["wrench"],
@@ -276,7 +276,3 @@ def _episode(
 
 def _flat(poses: Array) -> list[float]:
     return [float(x) for x in pose.pack(poses).ravel()]
-
-
-def _plain(x: Any) -> Any:
-    return x.tolist() if isinstance(x, np.ndarray | np.generic) else x

@@ -6,18 +6,17 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.datasets.rollout import About, Field, Rollout, in_words
+from apo_bench.datasets.rollout import About, Field, Rollout
 from apo_bench.envs.policies import POLICIES, insert_env
 from apo_bench.errors import InputError
 from apo_bench.names import resolve
 from apo_bench.records import TrialSettings
 
 _FRAME = "way in"
-_AXES = ("x", "y", "z", "rx", "ry", "rz")
 
 
 def _named(*kinds: str) -> tuple[str, ...]:
-    return tuple(f"{kind}_{axis}" for kind in kinds for axis in _AXES)
+    return tuple(f"{kind}_{axis}" for kind in kinds for axis in ("x", "y", "z", "rx", "ry", "rz"))
 
 
 _FIELDS: Mapping[str, Field] = MappingProxyType(
@@ -72,7 +71,6 @@ def insertions(
     env = insert_env(trials[0])
     boxes = {**dict(env.observation_space.items()), "action": env.action_space}  # type: ignore[attr-defined]
     fields = {name: _FIELDS[name]._replace(most=tuple(box.high.tolist())) for name, box in boxes.items()}
-    only = len({each.scenario for each in trials}) == 1
     about = About(
         name="insertions",
         summary="A robot holds a part before its mouth and is led by a policy until it lets go, in `APOInsert-v0` of "
@@ -82,7 +80,7 @@ def insertions(
         fields=fields,
         episodes=_OF_EPISODE,
         robot=trials[0].arm,
-        env_spec=env.spec.to_json() if only and env.spec is not None else None,
+        env_spec=env.spec.to_json() if env.spec and len({each.scenario for each in trials}) == 1 else None,
     )
     return about, _rollouts(trials, policy, act, say)
 
@@ -108,7 +106,7 @@ def _rollouts(trials: Iterable[TrialSettings], policy: str, act: Any, say: Calla
         told = {"scenario": scenario.name, "operation": k, "policy": policy}
         yield Rollout(
             seed=trial.seed,
-            task=f"Insert the part in the hand, the last of: {in_words(scenario.title)}.",
+            task=f"{scenario.title}: insert the part in the hand, the last one.",
             observations={name: np.array([each[name] for each in sights]) for name in seen},
             actions=np.array(actions),
             rewards=np.array(rewards),

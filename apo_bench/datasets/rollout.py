@@ -60,8 +60,3 @@ class About:
     robot: str
     env_spec: str | None = None
     """Of the environment, as Gymnasium writes it."""
-
-
-def in_words(title: str) -> str:
-    """A title inside a sentence."""
-    return title[:1].lower() + title[1:]

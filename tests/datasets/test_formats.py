@@ -88,7 +88,7 @@ def test_lerobot_has_statistics_of_every_feature_and_tasks_by_their_words(lerobo
     assert json.loads(schema.metadata[b"pandas"])["index_columns"] == ["task"]
     tasks = parquet.read_table(root / "meta" / "tasks.parquet").to_pylist()
     assert [task["task_index"] for task in tasks] == [0, 1]
-    assert tasks[0]["task"] == "Repeat an assembly that was shown: a block on a block."
+    assert tasks[0]["task"] == "A block on a block: repeat what was shown."
 
 
 def test_minari_finds_what_was_seen_around_every_action(minari: dict[str, Path], lerobot: dict[str, Path]) -> None:
