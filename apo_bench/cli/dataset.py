@@ -19,7 +19,6 @@ dataset = typer.Typer(
 )
 _FIRST_SEED = 1_000_000
 """Seeds below are for what is reported."""
-_RECORDS = ("replays", "insertions")
 
 
 @dataset.callback(invoke_without_command=True)
@@ -48,7 +47,7 @@ def dataset_make(
     from apo_bench.scenario.file import load_scenario
     from apo_bench.trial.request import Request, requested_settings
 
-    require(record in _RECORDS, f"--record {record} was given; {' or '.join(_RECORDS)} is allowed.")
+    require(record in ("replays", "insertions"), f"--record {record} was given; replays or insertions is allowed.")
     require(episodes >= 1, f"--episodes {episodes} was given; a whole number from 1 is allowed.")
     options["seed"] = seed
     asked = [Request(scenario=name, options=options) for name in (scenario, *(more or ()))]

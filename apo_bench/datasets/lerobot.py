@@ -24,7 +24,6 @@ from apo_bench.io.tables import write_columns
 _PLACE = "chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _CHUNK = 1000
 """Files of a folder."""
-_FILE_MB = 100
 _FRAMES_OF_A_FILE = 200_000
 """Some 60 MB."""
 _QUANTILES = (0.01, 0.10, 0.50, 0.90, 0.99)
@@ -153,8 +152,8 @@ def _write_meta(
         "total_frames": frames,
         "total_tasks": len(tasks),
         "chunks_size": _CHUNK,
-        "data_files_size_in_mb": _FILE_MB,
-        "video_files_size_in_mb": 2 * _FILE_MB,
+        "data_files_size_in_mb": 100,
+        "video_files_size_in_mb": 200,
         "fps": FPS,
         "splits": {"train": f"0:{len(episodes)}"},
         "data_path": f"data/{_PLACE}",

@@ -17,8 +17,6 @@ from apo_bench.datasets.rollout import About, Field, Rollout
 from apo_bench.errors import InputError
 from apo_bench.io.ordinary_files import to_write
 
-_VERSION = "0.5.4"
-"""Of Minari, whose format this is."""
 _OWN = {
     "rewards": "reward of each action",
     "terminations": "whether the episode is over after the action",
@@ -59,7 +57,7 @@ def write_minari(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple[
         "jpeg_encoding": False,
         "observation_space": json.dumps({"type": "Dict", "subspaces": {n: _box(f) for n, f in about.fields.items()}}),
         "action_space": json.dumps(_box(about.action)),
-        "minari_version": _VERSION,
+        "minari_version": "0.5.4",  # whose format this is
         "algorithm_name": about.command,
         "author": ["The apo_bench authors"],
         "description": about.summary,

@@ -53,19 +53,14 @@ class Begun:
         return np.asarray(self.covariances[self.start.operation])
 
     def off(self, control: TipControl) -> Array:
-        """By how much the part is off where it has to go, (6,), as `TipControl.off`.
-
-        Where its neighbours are now, its goal is with them; of several, the mean.
-        """
+        """By how much the part is off where its neighbours, as they stand now, want it; as `TipControl.off`."""
         assembly = self.plan.assembly
         k = self.start.operation
         main = assembly.operations[k].main
-        placed = {assembly.operations[i].main: self.goals[i] for i in range(k)}
-        true = {**self.start.parts, **placed}
+        true = {**self.start.parts, **{assembly.operations[i].main: self.goals[i] for i in range(k)}}
         now = control.poses()
         besides = sorted({of.part for contact in assembly.operations[k].contacts for of in contact} - {main})
-        goals = [now[part] @ pose.inverse(true[part]) @ self.goals[k] for part in besides] or [self.goals[k]]
-        return np.mean([control.off(goal) for goal in goals], axis=0)
+        return control.off([now[part] @ pose.inverse(true[part]) @ self.goals[k] for part in besides])
 
 
 class Trials(NamedTuple):

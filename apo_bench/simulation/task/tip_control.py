@@ -5,7 +5,7 @@ wrist; nothing here reads where a part is.
 """
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import NamedTuple, final
 
@@ -157,16 +157,23 @@ class TipControl:
         J = np.block([[R, -R @ pose.hat(front)], [np.zeros((3, 3)), R]])
         return np.asarray(np.sqrt(np.diag(J @ covariance @ J.T)))
 
-    def off(self, T_world_goal: Array) -> Array:
-        """By how much the front of the part, and its turn, are off where the part is at a pose, (6,), [m, rad].
+    def off(self, goals: Sequence[Array]) -> Array:
+        """By how much the front of the part, and its turn, are off the lines to such poses of it, (6,), [m, rad].
 
-        In the frame of the way in; the third number is less than 0 before it. For whoever watches, as `poses`.
+        The mean, in the frame of the way in; the third number is less than 0 before the end. For whoever watches, as
+        `poses`.
         """
-        T = part_pose(self.robot.scene.work, self.robot.data, self.start.transfer.part)
-        front = np.zeros(3) if self.start.transfer.front is None else self.start.transfer.front
-        shift = pose.apply(T, front[None])[0] - pose.apply(T_world_goal, front[None])[0]
-        turn = pose.log(pose.rigid(T[:3, :3] @ T_world_goal[:3, :3].T, np.zeros(3)))[3:]
-        return np.concatenate([shift @ self._R, turn @ self._R])
+        t = self.start.transfer
+        T = part_pose(self.robot.scene.work, self.robot.data, t.part)
+        front = np.zeros((1, 3)) if t.front is None else t.front[None]
+        found = []
+        for goal in goals:
+            way = goal[:3, :3] @ t.T_world_goal[:3, :3].T @ t.into.way
+            far = pose.apply(T, front)[0] - pose.apply(goal, front)[0]
+            turn = pose.log(pose.rigid(T[:3, :3] @ goal[:3, :3].T, np.zeros(3)))[3:]
+            across = (far - (far @ way) * way) @ self._R
+            found.append([*across[:2], far @ way, *turn @ self._R])
+        return np.asarray(np.mean(found, axis=0))
 
     def poses(self) -> Poses:
         """Where all parts are, (4, 4) each, world: for whoever watches, nothing is decided by it."""
