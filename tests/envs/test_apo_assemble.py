@@ -13,7 +13,6 @@ from gymnasium.utils.env_checker import check_env
 from apo_bench.envs.apo_assemble import APOAssemble
 
 STILL = np.zeros(7, dtype=np.float32)
-AWAY = np.array([1, 1, 0, 0, 0, 0, 0], dtype=np.float32)
 OPEN = np.array([0, 0, 0, 0, 0, 0, 1], dtype=np.float32)
 
 
@@ -48,16 +47,15 @@ def test_where_nothing_is_wrong_the_approach_alone_assembles_all_and_so_does_a_c
     assert whole_episode(env, 3, copied=True) == (done, won, info)
 
 
-def test_what_is_put_beside_its_place_is_not_right() -> None:
-    env = APOAssemble(scenario="block_on_block", corrector="oracle", robot_error="none", residual=False)
+def test_the_last_part_dropped_before_its_mouth_makes_the_whole_wrong() -> None:
+    env = APOAssemble(corrector="oracle", robot_error="none")
     seen, _ = env.reset(options={"trial": 3})
-    over, steps = False, 0
+    over = False
     while not over:
-        aside = seen["operation"][1] == 1.0 and np.abs(seen["agent_pos"][0]) < 14.0
-        seen, reward, over, _, info = env.step(AWAY if aside else OPEN)
-        steps += 1
-    assert steps > 10
-    assert (reward, info["success"]) == (0.0, False)
+        last = seen["operation"][2] == 1.0
+        seen, reward, over, _, info = env.step(OPEN if last else STILL)
+    assert last
+    assert (reward, info["success"], info["code"]) == (0.0, False, "overlap")
 
 
 def test_settings_that_are_of_one_operation_alone_are_not_taken() -> None:
