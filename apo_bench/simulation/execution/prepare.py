@@ -2,7 +2,6 @@
 moves, and nothing else.
 """
 
-from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -248,25 +247,13 @@ def key_angles(transfer: Transfer, scene: Scene) -> KeyAngles:
         q = there
         before = T
         reached.append(q)
-    if len(reached) == len(taken + put) and scene.arm.hand is not None and len(transfer.grips) == 1:
-        reached = reached[: _led_to(scene, taken + put, len(taken), reached[0])]
+    if len(reached) == len(taken + put) and scene.arm.hand is not None:
+        # What is held goes through the air from the last of the first to the first of the others.
+        k = len(taken)
+        way = way_there(scene.kinematics, scene.arm, taken[-1], put[0], reached[k - 1])
+        if led_there(scene.kinematics, taken[-1], way, reached[k - 1]) is None:
+            reached = reached[:k]
     if len(reached) == len(taken + put):
         return KeyAngles("", tuple(reached), q)
     code = "unreachable_start" if len(reached) < len(taken) else "unreachable"
     return KeyAngles(code, tuple(reached), scene.kinematics.last)
-
-
-def _led_to(scene: Scene, poses: Sequence[Array], carried: int, q: Array) -> int:
-    """How many tip poses straight lines lead to, one after the other; to one of them what is held goes through the air.
-
-    Args:
-        carried: The number of that one.
-        q: (joints,), at the first.
-    """
-    for i in range(1, len(poses)):
-        way = way_there(scene.kinematics, scene.arm, poses[i - 1], poses[i], q) if i == carried else (poses[i],)
-        led = led_there(scene.kinematics, poses[i - 1], way, q)
-        if led is None:
-            return i
-        q = led
-    return len(poses)
