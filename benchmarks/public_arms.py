@@ -52,6 +52,8 @@ MENAGERIE = (
     "franka_emika_panda",
     "trossen_wx250s",
     "unitree_z1",
+    "robotstudio_so101",
+    "trs_so_arm100",
 )
 LAYOUTS = 3
 SAID = """\
@@ -62,6 +64,8 @@ SAID = """\
 Written by `python benchmarks/public_arms.py MENAGERIE --trials N`: every arm with what its files say and nothing else,
 and the 2F-85 of Menagerie where it has no gripper. The check is `arm check` and what is foretold of trials: `yes` where
 nothing but payload, speeds and torques is missing. `oracle` at zero noise with a careful human, `--fidelity contact`.
+`reactorx200`, an arm of five joints, is not of Menagerie: its file names the model of the repository
+[uncore-team/reactorx200](https://github.com/uncore-team/reactorx200), and nothing else.
 """
 QUIET = ("no payload", "no speed", "the torque of a joint")
 

@@ -19,7 +19,8 @@ import trimesh
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.drafting.checking import check_file
-from apo_bench.drafting.posed import PosedPart, import_assembly, read_posed
+from apo_bench.drafting.from_cad import import_assembly
+from apo_bench.drafting.posed import PosedPart, read_posed
 from apo_bench.drafting.upright import drafted
 from apo_bench.drafting.writing import write_scenario
 from apo_bench.errors import InputError
@@ -249,11 +250,11 @@ def drawn(seed: int = _SEED) -> Iterator[tuple[str, Bodies]]:
         yield name, make(np.random.default_rng((seed, k)))
 
 
-def imported(body: str, mesh: Mesh, folder: Path) -> tuple[PosedPart, ...]:
-    file = folder / f"{body}.stl"
-    file.write_bytes(mesh.export(file_type="stl"))
-    poses, _ = import_assembly(file, folder / body, "mm", fewest=1)
-    return read_posed(poses, fewest=1)
+def imported(bodies: Bodies, folder: Path) -> tuple[PosedPart, ...]:
+    files = [folder / f"{body}.stl" for body in bodies]
+    for file, mesh in zip(files, bodies.values(), strict=True):
+        file.write_bytes(mesh.export(file_type="stl"))
+    return read_posed(import_assembly(files, folder / "parts", "mm")[0])
 
 
 def tried(name: str, bodies: Bodies, out: Path, seeds: int, fidelity: str) -> Became:
@@ -263,8 +264,7 @@ def tried(name: str, bodies: Bodies, out: Path, seeds: int, fidelity: str) -> Be
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / f"{stem}.toml"
     try:
-        parts = [each for body, mesh in bodies.items() for each in imported(body, mesh, folder)]
-        made = drafted(parts)
+        made = drafted(imported(bodies, folder))
         write_scenario(made, path, name, "STL files")
     except (InputError, RuntimeError) as error:
         return Became(False, 0, 0, (str(error),))

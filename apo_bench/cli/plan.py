@@ -6,6 +6,7 @@ Only `plan --arm` and `scene` need a simulator.
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 import typer
 
 from apo_bench.assembly import Plan
@@ -15,6 +16,7 @@ from apo_bench.cli.setting_options import AsJson, ScenarioArgument, StatedDeg, S
 from apo_bench.errors import InputError
 from apo_bench.files.deviations import assumed_deviations
 from apo_bench.files.robot_frames import RobotFrames
+from apo_bench.geometry import Array
 from apo_bench.io.processes import redirect_output
 from apo_bench.records import CORRECTOR
 from apo_bench.scenario.scenario import Scenario
@@ -87,7 +89,9 @@ def plan_command(
     ] = None,
     frames: Annotated[
         Path | None,
-        typer.Option(help="Base, flange, order of quaternions of --robot: .toml; default: world, tip, xyzw."),
+        typer.Option(
+            help="Base, flange, order of quaternions of --robot: .toml; default: world or the base of --arm, tip, xyzw."
+        ),
     ] = None,
     acts: Annotated[
         str | None,
@@ -134,6 +138,8 @@ def plan_command(
         from apo_bench.trial.planning import arm_sentence
 
         notes.append(arm_sentence(loaded, None if observation is None else plan, arm))
+        if frames is None:
+            robot_frames = RobotFrames(_base_of(arm))
     lines = plan_lines(plan, loaded)
     if robot is not None:
         form = robot_form(lines, plan, loaded, robot_frames, notes)
@@ -150,6 +156,15 @@ def plan_command(
     typer.echo("\n".join([*plan_text(lines), *([""] if notes else []), *notes]))
     if robot is not None:
         typer.echo(f"\nWrote {robot}")
+
+
+def _base_of(arm: str) -> Array:
+    """Where an arm stands, (4, 4), world, [m]."""
+    from apo_bench.geometry import pose
+    from apo_bench.simulation.arms.finding import find_arm
+
+    found = find_arm(arm)
+    return pose.unpack(np.array([*found.base, *found.turn]))
 
 
 def _acts_form(scenario: Scenario, plan: Plan, frames: RobotFrames, sensor: str, arm: str | None) -> dict[str, Any]:

@@ -53,7 +53,9 @@ def scenarios_command(
 
 @scenario.command("new")
 def scenario_new(
-    more: Annotated[list[str] | None, typer.Argument(metavar="[PART]...", help="Further parts, after --parts.")] = None,
+    more: Annotated[
+        list[str] | None, typer.Argument(metavar="[PART]...", help="Further files, after --parts or --assembly.")
+    ] = None,
     *,
     out: Annotated[Path, typer.Option(help="The scenario file to write, .toml.", parser=path_given)],
     poses: Annotated[
@@ -63,8 +65,8 @@ def scenario_new(
         list[str] | None, typer.Option(help="Part files; default: as named in --poses, beside it.")
     ] = None,
     assembly: Annotated[
-        Path | None,
-        typer.Option(help="A CAD file of several solids, in place of --parts and --poses.", parser=path_given),
+        list[str] | None,
+        typer.Option(help="A CAD file of several solids, or several in one frame, in place of --parts and --poses."),
     ] = None,
     unit: Annotated[str | None, typer.Option(help="Of --assembly, as in `part import`.")] = None,
     up: Annotated[
@@ -74,6 +76,9 @@ def scenario_new(
     fixed: Annotated[
         list[str] | None,
         typer.Option(help="A part that is never moved; may be given again. Default: the largest of the lowest."),
+    ] = None,
+    order: Annotated[
+        str | None, typer.Option(help="In which order parts are put, with commas. Default: an order that works.")
     ] = None,
     clearance: Annotated[float, typer.Option(help="Room per side of faces marked as fit, mm.")] = 0.25,
     loosen: Annotated[
@@ -98,16 +103,18 @@ def scenario_new(
         raise InputError(f"--clearance {clearance:g} was given; 0 to 5 mm are allowed.")
     if not 0.0 <= loosen <= 1.0:
         raise InputError(f"--loosen {loosen:g} was given; 0 to 1 mm are allowed.")
-    named = [*(parts or []), *(more or [])]
-    if assembly is not None:
-        if poses is not None or named:
+    named = [*(assembly or parts or []), *(more or [])]
+    source = ", ".join(Path(each).name for each in named) if assembly else "" if poses is None else poses.name
+    if assembly:
+        if poses is not None or parts:
             raise InputError("--assembly was given with --parts or --poses; give one or the other.")
-        poses, lines = import_assembly(assembly, out.with_name(f"{out.stem}_parts"), unit)
+        files, named = [path_given(each) for each in named], []
+        poses, lines = import_assembly(files, out.with_name(f"{out.stem}_parts"), unit)
         typer.echo("\n".join([*lines, f"Wrote {poses} and its parts"]))
     elif poses is None:
         raise InputError("neither --assembly nor --poses was given; say where the parts are in the end.")
-    made = drafted(read_posed(poses, named), up, fixed or (), clearance, loosen)
-    source = str((assembly or poses).name)
+    asked = [each.strip() for each in order.split(",")] if order else []
+    made = drafted(read_posed(poses, named), up, fixed or (), clearance, loosen, asked)
     write_scenario(made, out, f"Assembly of {out.stem}", source)
     typer.echo("\n".join(draft_lines(made)))
     load_scenario(out)

@@ -21,6 +21,8 @@ from apo_bench.scenario.scenario import Grasp, Site
 
 _OPENING_M = 0.046
 """How far each finger of the arm that comes with the benchmark opens."""
+_PLAY_M = 5e-4
+"""Flat walls that are so far apart fit."""
 _LOW_M = 1e-4
 _GROUP_ROOM_M = 0.05
 _FARTHEST_ASIDE_M = 0.26
@@ -57,18 +59,24 @@ class NoOrder(RuntimeError):
 
 
 def draft(
-    parts: Sequence[PosedPart], fixed: Sequence[str] = (), clearance_mm: float = 0.25, *, turned: bool = False
+    parts: Sequence[PosedPart],
+    fixed: Sequence[str] = (),
+    clearance_mm: float = 0.25,
+    asked: Sequence[str] = (),
+    *,
+    turned: bool = False,
 ) -> Draft:
     """Make a scenario of parts that stand on the table as `on_the_table` puts them.
 
     Args:
         fixed: Parts that stay where they are; none: the largest of those that lie lowest.
         clearance_mm: Room per side of faces that their part files mark as fit.
+        asked: The parts that are moved, in the order in which they are put; none: any order.
         turned: Whether they stand as they shall; else they may be turned by quarters about the vertical, so that a hand
             that has to be tilted leans towards its arm.
 
     Raises:
-        InputError: No part has that name, or there is no room on the table.
+        InputError: No part has that name, there is no room on the table, or they cannot be put in the order asked for.
         RuntimeError: Parts are inside each other.
         NoOrder: There is no order in which they can be put together.
     """
@@ -94,12 +102,24 @@ def draft(
             for contact, opposite in walls_without_play(solids, poses, contacts)
         ),
     ]
+    apart = set(found_contacts(solids, poses, _PLAY_M)) - {*contacts, *dropped}
+    notes += [
+        f"'{contact}' and '{opposite}' have play as drawn, so they are no contacts and correct nothing; draw them line "
+        "to line, and they touch, and get their play from --loosen"
+        for contact, opposite in walls_without_play(solids, poses, sorted(apart))
+    ]
     reach = reach_of(solids, poses, [each.name for each in parts])
     aside = np.array([-min(2.0 * reach + _GROUP_ROOM_M, _FARTHEST_ASIDE_M), 0.0, 0.0])
-    search = OrderSearch(solids, poses, contacts, aside)
+    search = OrderSearch(solids, poses, contacts, aside, asked=asked)
     order = search.order(frozenset(base))
     if order is None:
         raise NoOrder("; ".join(["there is no order in which these parts can be put together", *search.stuck()]) + ".")
+    mains = [placing.moves[0] for placing in order]
+    if asked and mains != list(asked):
+        raise InputError(
+            f"in the order {', '.join(asked)} these parts cannot be put together; {', '.join(mains)} can be: name "
+            "every part once that is not fixed, what is put into another one behind it."
+        )
     # Where assemblies may stand is kept free: the assembly, and a sub-assembly that is put together beside it.
     is_beside = any(np.linalg.norm(placing.at - poses[placing.moves[0]]) > _LOW_M for placing in order)
     site = site_of(reach, is_beside)
@@ -127,7 +147,7 @@ def draft(
     quarters = 0 if turned else _quarters(poses, found)
     if quarters:
         T = pose.at(np.zeros(3), (0.0, 0.0, 90.0 * quarters))
-        return draft([replace(each, T=T @ each.T) for each in parts], fixed, clearance_mm, turned=True)
+        return draft([replace(each, T=T @ each.T) for each in parts], fixed, clearance_mm, asked, turned=True)
     unfit = tuple(_unfit(solids, turns, found))
     return Draft(
         tuple(replace(each, T=poses[each.name]) for each in parts),

@@ -30,24 +30,31 @@ class ImportedSolid(NamedTuple):
     """What is to be known of it, one sentence each."""
 
 
-def import_assembly(file: Path, folder: Path, unit: str | None = None) -> tuple[Path, tuple[str, ...]]:
-    """Write the parts of an assembly, each shape once, and where every copy of them is.
+def import_assembly(files: Sequence[Path], folder: Path, unit: str | None = None) -> tuple[Path, tuple[str, ...]]:
+    """Write the parts of an assembly, each shape of a file once, and where every copy of them is.
+
+    Args:
+        files: One of several solids, or several that were drawn in one frame.
 
     Returns:
         The file of poses, and what was imported, one sentence each.
 
     Raises:
-        InputError: The file cannot be read, a solid makes no part, or there is one alone.
+        InputError: A file cannot be read, a solid makes no part, or there is one alone.
     """
-    raws = solids_at(file, unit)
-    if sum(len(raw.places) for raw in raws) < 2:
-        raise InputError(f"{file}: the file holds one solid; an assembly of at least two is needed.")
+    found = [(file.name, raw) for file in files for raw in solids_at(file, unit)]
+    if sum(len(raw.places) for _, raw in found) < 2:
+        raise InputError(
+            f"{files[0]}: the file holds one solid; an assembly of at least two is needed, in this file or in further "
+            "ones."
+        )
     parts: dict[str, ImportedSolid] = {}
-    for raw, others in zip(raws, coming_near(raws), strict=True):
-        part = import_solid(raw, others, folder, file.name, parts)
+    for (source, raw), others in zip(found, coming_near([raw for _, raw in found]), strict=True):
+        part = import_solid(raw, others, folder, source, parts)
         parts[part.name] = part
     copies = named_places({name: part.places for name, part in parts.items()})
-    return write_places(copies, folder, file.name), tuple(said for part in parts.values() for said in part.said)
+    sources = ", ".join(file.name for file in files)
+    return write_places(copies, folder, sources), tuple(said for part in parts.values() for said in part.said)
 
 
 def solids_at(file: Path, unit: str | None = None, places: Sequence[Array] = (np.eye(4),)) -> list[RawSolid]:

@@ -71,6 +71,8 @@ class OrderSearch:
     contacts: tuple[Contact, ...]
     aside: Array
     """(3,): where a sub-assembly is put together, from its place in the assembly, level, [m]."""
+    asked: Sequence[str] = ()
+    """Parts in the order in which they are to be put, where that can be."""
     failed: set[frozenset[str]] = field(default_factory=set)
     reasons: dict[str, Why] = field(default_factory=dict)
     """Part -> why it could not go, where it passed most tests; of these, where fewest others were there."""
@@ -130,6 +132,7 @@ class OrderSearch:
         part = placing.moves[0]
         low, _ = extent(self.solids[part].pieces, self.poses[part][2, :3])
         return (
+            -self.asked.index(part) if part in self.asked else 0,
             "from above" not in placing.why,
             -round(low + float(self.poses[part][2, 3]), 4),
             self.solids[part].volume,

@@ -34,12 +34,12 @@ _THREAD_M = 2.5e-3
 """A shaft that is so much thicker than the hole around it is pressed in, or has a thread."""
 
 
-def found_contacts(solids: Mapping[str, Solid], poses: Poses) -> tuple[Contact, ...]:
-    """Every pair of faces of different parts that touch, in the order of the parts."""
+def found_contacts(solids: Mapping[str, Solid], poses: Poses, gap_m: float = NEAR_M) -> tuple[Contact, ...]:
+    """Every pair of faces of different parts that touch, or are no farther apart, in the order of the parts."""
     return tuple(
         Contact(PartFace(a, each.a), PartFace(b, each.b))
         for a, b in combinations(solids, 2)
-        for each in facing(solids[a], poses[a], solids[b], poses[b], gap_m=NEAR_M, angle_rad=NEAR_RAD, share=SHARE)
+        for each in facing(solids[a], poses[a], solids[b], poses[b], gap_m=gap_m, angle_rad=NEAR_RAD, share=SHARE)
     )
 
 

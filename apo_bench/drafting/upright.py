@@ -19,6 +19,7 @@ def drafted(
     fixed: Sequence[str] = (),
     clearance_mm: float = 0.25,
     loosen_mm: float = LOOSEN_MM,
+    asked: Sequence[str] = (),
 ) -> Draft:
     """The draft of an assembly, with an axis of its poses up.
 
@@ -26,6 +27,7 @@ def drafted(
         up: An axis of `posed.UPS`; None: z, unless parts then find no order, do not stand, or cannot be held, and
             another axis is better.
         loosen_mm: Parts without play are given some where they are no deeper in each other; 0: none are.
+        asked: The parts that are moved, in the order in which they are put; none: any order.
 
     Raises:
         InputError: No part has that name, or there is no room on the table.
@@ -36,7 +38,7 @@ def drafted(
     failed: dict[str, NoOrder | InputError] = {}
     for axis in (up,) if up else _FIRST:
         try:
-            tried[axis] = _on_a_base(on_the_table(parts, axis), fixed, clearance_mm)
+            tried[axis] = _on_a_base(on_the_table(parts, axis), fixed, clearance_mm, asked)
         except (NoOrder, InputError) as error:
             failed[axis] = error
         else:
@@ -53,13 +55,13 @@ def drafted(
     return replace(tried[best], up=f"{best}, as with z up {why}")
 
 
-def _on_a_base(parts: Sequence[PosedPart], fixed: Sequence[str], clearance_mm: float) -> Draft:
+def _on_a_base(parts: Sequence[PosedPart], fixed: Sequence[str], clearance_mm: float, asked: Sequence[str]) -> Draft:
     """The draft on what is fixed, or on the largest of the parts that lie lowest with which there is an order."""
     try:
-        return draft(parts, fixed, clearance_mm)
+        return draft(parts, fixed, clearance_mm, asked)
     except NoOrder:
         for base in () if fixed else lowest(parts)[1:_MOST_BASES]:
             with suppress(NoOrder):
-                made = draft(parts, (base,), clearance_mm)
+                made = draft(parts, (base,), clearance_mm, asked)
                 return replace(made, why_fixed="it lies lowest; with larger ones that do there is no order")
         raise

@@ -107,11 +107,18 @@ def order_of(assembly: Assembly, stays: Stays, start: Poses, T_world_camera: Arr
 
     best = _choices(assembly, stays, worth, unseen)
     if not best:
+        seen = sorted((part for part in stays if len(stays[part]) > 1), key=lambda part: stays[part][-1].begins)
+        other = set(seen) == set(last) and seen != sorted(last, key=last.__getitem__)
         raise NoOrder(
             f"the moves of the log ({moves_text(stays)}) are not the operations of the scenario "
-            f"({', '.join(operation.main for operation in assembly.operations)}); check the ids in the objects file "
-            "and that the log begins before the first part is taken, or state --ends, or --unseen for operations that "
-            "the log does not show."
+            f"({', '.join(operation.main for operation in assembly.operations)}); "
+            + (
+                f"in this log they end in the order {', '.join(seen)}, as `scenario new --order` has it; "
+                if other
+                else ""
+            )
+            + "check the ids in the objects file and that the log begins before the first part is taken, or state "
+            "--ends, or --unseen for operations that the log does not show."
         )
     close = len(best) > 1 and best[0][0] - best[1][0] < _CLOSE
     return Order(best[0][1], best[1][1] if close else None)

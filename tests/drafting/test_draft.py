@@ -75,6 +75,28 @@ def test_contacts_order_and_starts_are_found_and_poses_closed(tmp_path: Path) ->
     assert min(np.linalg.norm(a - b) for i, a in enumerate(waits) for b in waits[:i]) > 0.06
 
 
+def test_the_order_is_as_asked_where_that_can_be(tmp_path: Path) -> None:
+    parts = on_the_table(covered(tmp_path, off_mm=0.0))
+    for asked in (("pin_1", "pin_2", "cover"), ("pin_2", "pin_1", "cover")):
+        assert tuple(placing.moves[0] for placing in draft(parts, asked=asked).order) == asked
+    for wrong in (("pin_1", "cover"), ("pin_1", "pin_2", "lid")):
+        with pytest.raises(InputError, match=r"in the order .* cannot be put together; .*cover.* can be"):
+            draft(parts, asked=wrong)
+
+
+def test_flat_walls_that_were_drawn_with_play_are_named(tmp_path: Path) -> None:
+    floor = extrude(rectangle(80, 60), 0, 10)
+    walls = [extrude(rectangle(80, 10, (0, side)), 10, 20) for side in (-15.2, 15.2)]
+    parts = made(
+        tmp_path,
+        {"channel": join(floor, *walls), "block": extrude(rectangle(30, 20), 0, 30)},
+        {"channel": ("channel", at(0, 0, 0)), "block": ("block", at(0, 0, 10))},
+    )
+    notes = [note for note in draft(on_the_table(parts)).notes if "have play as drawn" in note]
+    assert len(notes) == 1
+    assert "line to line" in notes[0]
+
+
 def test_what_is_blocked_where_it_goes_is_put_together_beside_the_assembly(tmp_path: Path) -> None:
     """A bar in the window of a frame, which stands between two walls that close the window."""
     window = rectangle(30.5, 16.5, (0, 25), names=("low", "right", "high", "left"))

@@ -21,7 +21,7 @@ from apo_bench.simulation.arms.home import tip_down, with_home
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.arms.loading import compiled, load_model
 from apo_bench.simulation.robot.paths import smooth
-from apo_bench.simulation.robot.reach import along, within_speed
+from apo_bench.simulation.robot.reach import along, led_there, way_there, within_speed
 from apo_bench.simulation.robot.robot import Robot
 
 ARMS = folder("assets") / "arms"
@@ -275,6 +275,47 @@ def test_fingers_that_turn_on_hinges_hold_by_their_edges_and_this_is_said(tmp_pa
     assert arm.hand.turns_deg == pytest.approx(turned[0], abs=1.5)
     assert arm.hand.turns_deg > 10.0
     assert any("hold by their edges" in each for each in unsaid(arm))
+
+
+def test_a_gripper_of_which_one_jaw_moves_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "weak.xml").write_text(
+        """<mujoco><worldbody><body><geom type="box" pos="-0.02 0 0.06" size="0.004 0.01 0.04"/><body pos="0.02 0 0">
+        <joint name="jaw" axis="0 1 0" range="0 40"/><geom type="box" pos="0 0 0.06" size="0.004 0.01 0.04"/></body>
+        </body></worldbody><actuator><position joint="jaw" kp="30" ctrlrange="0 0.7"/></actuator></mujoco>"""
+    )
+    with pytest.raises(InputError, match=r"one jaw of the gripper moves \('gripper/jaw'\) and the other is fixed"):
+        read_arm(described(tmp_path, ""))
+
+
+def test_fingers_of_which_one_hardly_pushes_are_named(tmp_path: Path) -> None:
+    """One finger is driven; its coupling to the other is soft."""
+    soft = (ARMS / "parallel_gripper.xml").read_text()
+    stiff = 'solref="0.004 1" solimp="0.98 0.999'
+    assert stiff in soft
+    (tmp_path / "weak.xml").write_text(soft.replace(stiff, 'solref="0.1 1" solimp="0.5 0.9'))
+    arm = read_arm(described(tmp_path, ""))
+    assert arm.hand is not None
+    assert arm.hand.evenness < 0.1
+    assert any("the part is moved aside" in each for each in unsaid(arm))
+    assert not any("moved aside" in each for each in unsaid(find_arm("panda_primitive")))
+
+
+def test_an_arm_goes_around_its_base_where_the_straight_way_leads_over_it() -> None:
+    arm = find_arm("ur5e_primitive")
+    kinematics = Kinematics(arm)
+    base = np.array(arm.base)
+    ends = [tip_down(base + np.array((0.05, side * 0.45, 0.35)), turn) for side, turn in ((-1, -1.0), (1, 1.0))]
+    q = kinematics.inverse(ends[0], np.array(arm.home) + np.array([-1.5, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    assert q is not None
+    assert led_there(kinematics, ends[0], ends[1:], q) is None
+    middle, end = way = way_there(kinematics, arm, ends[0], ends[1], q)
+    assert led_there(kinematics, ends[0], way, q) is not None
+    np.testing.assert_array_equal(end, ends[1])
+    assert middle[0, 3] - base[0] == pytest.approx(np.hypot(0.05, 0.45), rel=0.02)
+    near = tip_down(base + np.array((0.3, -0.4, 0.3)), -1.0)
+    assert len(way_there(kinematics, arm, ends[0], near, q)) == 1
+    usual = find_arm("six_axis")
+    assert len(way_there(Kinematics(usual), usual, ends[0], ends[1], np.array(usual.home))) == 1
 
 
 def test_an_arm_waits_with_no_joint_wound_up() -> None:

@@ -61,6 +61,8 @@ class Hand:
     """How much farther apart the middles of these are than the surfaces that hold."""
     reach: Array
     """(n,), how far the pads reach beyond the tip, [m]."""
+    evenness: float = 1.0
+    """How hard the weaker pad pushes on that part, as a part of the stronger one."""
 
     def __post_init__(self) -> None:
         n = len(self.opening)

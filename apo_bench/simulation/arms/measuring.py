@@ -134,7 +134,7 @@ def _table(
     thick = apart - 2 * levels[-1].opening
     openings = np.array([level.opening for level in table])
     commands = np.array([level.command for level in table])
-    force, squeeze, friction = force_of(rig, at, R, openings, commands)
+    press, squeeze = force_of(rig, at, R, openings, commands)
     apart = abs(float((data.geom_xpos[left] - data.geom_xpos[right]) @ across)) - thick
     half_open = min(table, key=lambda level: abs(level.opening - widest / 2))
     hand = Hand(
@@ -143,15 +143,16 @@ def _table(
         opening=openings,
         commands=commands,
         states=np.array([level.joints for level in table]),
-        force_n=force,
+        force_n=press.force_n,
         squeeze_m=squeeze,
         gives_m=max(0.0, PROBE_WIDE * widest - apart / 2),
         turns_deg=_angle(half_open.R_pad, table[-1].R_pad),
-        friction=friction,
+        friction=press.friction,
         pads=(model.geom(left).name, model.geom(right).name),
         thick_m=thick,
         seconds=seconds + _STROKE_S,
         reach=np.array([level.reach - longest + _BEYOND_M for level in table]),
+        evenness=press.evenness,
     )
     return Measured(hand, model.body(mount).name, T)
 

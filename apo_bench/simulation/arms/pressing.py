@@ -1,5 +1,7 @@
 """How hard the pads of a gripper push on a part between them."""
 
+from typing import NamedTuple
+
 import mujoco
 import numpy as np
 
@@ -23,9 +25,18 @@ _LOOKS = 100
 which the force is averaged."""
 
 
-def force_of(rig: Rig, at: Array, R: Array, openings: Array, commands: Array) -> tuple[float, float, float]:
-    """How hard each pad pushes on a part between them, [N], how far inside it they are sent for that, [m], and the
-    friction of what touches it there.
+class Press(NamedTuple):
+    """What two pads do to a part between them."""
+
+    force_n: float
+    """Of each, the mean of both."""
+    friction: float
+    evenness: float
+    """The push of the weaker pad, as a part of that of the stronger one."""
+
+
+def force_of(rig: Rig, at: Array, R: Array, openings: Array, commands: Array) -> tuple[Press, float]:
+    """How hard the pads push on a part between them, and how far inside it they are sent for that, [m].
 
     Farther means harder where the drive is soft; it is not more than a part should be pressed by.
     """
@@ -40,27 +51,27 @@ def force_of(rig: Rig, at: Array, R: Array, openings: Array, commands: Array) ->
     model.geom_aabb[geom, 3:] = half
     mocap = int(model.body_mocapid[body])
     data.mocap_pos[mocap] = (0.0, 0.0, -_AWAY_M)
-    force = squeeze = friction = 0.0
+    press, squeeze = Press(0.0, 0.0, 1.0), 0.0
     for squeeze in _SQUEEZES_M:
         rig.settle(opened)
         data.mocap_pos[mocap] = at
         data.mocap_quat[mocap] = quaternion(R)
         closed = np.array([np.interp(half[0] - squeeze, openings, column) for column in commands.T])
-        force, friction = _pressed(rig, geom, opened, closed, R[:, 0])
+        press = _pressed(rig, geom, opened, closed, R[:, 0])
         data.mocap_pos[mocap] = (0.0, 0.0, -_AWAY_M)
-        if force <= _MOST_N:
+        if press.force_n <= _MOST_N:
             break
-    return force, squeeze, friction
+    return press, squeeze
 
 
-def _pressed(rig: Rig, probe: int, opened: Array, closed: Array, across: Array) -> tuple[float, float]:
-    """The mean force of a pad while it presses, [N], and its friction."""
+def _pressed(rig: Rig, probe: int, opened: Array, closed: Array, across: Array) -> Press:
     data = rig.data
     for part in np.linspace(0.0, 1.0, _STEPS + 1)[1:]:
         rig.settle(opened + part * (closed - opened), _SLOWLY_S)
     rig.settle(closed)
     total = 0.0
     rubs = 0.0
+    sides = [0.0, 0.0]
     wrench = np.zeros(6)
     for _ in range(_LOOKS):
         rig.settle(closed, STEP_S)
@@ -69,5 +80,8 @@ def _pressed(rig: Rig, probe: int, opened: Array, closed: Array, across: Array) 
             push = abs(float(wrench[0] * (data.contact[c].frame[:3] @ across)))
             pad = next(int(g) for g in data.contact[c].geom if g != probe)
             total += push
+            sides[int((data.contact[c].pos - data.geom_xpos[probe]) @ across > 0.0)] += push
             rubs += push * float(rig.model.geom_friction[pad, 0])
-    return total / 2 / _LOOKS, round(rubs / total, 6) if total else 0.0
+    if not total:
+        return Press(0.0, 0.0, 1.0)
+    return Press(total / 2 / _LOOKS, round(rubs / total, 6), round(min(sides) / max(sides), 6))

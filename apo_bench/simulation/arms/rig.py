@@ -86,6 +86,11 @@ def rig_of(model: Any, path: Path, joints: Sequence[str], home: Array, flange: i
         raise InputError(
             f"{path}: the gripper has {what}; give its MJCF in 'gripper', with hinges or slides and what drives them."
         )
+    if len(own) == 1:
+        raise InputError(
+            f"{path}: one jaw of the gripper moves ('{model.joint(own[0]).name}') and the other is fixed to the hand, "
+            "so parts would be pushed aside as it closes; give the MJCF of a gripper whose two sides move in 'gripper'."
+        )
     model.opt.timestep = STEP_S
     model.opt.gravity[:] = 0.0
     model.opt.integrator = int(mujoco.mjtIntegrator.mjINT_IMPLICITFAST)

@@ -36,7 +36,7 @@ from apo_bench.simulation.execution.transfer import (
     motions,
 )
 from apo_bench.simulation.robot.paths import Trajectory
-from apo_bench.simulation.robot.reach import at_end
+from apo_bench.simulation.robot.reach import at_end, led_there, way_there
 from apo_bench.simulation.scene.scene import Scene
 
 _GRAVITY = 9.81
@@ -235,16 +235,25 @@ def key_angles(transfer: Transfer, scene: Scene) -> KeyAngles:
     q = np.array(scene.arm.home)
     before = None
     reached = list[Array]()
-    for code, poses in zip(("unreachable_start", "unreachable"), key_poses(transfer), strict=True):
-        for T in poses:
-            there = scene.kinematics.inverse(T, q)
-            if there is None and scene.arm.hand is not None:
-                # Step by step from where the tip was, since a leap may end at the limit of a joint.
-                start = scene.kinematics.forward(q) if before is None else before
-                there = at_end(scene.kinematics, Trajectory(start, T, 1.0, np.asarray), 0.0, 1.0, q)
-            if there is None:
-                return KeyAngles(code, tuple(reached), scene.kinematics.last)
-            q = there
-            before = T
-            reached.append(q)
-    return KeyAngles("", tuple(reached), q)
+    taken, put = key_poses(transfer)
+    for T in (*taken, *put):
+        there = scene.kinematics.inverse(T, q)
+        if there is None and scene.arm.hand is not None:
+            # Step by step from where the tip was, since a leap may end at the limit of a joint.
+            start = scene.kinematics.forward(q) if before is None else before
+            there = at_end(scene.kinematics, Trajectory(start, T, 1.0, np.asarray), 0.0, 1.0, q)
+        if there is None:
+            break
+        q = there
+        before = T
+        reached.append(q)
+    if len(reached) == len(taken + put) and scene.arm.hand is not None:
+        # What is held goes through the air from the last of the first to the first of the others.
+        k = len(taken)
+        way = way_there(scene.kinematics, scene.arm, taken[-1], put[0], reached[k - 1])
+        if led_there(scene.kinematics, taken[-1], way, reached[k - 1]) is None:
+            reached = reached[:k]
+    if len(reached) == len(taken + put):
+        return KeyAngles("", tuple(reached), q)
+    code = "unreachable_start" if len(reached) < len(taken) else "unreachable"
+    return KeyAngles(code, tuple(reached), scene.kinematics.last)

@@ -140,12 +140,33 @@ def waypoints_unwound(rest: Array, start: Array, end: Array) -> tuple[Array, ...
     b = turn_from(rest, end)
     if abs(b - a) <= np.pi:
         return (end,)
-    middle = np.array(start)
-    middle[:3, 3] = (start[:3, 3] + end[:3, 3]) / 2
-    turn = np.eye(4)
-    turn[:2, :2] = [[np.cos((b - a) / 2), -np.sin((b - a) / 2)], [np.sin((b - a) / 2), np.cos((b - a) / 2)]]
-    middle[:3, :3] = turn[:3, :3] @ start[:3, :3]
-    return (middle, end)
+    return (_halfway(start, (start[:3, 3] + end[:3, 3]) / 2, b - a), end)
+
+
+def waypoints_around(base: Array, rest: Array, start: Array, end: Array) -> tuple[Array, ...]:
+    """Where to go through so that the tip keeps away from where the base stands, (3,), world, [m].
+
+    It passes on the side where it is at rest, as far from the base as the farther of both ends.
+    """
+    front = rest[:2, 3] - base[:2]
+
+    def angle(T: Array) -> float:
+        x, y = T[:2, 3] - base[:2]
+        return float(np.arctan2(front[0] * y - front[1] * x, front @ (x, y)))
+
+    turn = (angle(start) + angle(end)) / 2 + np.arctan2(front[1], front[0])
+    far = max(float(np.linalg.norm(T[:2, 3] - base[:2])) for T in (start, end))
+    at = np.array([base[0] + far * np.cos(turn), base[1] + far * np.sin(turn), max(start[2, 3], end[2, 3])])
+    return (_halfway(start, at, turn_from(rest, end) - turn_from(rest, start)), end)
+
+
+def _halfway(start: Array, at: Array, turn: float) -> Array:
+    """A pose at a place, (3,), turned from the start about the vertical by half of a turn, [rad]."""
+    c, s = np.cos(turn / 2), np.sin(turn / 2)
+    T = np.array(start)
+    T[:3, 3] = at
+    T[:3, :3] = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]) @ start[:3, :3]
+    return T
 
 
 def shifted(T: Array, along: Array, by: float) -> Array:

@@ -8,8 +8,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from apo_bench.geometry import Array
+from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.kinematics import Kinematics
-from apo_bench.simulation.robot.paths import Trajectory
+from apo_bench.simulation.robot.paths import Trajectory, smooth, waypoints_around, waypoints_unwound
 
 _KNOT_M = 0.03
 _KNOT_RAD = 0.15
@@ -23,7 +24,7 @@ _CREEP_RAD_S = 2e-3
 """Dry friction is full above some such."""
 _FAR_M = 0.3
 _FAR_RAD = 1.0
-"""The spacing of knots where only the joint angles at the end are asked for."""
+"""The spacing of knots where only the joint angles at the end are asked for, and nothing is between them."""
 
 
 class Knots(NamedTuple):
@@ -56,9 +57,36 @@ def along(kinematics: Kinematics, line: Trajectory, s: Array, q: Array, known: K
 
 def at_end(kinematics: Kinematics, line: Trajectory, begin: float, end: float, q: Array) -> Array | None:
     """Joint angles, (joints,), at `end`, found by way of a few places from `begin`, where they are q."""
-    count = 1 + max(1, int(np.ceil((end - begin) * _steps(line, _FAR_M, _FAR_RAD))))
-    knots = _knots(kinematics, line, np.linspace(begin, end, count), q)
-    return None if knots is None else knots.q[-1]
+    for far, turn in ((_FAR_M, _FAR_RAD), (_KNOT_M, _KNOT_RAD)):
+        count = 1 + max(1, int(np.ceil((end - begin) * _steps(line, far, turn))))
+        knots = _knots(kinematics, line, np.linspace(begin, end, count), q)
+        if knots is not None:
+            return knots.q[-1]
+    return None
+
+
+def way_there(kinematics: Kinematics, arm: Arm, T: Array, end: Array, q: Array) -> tuple[Array, ...]:
+    """Where to go through in the air from T, where the joints are q, to another pose.
+
+    Straight, unless only a way around where the base stands is in reach, which short arms have in their way. The usual
+    arm has room.
+    """
+    rest = kinematics.forward(arm.home)
+    straight = waypoints_unwound(rest, T, end)
+    if arm.hand is None or led_there(kinematics, T, straight, q) is not None:
+        return straight
+    around = waypoints_around(np.array(arm.base), rest, T, end)
+    return straight if led_there(kinematics, T, around, q) is None else around
+
+
+def led_there(kinematics: Kinematics, T: Array, way: Sequence[Array], q: Array) -> Array | None:
+    """Where the joints end that lead the tip along straight lines from T, where they are q; None out of reach."""
+    for to in way:
+        path = along(kinematics, smooth(T, to, 1.0), np.array([0.0, 1.0]), q)
+        if path is None:
+            return None
+        T, q = to, path[-1]
+    return q
 
 
 def led(path: Array, velocity: Array, lead: Array, stick: Array) -> Array:

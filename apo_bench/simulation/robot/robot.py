@@ -3,8 +3,8 @@
 Every physics step of a replay is taken in `_tick`, where motions come by `_run` (`follow`) or `wait` (`fingers`), or in
 `nudge`, for motions of which each depends on what was felt in the one before it. The robot knows what it commanded, its
 own joint and finger positions and the force on the part in its hand: no command depends on where a part is. What reads
-or sets poses of parts is the simulation's own: `_look` and `slip` shift the part in the hand, `in_hand` records it, and
-at fidelity `contact` `follow` and `fingers` leave out steps while nothing is near. One class: all of this shares steps.
+or sets poses of parts is the simulation's own: `_look` and `slip` shift them in the hand, `in_hand` records that, and
+`follow` and `fingers` leave out steps while nothing is near (fidelity `contact`). One class: these share steps.
 """
 
 import math
@@ -21,8 +21,8 @@ from apo_bench.simulation.robot.forces import WRIST_S, ForceSensors, Guard
 from apo_bench.simulation.robot.gripper import STUCK_M, fingers_of
 from apo_bench.simulation.robot.in_hand import Carried, HoldWatch, fast_forward, steadied, take_along, weld
 from apo_bench.simulation.robot.obstacles import clear, moving_with_tip, near_spans
-from apo_bench.simulation.robot.paths import Trajectory, smooth, waypoints_unwound
-from apo_bench.simulation.robot.reach import along, at_end, led, within_speed
+from apo_bench.simulation.robot.paths import Trajectory, smooth
+from apo_bench.simulation.robot.reach import along, at_end, led, way_there, within_speed
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.robot.wrist import WristSensor
 from apo_bench.simulation.scene.scene import Scene
@@ -154,7 +154,7 @@ class Robot:
 
     def go(self, end: Array, speed: float, turn_speed: float = 1.5) -> None:
         """Through the air, smoothly, turning by the way on which the wrist does not wind up."""
-        for T in waypoints_unwound(self._rest, self.T, end):
+        for T in way_there(self.scene.kinematics, self.arm, self.T, end, self.q):
             self.follow(smooth(self.T, T, speed, turn_speed))
 
     def nudge(self, q: Array, passed: int, velocity: Array | None = None) -> list[float]:
