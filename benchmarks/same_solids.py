@@ -43,9 +43,9 @@ _AREA = 0.15
 
 PAGE = Path(__file__).parents[1] / "docs" / "results" / "same-solids.md"
 _LONGEST = 160
-_WHY = """With holes of 12 sides the gear of 12 teeth takes 240 triangles, that of 20 teeth 368, the flange with nine round
-walls 456: 200 triangles leave these 5 or 6 sides, and are off by up to 1.3 mm. The holes of the plate with round
-corners have 8 sides then; fewer than 12 are flat faces, as [the guide](../guide/part.md#from-a-cad-file) says. Fillets
+_WHY = """With holes of 12 sides the gear of 12 teeth takes 240 triangles, that of 20 teeth 368, the flange with its 18 circles
+456: what 200 triangles leave of them is off by up to 1.3 mm. The holes of the plate with round corners have 8 sides
+then; fewer than 12 are flat faces, as [the guide](../guide/part.md#from-a-cad-file) says. Fillets
 of 5 sides are so many flat faces, too. A flank of the gear of 20 teeth is 1.9 mm wide, so that noise of 0.01 mm on its
 four corners turns it by 0.005 rad, root mean square; 4 of 80 are turned by more than the 0.01 rad that are allowed.
 """
