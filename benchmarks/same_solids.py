@@ -43,7 +43,8 @@ _AREA = 0.15
 
 PAGE = Path(__file__).parents[1] / "docs" / "results" / "same-solids.md"
 _LONGEST = 160
-_WHY = """With holes of 12 sides the gear of 12 teeth takes 240 triangles, that of 20 teeth 368, the flange with its 18 circles
+_WHY = """\
+With holes of 12 sides the gear of 12 teeth takes 240 triangles, that of 20 teeth 368, the flange with its 18 circles
 456: what 200 triangles leave of them is off by up to 1.3 mm. The holes of the plate with round corners have 8 sides
 then; fewer than 12 are flat faces, as [the guide](../guide/part.md#from-a-cad-file) says. Fillets
 of 5 sides are so many flat faces, too. A flank of the gear of 20 teeth is 1.9 mm wide, so that noise of 0.01 mm on its
