@@ -11,7 +11,7 @@ from apo_bench.cad.faces.parallel import regular
 from apo_bench.cad.faces.polygons import seen_from_corners, with_rings
 from apo_bench.cad.faces.redrawing import redrawn
 from apo_bench.cad.faces.regions import regions_of
-from apo_bench.cad.faces.rough import patches_of, rough_of
+from apo_bench.cad.faces.rough import patches_of, rough_of, together
 from apo_bench.cad.meshes.crossings import crossings
 from apo_bench.cad.solids.bodies import body_of, mesh_of
 from apo_bench.cad.solids.raw_solid import Mesh, Region
@@ -70,7 +70,8 @@ def faces_of(mesh: Mesh, fewest: int) -> Faces:
         if share > _ALL or near > _NEAREST * mesh.extent:
             break
         rough = rough_of(mesh, near, fewest)
-        drawn = redrawn(rough, seen_from_corners(rough, regular(rough, with_rings(rough, patches_of(rough), fewest))))
+        patches = together(rough, regular(rough, with_rings(rough, patches_of(rough), fewest)))
+        drawn = redrawn(rough, seen_from_corners(rough, patches))
         if drawn is None or not _is_sound(drawn.mesh, mesh, drawn.regions):
             continue
         said = (

@@ -12,7 +12,9 @@ _MOST_POINTS = 400
 _TURNED = 0.09
 """How far a flat piece may be turned from what it stands for, beside half of the angle that it spans, [rad]."""
 _WIDEST = 1.6
-"""No strip of a round face is this much wider than most of them."""
+"""No strip of a round face is this much wider than most of them, unless all of it is near to the face."""
+NEAR_MM = 0.02
+"""Sides stand for a round face if they, and their corners, are this near to it."""
 ON_WALL = 1e-5
 """Of the size of a part: corners of a round face are this near to it."""
 _SNAP_RAD = 2e-6
@@ -142,7 +144,8 @@ def on_it(mesh: Mesh, facets: Facets, among: Any, wall: Round, tolerance: float)
     hole = bool((np.sign(facing[good]) * facets.areas[among][good]).sum() < 0.0)
     good &= (facing < 0.0) == hole
     if good.any():
-        good &= span <= _WIDEST * np.median(span[good])
+        sagittas = np.maximum.reduceat(sagitta, starts)
+        good &= (span <= _WIDEST * np.median(span[good])) | (sagittas < NEAR_MM)
     return among[good], hole, span[good]
 
 

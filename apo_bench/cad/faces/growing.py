@@ -50,12 +50,37 @@ def walls_of(mesh: Mesh, facets: Facets) -> list[FoundWall]:
         if whole is not None and len(whole.members) == len(group):
             walls.append(whole)
         else:
-            work = _add_from_edges(mesh, facets, group, inside, walls, work)
+            found, work = _from_edges(mesh, facets, group, inside, work)
+            walls += _together(mesh, facets, group, inside, found)
     return walls
 
 
-def _add_from_edges(mesh: Mesh, facets: Facets, group: Any, inside: Any, walls: list[FoundWall], work: int) -> int:
-    """Look for round surfaces in part of a smooth surface, the longest edges first; returns what work is left."""
+def _together(mesh: Mesh, facets: Facets, group: Any, inside: Any, found: list[FoundWall]) -> list[FoundWall]:
+    """Walls of a smooth part of the surface, the large ones with what small ones had taken of them.
+
+    Few sides lie on many a wall beside the true one.
+    """
+    walls: list[FoundWall] = []
+    left = group
+    for wall in sorted(found, key=lambda wall: -len(wall.members)) if len(found) > 1 else found:
+        mine = np.isin(wall.members, left)
+        rest = wall._replace(members=wall.members[mine], spans=wall.spans[mine])
+        if len(rest.members) < _FEWEST:
+            continue
+        near, _, _ = on_it(mesh, facets, left, wall.surface, ON_WALL * mesh.extent)
+        if len(near) > len(rest.members):
+            untaken = inside & np.isin(facets.smooth, left).all(axis=1)
+            start = (wall.surface, wall.surface.slope != 0.0)
+            more = _grown(mesh, facets, left, untaken, [start], int(rest.members[0]))
+            rest = more if more is not None and len(more.members) > len(rest.members) else rest
+        walls.append(rest)
+        left = np.setdiff1d(left, rest.members)
+    return walls
+
+
+def _from_edges(mesh: Mesh, facets: Facets, group: Any, inside: Any, work: int) -> tuple[list[FoundWall], int]:
+    """Round surfaces in part of a smooth surface, the longest edges first, and what work is left."""
+    walls = list[FoundWall]()
     taken = np.zeros(len(facets.areas), dtype=bool)
     rows = np.flatnonzero(inside)
     around: dict[int, list[int]] = {}  # the smooth edges of each flat piece
@@ -88,7 +113,7 @@ def _add_from_edges(mesh: Mesh, facets: Facets, group: Any, inside: Any, walls: 
             failed = 0
             walls.append(best)
             taken[best.members] = True
-    return work
+    return walls, work
 
 
 def _seed_cylinder(

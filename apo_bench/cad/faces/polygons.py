@@ -5,13 +5,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from apo_bench.cad.faces.facets import widest_of
-from apo_bench.cad.faces.fitting import Round, axis_of, circle_through
+from apo_bench.cad.faces.fitting import NEAR_MM, Round, axis_of, circle_through
 from apo_bench.cad.faces.rough import Patch, Plane, Rough
 from apo_bench.cad.solids.raw_solid import connected, square_to
 from apo_bench.geometry import WHOLE_TURN, Array
 
-ON_CIRCLE_MM = 0.02
-"""Corners of sides are this near to a circle if the sides stand for it."""
 _MOST_SIDES = 96
 _PHASES = 32
 _CLEARLY = 0.6
@@ -53,7 +51,7 @@ def _around(sides: Sequence[Plane]) -> Round | None:
     offsets = np.array([side.offset for side in sides])
     corners = np.linalg.solve(both, np.stack([offsets[order], offsets[np.roll(order, -1)]], axis=1)[..., None])[..., 0]
     wall = circle_through(corners @ flat.T, axis)
-    return wall if wall is not None and np.abs(wall.off(corners @ flat.T)).max() < ON_CIRCLE_MM else None
+    return wall if wall is not None and np.abs(wall.off(corners @ flat.T)).max() < NEAR_MM else None
 
 
 def seen_from_corners(rough: Rough, patches: Sequence[Patch]) -> list[Patch]:
@@ -89,4 +87,4 @@ def _corners_around(angle: Array) -> int:
     around = np.sort(angle)
     gaps = np.diff(around, append=around[0] + WHOLE_TURN)
     wide = gaps[gaps > 0.5 * gaps.max()]
-    return len(wide) if wide.sum() > 0.8 * WHOLE_TURN and wide.min() > 0.7 * wide.max() else 0
+    return len(wide) if wide.sum() > 0.8 * WHOLE_TURN and wide.min() > 0.7 * wide.max() and len(wide) > 2 else 0

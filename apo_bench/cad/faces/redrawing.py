@@ -19,8 +19,11 @@ _LEVEL = 2e-7
 _STEPS = 12
 _RANK = 0.03
 """Surfaces that meet at a smaller angle, [rad], are followed as one."""
-_FARTHEST = 0.01
-"""Corners move by no more than this part of the size, beside the sagitta of sides of a round face."""
+_SHALLOW_RAD = 0.15
+_FARTHEST = 0.03
+_NEAR = 0.01
+"""Corners move by no more than this part of the size, beside the sagitta of sides of a round face, nor by more than the
+second one where faces meet at so small an angle that noise shifts their edge far."""
 
 
 class Redrawn(NamedTuple):
@@ -52,12 +55,12 @@ def redrawn(rough: Rough, patches: Sequence[Patch]) -> Redrawn | None:
     for k, patch in enumerate(patches):
         owner[patch.triangles] = k
     surfaces = [patch.surface for patch in patches]
-    points = _settled(mesh, owner, surfaces)
-    moved = float(np.linalg.norm(points - mesh.corners, axis=1).max())
+    points, shallow = _settled(mesh, owner, surfaces)
+    far = np.linalg.norm(points - mesh.corners, axis=1)
     sagittas = (
         s.radius * (1.0 - np.cos(np.pi / p.sides)) for p in patches if isinstance(s := p.surface, Round) and p.sides
     )
-    if moved > _FARTHEST * mesh.extent + max(sagittas, default=0.0):
+    if (far > np.where(shallow, _NEAR, _FARTHEST) * mesh.extent + max(sagittas, default=0.0)).any():
         return None
     drawing = _Drawing(Mesh(points, mesh.triangles), owner, surfaces)
     drawing.draw()
@@ -67,7 +70,7 @@ def redrawn(rough: Rough, patches: Sequence[Patch]) -> Redrawn | None:
     if not new.is_closed:
         return None
     regions = [_region(new, np.flatnonzero(whole == k), patch) for k, patch in enumerate(patches) if (whole == k).any()]
-    return Redrawn(new, tuple(sorted(regions, key=lambda region: int(region.triangles[0]))), moved)
+    return Redrawn(new, tuple(sorted(regions, key=lambda region: int(region.triangles[0]))), float(far.max()))
 
 
 def _region(mesh: Mesh, triangles: Any, patch: Patch) -> Region:
@@ -80,8 +83,8 @@ def _region(mesh: Mesh, triangles: Any, patch: Patch) -> Region:
     )
 
 
-def _settled(mesh: Mesh, owner: Any, surfaces: Sequence[Plane | Round | None]) -> Array:
-    """Corners on all of the faces around them, by the shortest ways."""
+def _settled(mesh: Mesh, owner: Any, surfaces: Sequence[Plane | Round | None]) -> tuple[Array, Any]:
+    """Corners on all of the faces around them, by the shortest ways, and at which of them two meet at a small angle."""
     points = mesh.corners.copy()
     pairs = np.unique(np.column_stack([mesh.triangles.ravel(), np.repeat(owner, 3)]), axis=0)
     pairs = pairs[np.array([surface is not None for surface in surfaces])[pairs[:, 1]]]
@@ -89,6 +92,8 @@ def _settled(mesh: Mesh, owner: Any, surfaces: Sequence[Plane | Round | None]) -
     rows = [np.flatnonzero(pairs[:, 1] == k) for k in range(len(surfaces))]
     lists = np.split(np.arange(len(pairs)), np.cumsum(many)[:-1])
     shared = np.flatnonzero(many > 1)
+    shallow = np.zeros(len(points), dtype=bool)
+    is_flat = np.array([isinstance(surface, Plane) for surface in surfaces])
     for _ in range(_STEPS):
         off = np.zeros(len(pairs))
         normals = np.zeros((len(pairs), 3))
@@ -101,10 +106,15 @@ def _settled(mesh: Mesh, owner: Any, surfaces: Sequence[Plane | Round | None]) -
         points[pairs[alone, 0]] -= off[alone, None] * normals[alone]
         for corner in shared.tolist():
             mine = lists[corner]
+            alike = np.abs(normals[mine] @ normals[mine].T) > np.cos(_SHALLOW_RAD)
+            shallow[corner] = alike.sum() > len(mine)
+            # Where a wall goes over into a plane smoothly, their edge is kept in the plane.
+            flat = is_flat[pairs[mine, 1]]
+            mine = mine[flat | ~alike[:, flat].any(axis=1)]
             points[corner] -= np.linalg.pinv(normals[mine], rcond=_RANK) @ off[mine]
         if np.abs(off).max(initial=0.0) < 1e-10 * mesh.extent:
             break
-    return points
+    return points, shallow
 
 
 @final

@@ -26,9 +26,13 @@ _BALLS = (12, 48, 192)
 """With how many triangles a face begins."""
 _FLAT = 0.995
 """Triangles whose normals have this product may be of one side of a coarse wall."""
+_FEWEST_CORNERS = 10
+"""Through fewer there is a wall nearly always."""
 _MOST_FAILED = 5
 _LEAST = 2e-4
 """Faces are no smaller than this part of the surface."""
+_CRUMB = 0.1
+"""A face across an edge is part of what remeshing made of the edge if it is so small beside both."""
 _FLATTEST = 5.0
 """No wall has a radius so much larger than the part."""
 _LEAST_SLOPE = 0.02
@@ -100,7 +104,7 @@ def patches_of(rough: Rough) -> list[Patch]:
     order = np.argsort(of, kind="stable")
     groups = np.split(order, np.cumsum(np.bincount(of, minlength=count))[:-1])
     patches = [patch for group in groups for patch in _patches_in(rough, group)]
-    return _together(rough, _at_nearest(rough, patches))
+    return _without_crumbs(rough, together(rough, _at_nearest(rough, patches)))
 
 
 def _patches_in(rough: Rough, group: Any) -> Iterator[Patch]:
@@ -134,8 +138,10 @@ def _patches_in(rough: Rough, group: Any) -> Iterator[Patch]:
 
 
 def _is_tight(rough: Rough, patch: Patch) -> bool:
-    off = patch.surface.off(rough.points(patch.triangles)) if patch.surface is not None else np.ones(1)
-    return float(np.sqrt((off**2).mean())) < _SPREAD * rough.near
+    points = rough.points(patch.triangles)
+    off = patch.surface.off(points) if patch.surface is not None else np.ones(1)
+    is_sure = isinstance(patch.surface, Plane) or len(points) >= _FEWEST_CORNERS
+    return is_sure and float(np.sqrt((off**2).mean())) < _SPREAD * rough.near
 
 
 def _largest(rough: Rough, left: Any) -> Patch | None:
@@ -245,9 +251,7 @@ def _facing(rough: Rough, surface: Plane | Round, triangles: Any) -> Array:
 
 def _at_nearest(rough: Rough, patches: list[Patch]) -> list[Patch]:
     """With triangles between faces that go over into each other smoothly on the one that they are nearer to."""
-    owner = np.full(len(rough.areas), -1)
-    for k, patch in enumerate(patches):
-        owner[patch.triangles] = k
+    owner = _owner(rough, patches)
     pairs = rough.mesh.neighbours
     sizes = np.bincount(owner, rough.areas, len(patches)) / rough.areas.sum()
     free = np.array([p.surface is None for p in patches])
@@ -278,25 +282,58 @@ def _at_nearest(rough: Rough, patches: list[Patch]) -> list[Patch]:
     return [p._replace(triangles=np.flatnonzero(owner == k)) for k, p in enumerate(patches) if (owner == k).any()]
 
 
-def _together(rough: Rough, patches: list[Patch]) -> list[Patch]:
+def together(rough: Rough, patches: list[Patch]) -> list[Patch]:
     """With faces that touch and lie on one surface as one, which narrow triangles had cut in two."""
-    owner = np.zeros(len(rough.areas), dtype=np.int64)
-    for k, patch in enumerate(patches):
-        owner[patch.triangles] = k
+    owner = _owner(rough, patches)
     beside = np.unique(np.sort(owner[rough.mesh.neighbours], axis=1), axis=0)
-    same = [(i, k) for i, k in beside.tolist() if i != k and _is_same(rough, patches[i], patches[k])]
+    both = np.concatenate([beside, beside[:, ::-1]]).tolist()
+    same = [(i, k) for i, k in both if i != k and _is_same(rough, patches[i], patches[k])]
     _, group = connected(np.array(same, dtype=np.int64).reshape(-1, 2), len(patches))
+    sizes = np.bincount(owner, rough.areas, len(patches))
     return [
-        patches[int(np.flatnonzero(group == g)[0])]._replace(triangles=np.flatnonzero(group[owner] == g))
+        patches[int(np.where(group == g, sizes, -1.0).argmax())]._replace(triangles=np.flatnonzero(group[owner] == g))
         for g in np.unique(group)
     ]
 
 
 def _is_same(rough: Rough, a: Patch, b: Patch) -> bool:
-    if a.surface is None or type(a.surface) is not type(b.surface) or a.hole != b.hole:
+    """Whether the second face lies on the first one, as a flat one within one side of a wall does."""
+    alike = type(a.surface) is type(b.surface) and a.hole == b.hole
+    if a.surface is None or not (alike or (isinstance(a.surface, Round) and isinstance(b.surface, Plane))):
         return False
-    is_near = np.abs(a.surface.off(rough.points(b.triangles))).max() < rough.near
+    points = np.concatenate([rough.points(b.triangles), *([] if alike else [rough.middles[b.triangles]])])
+    is_near = np.abs(a.surface.off(points)).max() < rough.near
     return bool(is_near) and float(_facing(rough, a.surface, b.triangles).mean()) * (-1.0 if a.hole else 1.0) > 0.8
+
+
+def _without_crumbs(rough: Rough, patches: list[Patch]) -> list[Patch]:
+    """Without small faces across a shallow edge, all of whose corners lie on the large faces around them."""
+    owner = _owner(rough, patches)
+    sizes = np.bincount(owner, rough.areas, len(patches))
+    pairs = owner[rough.mesh.neighbours]
+    for k, patch in enumerate(patches):
+        around = np.setdiff1d(pairs[(pairs == k).any(axis=1)], [k])
+        large = [n for n in around.tolist() if patches[n].surface is not None and sizes[k] < _CRUMB * sizes[n]]
+        corners = np.unique(rough.mesh.triangles[patch.triangles])
+        inside = np.setdiff1d(corners, rough.mesh.triangles[owner != k])
+        if len(large) < 2 or len(inside):
+            continue
+        surfaces = [(patches[n].surface, -1.0 if patches[n].hole else 1.0) for n in large]
+        off = np.array([np.abs(s.off(rough.mesh.corners[corners])) for s, _ in surfaces])
+        middle = np.array([np.abs(s.off(rough.middles[patch.triangles])) for s, _ in surfaces])
+        looks = np.array([sign * _facing(rough, s, patch.triangles) for s, sign in surfaces]) > np.cos(_TURNED_RAD)
+        near = (off.min(axis=0) < rough.near).all() and (middle.min(axis=0) < 2.0 * rough.near).all()
+        if near and looks[middle.argmin(axis=0), np.arange(len(patch.triangles))].all():
+            owner[patch.triangles] = np.array(large)[middle.argmin(axis=0)]
+    return [p._replace(triangles=np.flatnonzero(owner == k)) for k, p in enumerate(patches) if (owner == k).any()]
+
+
+def _owner(rough: Rough, patches: list[Patch]) -> Any:
+    """The face of each triangle."""
+    owner = np.full(len(rough.areas), -1)
+    for k, patch in enumerate(patches):
+        owner[patch.triangles] = k
+    return owner
 
 
 def _cost(rough: Rough, patches: list[Patch], owner: Any, triangles: Any) -> Array:
