@@ -80,7 +80,7 @@ def _lowest_above(solid: Solid, R: Array, begin: tuple[float, float], end: tuple
 def _fitted(box: Box, solid: Solid, T: Array) -> Box:
     """A column as high as the solid at T leaves it room; of no height if that is not found soon."""
     for _ in range(3):
-        depth = float(intrusion_depths((box,), np.eye(3), np.zeros((1, 3)), solid.pieces, T)[0])
+        depth = float(intrusion_depths((box,), np.eye(3), np.zeros((1, 3)), solid.pieces, T, 0.0)[0])
         if depth <= 0.0:
             return box
         box = _upright(

@@ -215,7 +215,7 @@ class OrderSearch:
         """How deep a part is in another one after each of some shifts, (k, 3), (k,), [m]."""
         T, other_T = self.poses[part], self.poses[other]
         return intrusion_depths(
-            self.solids[part].pieces, T[:3, :3], T[:3, 3] + shifts, self.solids[other].pieces, other_T
+            self.solids[part].pieces, T[:3, :3], T[:3, 3] + shifts, self.solids[other].pieces, other_T, 0.0
         )
 
     def _beside(self, group: tuple[str, ...]) -> tuple[Placing, ...] | None:

@@ -62,7 +62,7 @@ class _Rays(NamedTuple):
     h: Array
     """How high each ray is, (r,)."""
     low: Array
-    """Where they enter each piece, (r, p); infinite where they miss it."""
+    """Where they enter the pieces that they pass through, in rising order, (r, m); infinite behind the last."""
     high: Array
 
 
@@ -208,13 +208,24 @@ def _cast(pieces: tuple[Piece, ...], across: Array, up: Array, t: Array, h: Arra
     met = np.flatnonzero((t0 < t1) & (h0 < h1))
     T, H = np.meshgrid(t, h)
     start = T[..., None] * along + H[..., None] * up
-    low = np.full((*T.shape, len(met)), np.inf)
-    high = np.full((*T.shape, len(met)), -np.inf)
-    for k, i in enumerate(met):
+    number = np.arange(T.size).reshape(T.shape)
+    rays, lows, highs = [np.zeros(0, dtype=np.intp)], [np.zeros(0)], [np.zeros(0)]
+    for i in met:
         here = slice(h0[i], h1[i]), slice(t0[i], t1[i])
-        ends = passage(pieces[i].planes, start[here].reshape(-1, 3), across)
-        low[(*here, k)], high[(*here, k)] = (end.reshape(T[here].shape) for end in ends)
-    return _Rays(T.ravel(), H.ravel(), *(end.reshape(T.size, len(met)) for end in (low, high)))
+        enter, leave = passage(pieces[i].planes, start[here].reshape(-1, 3), across)
+        hit = np.isfinite(enter)
+        rays.append(number[here].ravel()[hit])
+        lows.append(enter[hit])
+        highs.append(leave[hit])
+    # Of each ray what it passes through, one behind the other: most pass through few of many pieces.
+    ray, low, high = (np.concatenate(each) for each in (rays, lows, highs))
+    order = np.lexsort((low, ray))
+    ray = ray[order]
+    place = np.arange(len(ray)) - np.searchsorted(ray, ray)
+    ends = [np.full((T.size, int(place.max(initial=0)) + 1), empty) for empty in (np.inf, -np.inf)]
+    for end, values in zip(ends, (low, high), strict=True):
+        end[ray, place] = values[order]
+    return _Rays(T.ravel(), H.ravel(), *ends)
 
 
 def _over(places: Array, at: Array, first: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
@@ -245,13 +256,14 @@ def _offers(rays: _Rays, t: float, h: float, opening_m: float, least: float) -> 
     above = (np.abs(rays.t - t) <= side + _RAY_M) & (rays.h >= h - down - _RAY_M)
     within = above & (rays.h <= h + over)
     on = ((np.abs(rays.t - t) <= side) & (rays.h >= h - down))[within]
+    enter, leave = rays.low[within], rays.high[within]
     for low, high in _clusters(rays, within):
         if (high - low) / 2 + FINGER_ROOM_M / 2 > opening_m or _in_the_way(rays, above, low, high):
             continue
-        own = np.where((rays.low >= low - 1e-9) & (rays.high <= high + 1e-9), 1.0, np.nan)[within]
+        own = np.where((enter >= low - 1e-9) & (leave <= high + 1e-9), 1.0, np.nan)
         with np.errstate(invalid="ignore"):
-            first = np.fmin.reduce(rays.low[within] * own, axis=1)
-            last = np.fmax.reduce(rays.high[within] * own, axis=1)
+            first = np.fmin.reduce(enter * own, axis=1)
+            last = np.fmax.reduce(leave * own, axis=1)
             pressed = on & (first < low + _FLAT_M) & (last > high - _FLAT_M)
         if (np.abs(rays.t[within][pressed] - t) < side / 3).any():
             lengths = [float(np.ptp(places[within][pressed])) for places in (rays.t, rays.h)]

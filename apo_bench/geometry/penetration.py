@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -29,7 +29,9 @@ _STEP_M = 5e-4
 """Places along a fall are so far apart: two boxes that together are thinner could pass each other unseen."""
 _MOST_PLACES = 10_000
 _AT_ONCE = 100_000
-"""At most so many places, the farther apart; so many pairs of boxes are looked at together, which bounds the memory."""
+_MOST_ROOMS = 4_000_000
+"""At most so many places, the farther apart; so many pairs of pieces are looked at together in a fall, and so many
+pairs times places elsewhere, which bounds the memory."""
 
 
 class WaysOut(NamedTuple):
@@ -51,21 +53,24 @@ def intrusion(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
     """
     if balls_apart(a.pieces, T_a, b.pieces, T_b) > _TOUCHING_M:
         return 0.0
-    return max(0.0, float(intrusion_depths(a.pieces, T_a[:3, :3], T_a[None, :3, 3], b.pieces, T_b)[0]))
+    return max(0.0, float(intrusion_depths(a.pieces, T_a[:3, :3], T_a[None, :3, 3], b.pieces, T_b, 0.0)[0]))
 
 
-def intrusion_depths(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array) -> Array:
+def intrusion_depths(
+    a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array, apart_m: float = np.inf
+) -> Array:
     """How deep pieces that only shift are in others, at k places, (k,), [m]; negative where they are apart.
 
     Args:
         R_a: (3, 3), the orientation of `a`.
         at: (k, 3), the places of the frame of `a`, [m].
+        apart_m: What is farther apart than this may count as so far apart, which takes less time.
 
     Returns:
         (k,), [m].
     """
     if not (all_boxes(a) and all_boxes(b)):
-        return _piece_by_piece(a, R_a, at, b, T_b)
+        return _piece_by_piece(a, R_a, at, b, T_b, apart_m)
     axes = box_axes(R_a, T_b[:3, :3])
     # Two boxes are as deep in each other as their shadows on the axis on which that is least; pieces as their deepest
     # pair.
@@ -106,36 +111,72 @@ def _ways(a: Piece, T_a: Array, b: Piece, T_b: Array, axes: Array, along: Array,
     return WaysOut(axes * np.where(along < 0.0, -1.0, 1.0)[:, None], depths, pose.apply(T, piece.center[None])[0])
 
 
-def _piece_by_piece(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array) -> Array:
+def _piece_by_piece(
+    a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array, apart_m: float = np.inf
+) -> Array:
     """`intrusion_depths` where sides look anywhere: pairs of which balls or upright boxes meet nowhere count by how far
     these are apart.
 
     No pair is deeper than its balls and boxes are in each other, nor than it is across its sides alone, so most need
     not be looked at.
     """
-    R_b = T_b[:3, :3]
+    pairs = _pairs(a, R_a, at, b, T_b, apart_m)
+    if len(at) < 2 or len(at) * len(pairs) < _MOST_ROOMS:
+        return _measured(a, R_a, at, b, T_b, pairs, apart_m)
+    halves = (at[: len(at) // 2], at[len(at) // 2 :])
+    return np.concatenate([_piece_by_piece(a, R_a, each, b, T_b, apart_m) for each in halves])
+
+
+def _measured(
+    a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array, pairs: Any, apart_m: float
+) -> Array:
+    """The depth of the deepest of some pairs, (p, 2), at k places, (k,)."""
     # Pairs that are surely apart count by their room; the others are measured, nearest first, and only at places where
     # they may be deeper than what was found there before: first across sides, which bounds the depth from above.
-    rooms = _rooms(a, R_a, at, b, T_b)
-    deepest = np.where(rooms > 0.0, -rooms, -np.inf).max(axis=(1, 2))
-    closest = rooms.min(axis=0)
-    pairs = np.argwhere(closest <= 0.0)
-    for i, j in pairs[np.argsort(closest[closest <= 0.0], kind="stable")]:
-        room = rooms[:, i, j]
+    rooms = _rooms(a, R_a, at, b, T_b, pairs)
+    deepest = np.where(rooms > 0.0, -rooms, -np.inf).max(axis=1, initial=-apart_m)
+    closest = rooms.min(axis=0, initial=np.inf)
+    order = np.flatnonzero(closest <= 0.0)
+    for k in order[np.argsort(closest[order], kind="stable")]:
+        i, j = pairs[k]
+        room = rooms[:, k]
         near = (room <= 0.0) & (-room > deepest)
         if not near.any():
             continue
         across = np.full(len(at), -np.inf)
-        across[near] = _depths(a[i], R_a, at[near], b[j], T_b, across_sides(a[i], R_a, b[j], R_b))
+        across[near] = _depths(a[i], R_a, at[near], b[j], T_b, across_sides(a[i], R_a, b[j], T_b[:3, :3]))
         near &= across > deepest
         if near.any():
-            edges = _depths(a[i], R_a, at[near], b[j], T_b, across_edges(a[i], R_a, b[j], R_b))
+            edges = _depths(a[i], R_a, at[near], b[j], T_b, across_edges(a[i], R_a, b[j], T_b[:3, :3]))
             deepest[near] = np.maximum(deepest[near], np.minimum(across[near], edges))
     return deepest
 
 
-def _rooms(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array) -> Array:
-    """How far apart pieces are at least, at k places, (k, a, b), [m]: by balls, and by upright boxes, around them."""
+def _pairs(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array, apart_m: float) -> Any:
+    """Pairs of pieces whose upright boxes come nearer to each other anywhere on the way, (p, 2)."""
+    mine, its = np.arange(len(a)), np.arange(len(b))
+    if np.isinf(apart_m):
+        return np.stack(np.meshgrid(mine, its, indexing="ij"), axis=-1).reshape(-1, 2)
+    (mid_a, half_a), (mid_b, half_b) = _upright(a, R_a), _upright(b, T_b[:3, :3])
+    slack = apart_m + TOUCH_M
+    low_a, high_a = mid_a - half_a + at.min(axis=0) - slack, mid_a + half_a + at.max(axis=0) + slack
+    low_b, high_b = mid_b - half_b + T_b[:3, 3], mid_b + half_b + T_b[:3, 3]
+    # First those of each side that come near to the box around all others, then pair by pair.
+    its = its[((low_b < high_a.max(axis=0)) & (high_b > low_a.min(axis=0))).all(axis=1)]
+    if not len(its):
+        return np.zeros((0, 2), dtype=np.intp)
+    mine = mine[((low_a < high_b[its].max(axis=0)) & (high_a > low_b[its].min(axis=0))).all(axis=1)]
+    near = np.ones((len(mine), len(its)), dtype=np.bool_)
+    for axis in range(3):
+        near &= low_a[mine, axis, None] < high_b[its, axis]
+        near &= high_a[mine, axis, None] > low_b[its, axis]
+    i, j = np.nonzero(near)
+    return np.column_stack([mine[i], its[j]])
+
+
+def _rooms(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_b: Array, pairs: Any) -> Array:
+    """How far apart pairs of pieces are at least, at k places, (k, p), [m]: by balls and upright boxes around them."""
+    mine, its = pairs.T
     balls_a, radii_a = _balls(a)
     balls_b, radii_b = _balls(b)
     boxes_a, halves_a = _upright(a, R_a)
@@ -143,19 +184,19 @@ def _rooms(a: tuple[Piece, ...], R_a: Array, at: Array, b: tuple[Piece, ...], T_
     shift = at - T_b[:3, 3]
     middles_a = balls_a @ R_a.T
     middles_b = balls_b @ T_b[:3, :3].T
-    # One axis after the other: reducing arrays of (k, a, b, 3) along their last axis takes three times as long.
-    squared = np.zeros((len(at), len(a), len(b)))
+    # One axis after the other: reducing arrays of (k, p, 3) along their last axis takes three times as long.
+    squared = np.zeros((len(at), len(pairs)))
     apart = np.full(squared.shape, -np.inf)
     for i in range(3):
-        along = shift[:, i, None, None]
-        between = along + middles_a[:, i, None] - middles_b[:, i]
+        along = shift[:, i, None]
+        between = along + middles_a[mine, i] - middles_b[its, i]
         squared += between * between
-        gap = along + boxes_a[:, i, None] - boxes_b[:, i]
+        gap = along + boxes_a[mine, i] - boxes_b[its, i]
         np.abs(gap, out=gap)
-        gap -= halves_a[:, i, None] + halves_b[:, i]
+        gap -= halves_a[mine, i] + halves_b[its, i]
         np.maximum(apart, gap, out=apart)
     np.sqrt(squared, out=squared)
-    squared -= radii_a[:, None] + radii_b
+    squared -= radii_a[mine] + radii_b[its]
     return np.maximum(squared, apart, out=apart)
 
 
@@ -222,9 +263,20 @@ def drop(a: Solid, T_a: Array, b: Solid, T_b: Array) -> float:
 
 def _first_met(a: Solid, T_a: Array, ways: Array, b: Solid, T_b: Array) -> int | None:
     """The first of the places at which `a` is in `b`."""
-    count = max(1, _AT_ONCE // (len(a.pieces) * len(b.pieces)))
+    R_a, at = T_a[:3, :3], T_a[:3, 3] - np.outer(ways, (0.0, 0.0, 1.0))
+    if all_boxes(a.pieces) and all_boxes(b.pieces):
+        pairs, many = None, len(a.pieces) * len(b.pieces)
+    else:
+        pairs = _pairs(a.pieces, R_a, at, b.pieces, T_b, 0.0)
+        many = max(1, len(pairs))
+    count = max(1, _AT_ONCE // many)
     for begin in range(0, len(ways), count):
-        met = np.flatnonzero(drop_depths(a, T_a, ways[begin : begin + count], b, T_b) > TOUCH_M)
+        here = at[begin : begin + count]
+        if pairs is None:
+            depths = intrusion_depths(a.pieces, R_a, here, b.pieces, T_b)
+        else:
+            depths = _measured(a.pieces, R_a, here, b.pieces, T_b, pairs, 0.0)
+        met = np.flatnonzero(depths > TOUCH_M)
         if len(met):
             return begin + int(met[0])
     return None

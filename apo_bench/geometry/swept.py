@@ -16,14 +16,16 @@ from apo_bench.geometry.arrays import Array
 from apo_bench.geometry.convex import (
     across_edges,
     across_sides,
+    all_corners,
     ball_around,
     box_axes,
     boxes_around,
-    boxes_reach,
     shadow,
 )
+from apo_bench.geometry.polygon import plane_across
 from apo_bench.geometry.solid import Piece, all_boxes
 
+_ROUNDING_M = 1e-9
 _SLACK_M = 5e-5
 """Pieces are less than this deep in each other where they touch."""
 _ANYWHERE = (-np.inf, np.inf)
@@ -47,7 +49,7 @@ def overlap_intervals(
         slack_m: Negative: pieces count that are still this far apart.
         within: Overlaps that end before or begin after these places may be left out, [m].
     """
-    pairs, spans = _boxed(moving, way, resting, slack_m)
+    pairs, spans = _boxed(moving, way, resting, slack_m, within)
     if all_boxes(moving.pieces) and all_boxes(resting.pieces):
         return spans
     near = (spans[:, 1] > within[0]) & (spans[:, 0] < within[1])
@@ -55,14 +57,43 @@ def overlap_intervals(
     return np.concatenate([np.zeros((0, 2)), *exact])
 
 
-def _boxed(moving: Posed, way: Array, resting: Posed, slack_m: float) -> tuple[NDArray[np.intp], Array]:
+def _boxed(
+    moving: Posed, way: Array, resting: Posed, slack_m: float, within: tuple[float, float] = _ANYWHERE
+) -> tuple[NDArray[np.intp], Array]:
     """Which pairs of pieces, by number, the boxes around them meet on a line, (k,), and from and until, (k, 2)."""
     a, b = (pose.apply(of.T, boxes_around(of.pieces)[0]) for of in (moving, resting))
     R_a, R_b = (of.T[:3, :3] for of in (moving, resting))
     axes = box_axes(R_a, R_b)
-    reach = boxes_reach(moving.pieces, R_a, resting.pieces, R_b, axes).reshape(-1, len(axes)) - slack_m
-    at = ((a @ axes.T)[:, None] - (b @ axes.T)[None]).reshape(-1, len(axes))
-    return _intervals(at, axes @ way, reach)
+    halves = [boxes_around(of.pieces)[1] @ np.abs(axes @ of.T[:3, :3]).T for of in (moving, resting)]
+    # Most pairs of many pieces pass each other by, seen along the way.
+    i, j = _side_by_side(moving, way, resting, slack_m, within)
+    at = (a @ axes.T)[i] - (b @ axes.T)[j]
+    kept, spans = _intervals(at, axes @ way, halves[0][i] + halves[1][j] - slack_m)
+    return i[kept] * len(b) + j[kept], spans
+
+
+def _side_by_side(
+    moving: Posed, way: Array, resting: Posed, slack_m: float, within: tuple[float, float]
+) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    """Pairs of pieces that may meet on a line, (k,) each: their shadows square to it do, and those along it in time."""
+    if all_boxes(moving.pieces) and all_boxes(resting.pieces):
+        every = np.indices((len(moving.pieces), len(resting.pieces))).reshape(2, -1)
+        return every[0], every[1]
+    near = np.ones((len(moving.pieces), len(resting.pieces)), dtype=np.bool_)
+    room = _ROUNDING_M - min(10.0 * slack_m, 0.0)
+    for axis, (begin, end) in zip((*plane_across(way).T, way), ((0.0, 0.0), (0.0, 0.0), within), strict=True):
+        (low_a, high_a), (low_b, high_b) = (_ends(of, axis) for of in (moving, resting))
+        near &= low_a[:, None] + begin < high_b + room
+        near &= high_a[:, None] + end > low_b - room
+    i, j = np.nonzero(near)
+    return i, j
+
+
+def _ends(of: Posed, axis: Array) -> tuple[Array, Array]:
+    """From where to where each piece is along an axis, (k,) each."""
+    corners, first = all_corners(of.pieces)
+    along = corners @ (of.T[:3, :3].T @ axis) + of.T[:3, 3] @ axis
+    return np.minimum.reduceat(along, first), np.maximum.reduceat(along, first)
 
 
 def _exactly(moving: Posed, way: Array, resting: Posed, slack_m: float, pair: int) -> Array:
@@ -113,15 +144,17 @@ def exit_distance(moving: Sequence[Posed], way: Array, resting: Sequence[Posed])
         owners += [(m, r, int(k)) for k in pairs]
     # Follow the intervals that overlap from 0 on: each one that begins before the end so far moves that end outwards.
     at = 0.0
-    order = np.argsort([-span[1] for span in spans], kind="stable")
-    while (i := next((i for i in order if spans[i][0] <= at < spans[i][1]), None)) is not None:
+    low, high = np.array(spans).reshape(-1, 2).T.copy()
+    order = np.argsort(-high, kind="stable")
+    while (over := (low[order] <= at) & (high[order] > at)).any():
+        i = order[over.argmax()]
         if not exact[i]:
             m, r, k = owners[i]
             met = _exactly(m, way, r, -_SLACK_M, k)
-            spans[i] = met[0] if len(met) else np.array([np.inf, -np.inf])
+            low[i], high[i] = met[0] if len(met) else (np.inf, -np.inf)
             exact[i] = True
-        if spans[i][0] <= at < spans[i][1]:
-            at = float(spans[i][1])
+        if low[i] <= at < high[i]:
+            at = float(high[i])
     return max(0.0, at - _SLACK_M)
 
 

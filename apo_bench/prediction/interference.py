@@ -75,7 +75,7 @@ def _deepest(a: Solid, T_a: Array, b: Solid, T_b: Array, shifts: Array) -> float
     near = np.linalg.norm(seen_from_b - np.clip(seen_from_b, *b.bounds), axis=1) < radius + FAR_M
     if not near.any():
         return -FAR_M
-    depths = intrusion_depths(a.pieces, T_a[:3, :3], T_a[:3, 3] + shifts[near], b.pieces, T_b)
+    depths = intrusion_depths(a.pieces, T_a[:3, :3], T_a[:3, 3] + shifts[near], b.pieces, T_b, FAR_M)
     return max(-FAR_M, float(depths.max()))
 
 

@@ -200,7 +200,9 @@ def _with_seed(rough: Rough, members: Any, seed: int) -> Any:
     at = int(np.searchsorted(members, seed))
     if at == len(members) or members[at] != seed:
         return members[:0]
-    pairs = rough.smooth[np.isin(rough.smooth, members).all(axis=1)]
+    mine = np.zeros(len(rough.areas), dtype=np.bool_)
+    mine[members] = True
+    pairs = rough.smooth[mine[rough.smooth].all(axis=1)]
     _, group = connected(np.searchsorted(members, pairs), len(members))
     return members[group == group[at]]
 

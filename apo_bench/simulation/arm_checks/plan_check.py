@@ -93,7 +93,7 @@ def _struck(scene: Scene, part: str, grip: Grip, beyond: float, poses: Poses) ->
     boxes = gripper_boxes(scene.kinematics, scene.arm, opening)
     T = poses[part] @ grip.T_part_tip
     depths = [
-        (float(intrusion_depths(boxes, T[:3, :3], T[None, :3, 3], pieces, poses[other])[0]), other)
+        (float(intrusion_depths(boxes, T[:3, :3], T[None, :3, 3], pieces, poses[other], 0.0)[0]), other)
         for other, pieces in scene.pieces.items()
         if other != part
     ]

@@ -128,7 +128,7 @@ def _free(scene: Scene, t: Transfer, place: Beside, wall: Obstacle, others: tupl
     R = place.T[:3, :3]
     for each, shifts in ((wall, above), *((other, whole) for other in others)):
         at = place.T[:3, 3] + shifts
-        if intrusion_depths(scene.pieces[t.part], R, at, each.pieces, each.T).max() > 0.0:
+        if intrusion_depths(scene.pieces[t.part], R, at, each.pieces, each.T, 0.0).max() > 0.0:
             return False
     at = tip[:3, 3] + whole
     if gripper_depth(scene, grip.half_width, tip[:3, :3], at, (wall, *others), _ROOM_M).max() > 0.0:

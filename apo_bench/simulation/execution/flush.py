@@ -73,10 +73,10 @@ def flush_pose(assembly: Assembly, scene: Scene, t: Transfer, believed: Poses) -
     R = flush[:3, :3]
     pieces = scene.pieces[t.part]
     for each in others:
-        if intrusion_depths(pieces, R, flush[:3, 3] + lifts, each.pieces, each.T).max() > -_ROOM_M:
+        if intrusion_depths(pieces, R, flush[:3, 3] + lifts, each.pieces, each.T, _ROOM_M).max() > -_ROOM_M:
             return None
     for each in fixed:  # down to the floor itself, which it shall touch
-        if intrusion_depths(pieces, R, flush[:3, 3] + lifts + _LOWEST_M * UP, each.pieces, each.T).max() > 0.0:
+        if intrusion_depths(pieces, R, flush[:3, 3] + lifts + _LOWEST_M * UP, each.pieces, each.T, 0.0).max() > 0.0:
             return None
     tip = flush @ t.grips[0].T_part_tip
     width = t.grips[0].half_width

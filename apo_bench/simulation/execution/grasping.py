@@ -2,10 +2,11 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import groupby
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from apo_bench.assembly import Poses
 from apo_bench.geometry import (
@@ -33,6 +34,8 @@ _MARGINS_M = (0.004, 0.003, 0.002)
 """Room around the gripper, as much as there is."""
 _GRID_M = 0.003
 """Candidates along a part, and looks along a stroke, are this far apart."""
+_SOME = (0, 1, 9, 73, None)
+"""So many places are looked at together."""
 _END_M = 0.018
 """No grasp is nearer to the end of a long part: the pads still lie on it."""
 _MOST_LEFT_M = 0.1
@@ -211,16 +214,28 @@ def first_clear(
     strokes: Sequence[Stroke] = (),
 ) -> Grasp | None:
     """The first of those around which there is most room at every place, and all along strokes, or None."""
-    clear = ((grasp, margin) for margin in _MARGINS_M for grasp in _clear(hand, solid, grasps, places, margin))
-    return next((grasp for grasp, m in clear if not any(_nearest(hand, solid, grasp, s, m) for s in strokes)), None)
+    widest, *less = _MARGINS_M
+    first = next(_clear(hand, solid, grasps, places, widest, strokes), None)
+    # What is not clear with the least room is not with more.
+    left = [] if first is not None else list(_clear(hand, solid, grasps, places, less[-1], strokes))
+    margins = less[:-1] if left else ()
+    return next(
+        (g for m in margins for g in _clear(hand, solid, left, places, m, strokes)), first or next(iter(left), None)
+    )
 
 
 def _clear(
-    hand: HasGripper, solid: Solid, grasps: Sequence[Grasp], places: Sequence[RestingPart], margin: float
+    hand: HasGripper,
+    solid: Solid,
+    grasps: Sequence[Grasp],
+    places: Sequence[RestingPart],
+    margin: float,
+    strokes: Sequence[Stroke] = (),
 ) -> Iterator[Grasp]:
-    """The grasps at which the open gripper, about to close or having let go, strikes nothing at any place.
+    """The grasps at which the open gripper, about to close or having let go, strikes nothing at any place, nor the
+    closed one along any stroke.
 
-    They are worked out as they are asked for, those of one direction and width together.
+    They are worked out as they are asked for, some at a time, of these those of one direction and width together.
     """
     T = places[0].T
 
@@ -228,25 +243,60 @@ def _clear(
         ahead = () if grasp.ahead is None else map(float, grasp.ahead)
         return (*map(float, grasp.across), round(_known_width(solid.pieces, grasp, T), 6), *ahead)
 
-    for _, those in groupby(grasps, key=kind):
-        same = list(those)
-        width = _known_width(solid.pieces, same[0], T)
-        opening = min(width + _STAND_OFF_M, hand.arm.opening_m)
-        points = np.array([grasp.point for grasp in same])
-        struck = np.zeros(len(same), dtype=np.bool_)
-        # All points of one direction and width at once: the tip has one orientation at a place.
-        for place in places:
-            R = (place.T @ tip_frame(replace(same[0], point=np.zeros(3)), place.T))[:3, :3]
-            at = points @ place.T[:3, :3].T + place.T[:3, 3]
-            struck |= gripper_depth(hand, opening, R, at, place.around, margin) > 0.0
-        yield from (grasp for grasp, hit in zip(same, struck, strict=True) if not hit)
+    for begin, end in pairwise(_SOME):
+        some = grasps[begin:end]
+        groups: dict[tuple[float, ...], list[int]] = {}
+        for k, grasp in enumerate(some):
+            groups.setdefault(kind(grasp), []).append(k)
+        free = np.ones(len(some), dtype=np.bool_)
+        for those in groups.values():
+            free[those] = _is_clear(hand, solid, [some[k] for k in those], places, margin, strokes)
+        yield from (grasp for grasp, is_free in zip(some, free, strict=True) if is_free)
+
+
+def _is_clear(
+    hand: HasGripper,
+    solid: Solid,
+    same: Sequence[Grasp],
+    places: Sequence[RestingPart],
+    margin: float,
+    strokes: Sequence[Stroke],
+) -> NDArray[np.bool_]:
+    """Which of some grasps of one direction and width are clear, (k,)."""
+    width = _known_width(solid.pieces, same[0], places[0].T)
+    opening = min(width + _STAND_OFF_M, hand.arm.opening_m)
+    points = np.array([grasp.point for grasp in same])
+    free = np.ones(len(same), dtype=np.bool_)
+    # All points at once: the tip has one orientation at a place.
+    for place in places:
+        R, at = _tips(same[0], points, place.T)
+        free &= gripper_depth(hand, opening, R, at, place.around, margin) <= 0.0
+    for stroke in strokes:
+        able = np.flatnonzero(free)
+        if len(able) and stroke.travel > 0.0:
+            R, at = _tips(same[0], points[able], stroke.T)
+            every = (at[:, None] - _lefts(stroke)[:, None] * stroke.way).reshape(-1, 3)
+            depth = gripper_depth(hand, width, R, every, stroke.around, margin)
+            free[able] = (depth.reshape(len(able), -1) <= 0.0).all(axis=1)
+    return free
+
+
+def _tips(grasp: Grasp, points: Array, T: Array) -> tuple[Array, Array]:
+    """The orientation of the tip at a grasp of a part at T, (3, 3), and its places at such grasps of points, (k, 3)."""
+    R = (T @ tip_frame(replace(grasp, point=np.zeros(3)), T))[:3, :3]
+    return R, points @ T[:3, :3].T + T[:3, 3]
 
 
 def _nearest(hand: HasGripper, solid: Solid, grasp: Grasp, stroke: Stroke, margin: float) -> float:
     """How near to its end the closed gripper comes along a stroke before it strikes something, [m]; 0 if it arrives."""
-    lefts = np.linspace(stroke.travel, 0.0, max(2, round(stroke.travel / _GRID_M) + 1))
+    lefts = _lefts(stroke)
     struck = _closed_depth(hand, solid, grasp, stroke, lefts, margin) > 0.0
     return float(lefts[max(0, int(np.argmax(struck)) - 1)]) if struck.any() else 0.0
+
+
+def _lefts(stroke: Stroke) -> Array:
+    """How far it is to the end of a stroke at each look, [m]."""
+    return np.linspace(stroke.travel, 0.0, max(2, round(stroke.travel / _GRID_M) + 1))
 
 
 def _closed_depth(hand: HasGripper, solid: Solid, grasp: Grasp, stroke: Stroke, lefts: Array, margin: float) -> Array:
@@ -271,5 +321,5 @@ def gripper_depth(
     depth = np.full(len(at), -1.0)
     for each in around:
         if (low < each.high).all() and (high > each.low).all():
-            depth = np.maximum(depth, intrusion_depths(boxes, R, at, each.pieces, each.T))
+            depth = np.maximum(depth, intrusion_depths(boxes, R, at, each.pieces, each.T, 0.0))
     return depth

@@ -131,7 +131,8 @@ def _near(moving: Iterable[Moving], obstacles: Sequence[Obstacle], line: Traject
             if look.any():
                 at = tips[look] + R @ T_tip[:3, 3]
                 near[look] = (
-                    intrusion_depths(pieces, R @ T_tip[:3, :3], at, obstacles[i].pieces, obstacles[i].T) > -margin
+                    intrusion_depths(pieces, R @ T_tip[:3, :3], at, obstacles[i].pieces, obstacles[i].T, margin)
+                    > -margin
                 )
     return near
 
