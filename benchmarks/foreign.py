@@ -133,7 +133,7 @@ def imported(each: Foreign, paths: Sequence[Path], folder: Path) -> tuple[list[d
         with _said_of(lines[k], paths[k]):
             part = import_solid(raw, others, folder, paths[k].name, made)
             made[part.name] = part.places
-            solid = load_part(folder / f"{part.name}.xml")
+            solid = load_part(folder / f"{part.name}.xml", checked=False)  # as it has just been
             for key, more in (("solids", 1), ("flat", len(solid.faces)), ("round", len(solid.rounds))):
                 lines[k][key] += more
             lines[k]["no_contact"] += sum("can make no contact" in sentence for sentence in part.said)

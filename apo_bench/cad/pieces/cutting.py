@@ -17,6 +17,8 @@ from apo_bench.parts.allowed import MOST_PIECES
 
 _MOST_TRIANGLES = 20_000
 _MOUTH_MM = 1.0
+_WEDGES = 300
+"""Beside other parts holes that nothing comes near to are filled where all holes would take more pieces."""
 _LOSS = 1e-3
 """A piece whose volume differs by more than this part from what it stands for is said to do so."""
 
@@ -74,6 +76,9 @@ def cut(raw: RawSolid, others: Array | None = None) -> Cut:
             grown.append(more)
         outlines.append(corners)
     kept = sorted(bores, key=lambda bore: (_is_near(bore, others), max(bore.radii)), reverse=True)
+    # Screws that nobody drew: beyond some pieces, holes that nothing comes near to are filled.
+    while others is not None and kept and least_pieces(kept) > _WEDGES and not _is_near(kept[-1], others):
+        kept.pop()
     pieces = _bored(outlines, kept, flats)
     while pieces is None and kept:
         # What nothing comes near to goes first, and what is small; others are there as they were drawn.
