@@ -167,7 +167,10 @@ def _solved(solids: Mapping[str, Solid], poses: Poses, contacts: list[Contact], 
             break
         # The least |x / W| with J x = -e: x = W y, y the least solution of (J W) y = -e.
         W = np.tile([1.0, 1.0, 1.0, 1 / _ARM_M, 1 / _ARM_M, 1 / _ARM_M], len(free))
-        x = W * np.linalg.lstsq(np.concatenate(rows) * W, -np.concatenate(values), rcond=1e-9)[0]
+        try:
+            x = W * np.linalg.lstsq(np.concatenate(rows) * W, -np.concatenate(values), rcond=1e-9)[0]
+        except np.linalg.LinAlgError:  # contacts that contradict each other: what is farthest open goes
+            break
         for part, at in first.items():
             now[part] = pose.exp(x[at : at + 6]) @ now[part]
     return now

@@ -123,10 +123,22 @@ def is_way_free(moving: Sequence[Posed], way: Array, length_m: float, resting: S
     """Whether parts can be moved so far as one without coming into any other."""
     for m, r in product(moving, resting):
         if _near(m, way, length_m, r):
-            spans = overlap_intervals(m, way, r, within=(0.0, length_m))
-            if ((spans[:, 1] > 0.0) & (spans[:, 0] < length_m)).any():
+            pairs, spans = _boxed(m, way, r, _SLACK_M, (0.0, length_m))
+            if not (all_boxes(m.pieces) and all_boxes(r.pieces)):
+                # One pair that meets is enough: those first whose boxes do so along most of the way.
+                meet = np.minimum(spans[:, 1], length_m) - np.maximum(spans[:, 0], 0.0)
+                order = np.flatnonzero(meet > 0.0)
+                order = order[np.argsort(-meet[order], kind="stable")]
+                exact = (_exactly(m, way, r, _SLACK_M, int(pairs[k])) for k in order)
+                spans = next((span for span in exact if _within(span, length_m)), np.zeros((0, 2)))
+            if _within(spans, length_m):
                 return False
     return True
+
+
+def _within(spans: Array, length_m: float) -> bool:
+    """Whether any of some spans, (k, 2), begins before the end of a way, and ends behind its begin."""
+    return bool(((spans[:, 1] > 0.0) & (spans[:, 0] < length_m)).any())
 
 
 def exit_distance(moving: Sequence[Posed], way: Array, resting: Sequence[Posed]) -> float:

@@ -88,6 +88,17 @@ def _mesh(solid: Solid) -> Any:
 
 def check_one_piece(pieces: Sequence[Piece], path: Path) -> None:
     """Raise an `InputError` unless every piece touches the others, over some of them."""
+    groups = touching_groups(pieces)
+    require(groups is not None, f"{path}: whether the pieces touch takes too long to find out; use fewer pieces.")
+    assert groups is not None
+    require(
+        len(groups) <= 1,
+        f"{path}: the pieces make {len(groups)} separate solids; a part is one rigid piece.",
+    )
+
+
+def touching_groups(pieces: Sequence[Piece]) -> list[set[int]] | None:
+    """Which pieces touch each other, over some of them; None if that takes too long to find out."""
     from scipy.cluster.hierarchy import DisjointSet
 
     solids = DisjointSet(range(len(pieces)))
@@ -99,15 +110,11 @@ def check_one_piece(pieces: Sequence[Piece], path: Path) -> None:
             if solids.connected(i, int(k)):
                 continue
             tests += 1
-            require(
-                tests <= _MOST_TESTS, f"{path}: whether the pieces touch takes too long to find out; use fewer pieces."
-            )
+            if tests > _MOST_TESTS:
+                return None
             if _gap(pieces[i], pieces[int(k)]) < _TOUCHING_M:
                 solids.merge(i, int(k))
-    require(
-        solids.n_subsets <= 1,
-        f"{path}: the pieces make {solids.n_subsets} separate solids; a part is one rigid piece.",
-    )
+    return list(solids.subsets())
 
 
 def _gap(a: Piece, b: Piece) -> float:

@@ -14,11 +14,14 @@ from apo_bench.cad.solids.raw_solid import RawSolid, Region
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Hull
 from apo_bench.parts.allowed import MOST_PIECES
+from apo_bench.parts.check import touching_groups
 
 _MOST_TRIANGLES = 20_000
 _MOUTH_MM = 1.0
 _WEDGES = 300
 """Beside other parts holes that nothing comes near to are filled where all holes would take more pieces."""
+_CRUMB = 1e-3
+"""Pieces that touch none of the others are left out if they are so little of a solid."""
 _LOSS = 1e-3
 """A piece whose volume differs by more than this part from what it stands for is said to do so."""
 
@@ -90,7 +93,19 @@ def cut(raw: RawSolid, others: Array | None = None) -> Cut:
             "out fillets and free surfaces."
         )
     filled = tuple(bore.name for bore in bores if bore not in kept)
-    return Cut(tuple(as_cylinders(pieces, shafts)), sum(grown, 0.0), len(grown), filled)
+    whole, lost = _without_crumbs(list(as_cylinders(pieces, shafts)), _CRUMB * raw.mesh.volume)
+    return Cut(tuple(whole), sum([*grown, *(-each for each in lost)]), len(grown) + len(lost), filled)
+
+
+def _without_crumbs(pieces: list[Hull], most: float) -> tuple[list[Hull], list[float]]:
+    """Without what hangs on nothing once free shapes are trimmed, if it is no more than that, and how much that is."""
+    from scipy.spatial import ConvexHull
+
+    groups = sorted(touching_groups(pieces) or (), key=len)
+    lost = [(group, sum(ConvexHull(1e3 * pieces[k].corners).volume for k in group)) for group in groups[:-1]]
+    crumbs = [(group, volume) for group, volume in lost if volume < most]
+    gone = {k for group, _ in crumbs for k in group}
+    return [piece for k, piece in enumerate(pieces) if k not in gone], [volume for _, volume in crumbs]
 
 
 def _bored(outlines: Sequence[Array], bores: Sequence[Region], flats: Array) -> list[Hull] | None:
