@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from apo_bench import InputError
 from apo_bench.cad.importing import import_part, raw_solids
 from apo_bench.cad.pieces import cutting
 from apo_bench.cad.time_limit import limit_of
+from apo_bench.geometry import Hull
 from tests.cad.made import block, rod, write_stl
 
 RADII = (1.5, 1.5, 1.5, 2.0, 2.0, 2.5)
@@ -44,6 +46,34 @@ def test_holes_that_nothing_comes_into_are_filled_where_there_are_too_many(
     )
     assert part.solid.volume - whole.solid.volume == pytest.approx(filled, rel=0.01)
     assert {len(face.holes) for face in part.solid.faces.values()} == {0, 6}
+
+
+def test_beside_others_many_holes_are_filled_that_nothing_comes_into(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(cutting, "_WEDGES", 60)
+    _, (raw,) = raw_solids(write_stl(plate(), tmp_path / "a.stl"), None)
+    part = import_part(raw, "part", tmp_path, "a.stl", others=np.array([[10.0, 0.3, 2.0], [20.0, 0.3, 2.0]]))
+    kept = {round(1e3 * float(wall.point[0])) for wall in part.solid.rounds.values()}
+    assert {10, 20} <= kept
+    assert len(kept) == 6 - len(part.cut.filled) <= 3
+    # Where others come into all of them, all stay; and so they do of a part alone.
+    into_all = np.array([[10.0 * k, 0.3, 2.0] for k in range(6)])
+    assert not cutting.cut(raw, into_all).filled
+    assert not cutting.cut(raw).filled
+
+
+def test_crumbs_that_hang_on_nothing_are_left_out() -> None:
+    def cube(x: float, half: float) -> Hull:
+        return Hull("", np.array(list(product((x - half, x + half), *[(-half, half)] * 2))))
+
+    near, far, crumb = cube(0.0, 0.01), cube(0.0205, 0.01), cube(0.05, 0.0005)
+    kept, lost = cutting._without_crumbs([crumb, near, cube(0.02, 0.01)], 2.0)
+    assert len(kept) == 2
+    assert lost == pytest.approx([1.0])
+    # What is more is no crumb: it stays, and is refused with the part.
+    assert cutting._without_crumbs([near, far], 2.0) == ([near, far], [])
+    assert cutting._without_crumbs([near], 2.0) == ([near], [])
 
 
 def test_what_has_more_triangles_may_take_longer_up_to_a_limit() -> None:

@@ -62,3 +62,23 @@ def test_so_are_cylinders(seed: int):
     corners = [hull.corners @ T[:3, :3].T + T[:3, 3] for hull, T in ((a, T_a), (b, T_b))]
     found = float(intrusion_depths((a,), T_a[:3, :3], T_a[None, :3, 3], (b,), T_b)[0])
     assert max(0.0, found) == pytest.approx(depth(*corners), abs=1e-9)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_is_far_apart_may_be_left_out(seed: int):
+    rng = np.random.default_rng(seed)
+    a, b = (tuple(random_hull(rng) for _ in range(5)) for _ in range(2))
+    at = rng.uniform(-0.1, 0.1, (9, 3))
+    T = moved(rng, 0.05)
+    depths = intrusion_depths(a, np.eye(3), at, b, T)
+    for apart in (0.0, 0.02):
+        np.testing.assert_array_equal(
+            intrusion_depths(a, np.eye(3), at, b, T, apart), np.maximum(depths, -apart), strict=True
+        )
+
+
+def test_a_far_away_part_is_met_nowhere():
+    hull = (random_hull(np.random.default_rng(0)),)
+    far = np.eye(4)
+    far[0, 3] = 9.0
+    assert intrusion_depths(hull, np.eye(3), np.zeros((2, 3)), hull, far, 0.0).tolist() == [0.0, 0.0]
