@@ -28,7 +28,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 
 from apo_bench.assembly import contact_kind
-from apo_bench.cad.assembled import coming_near
+from apo_bench.cad.assembled import coming_near, mates_of
 from apo_bench.cad.import_report import named_places, write_places
 from apo_bench.cad.solids.raw_solid import RawSolid, SolidPlace
 from apo_bench.drafting.checking import check_file
@@ -127,11 +127,11 @@ def imported(each: Foreign, paths: Sequence[Path], folder: Path) -> tuple[list[d
         places = [np.concatenate([T[:3] * [1.0, 1.0, 1.0, 1e3], T[3:]]) for T in file.places]
         with _said_of(lines[k], paths[k]):
             found += [(k, raw) for raw in solids_at(paths[k], file.unit, places)]
-    near = coming_near([raw for _, raw in found])
+    raws = [raw for _, raw in found]
     made: dict[str, list[SolidPlace]] = {}
-    for (k, raw), others in zip(found, near, strict=True):
+    for (k, raw), others, mates in zip(found, coming_near(raws), mates_of(raws), strict=True):
         with _said_of(lines[k], paths[k]):
-            part = import_solid(raw, others, folder, paths[k].name, made)
+            part = import_solid(raw, others, folder, paths[k].name, made, mates)
             made[part.name] = part.places
             solid = load_part(folder / f"{part.name}.xml", checked=False)  # as it has just been
             for key, more in (("solids", 1), ("flat", len(solid.faces)), ("round", len(solid.rounds))):

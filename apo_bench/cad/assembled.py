@@ -47,6 +47,28 @@ def coming_near(raws: Sequence[RawSolid]) -> list[Array]:
     return [each[0] for each in near]
 
 
+def mates_of(raws: Sequence[RawSolid]) -> list[Any]:
+    """Of each solid all others at their places around one of its own, in its frame, as one body of manifold3d."""
+    import manifold3d
+
+    bodies = [body_of(raw.mesh) for raw in raws]
+    others = []
+    for own in raws:
+        low, high = own.mesh.corners.min(axis=0), own.mesh.corners.max(axis=0)
+        box = manifold3d.Manifold.cube(high - low + 2.0 * _NEAR_MM).translate(low - _NEAR_MM)
+        pairs = (
+            (place, body, its)
+            for place in own.places
+            for body, raw in zip(bodies, raws, strict=True)
+            for its in raw.places
+        )
+        near = [
+            box ^ body.transform((pose.inverse(place.T) @ its.T)[:3]) for place, body, its in pairs if its is not place
+        ]
+        others.append(manifold3d.Manifold.batch_boolean(near, manifold3d.OpType.Add))
+    return others
+
+
 def _each_once(points: Array) -> Array:
     """Points on a grid, in the order of their places, each once."""
     # Rows are compared as one whole number each, which takes a tenth of the time.

@@ -5,7 +5,7 @@ import re
 from collections.abc import Callable, Container, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import final
+from typing import Any, final
 
 import numpy as np
 
@@ -82,13 +82,20 @@ def _with_faces(path: Path, raw: RawSolid, fewest_sides: int) -> RawSolid:
 
 
 def import_part(
-    raw: RawSolid, name: str, folder: Path, source: str, density: float = 1000.0, others: Array | None = None
+    raw: RawSolid,
+    name: str,
+    folder: Path,
+    source: str,
+    density: float = 1000.0,
+    others: Array | None = None,
+    mates: Any = None,
 ) -> Imported:
     """Write a raw solid as `NAME.xml` and `NAME.toml` that are read as a part.
 
     Args:
         density: [kg/m^3].
         others: Points of what comes near to it, (k, 3), [mm]: there its pieces are finest; None: nothing is known.
+        mates: All others where they are, as one body of manifold3d, [mm]: its pieces keep out of these.
 
     Raises:
         InputError: It has more faces or pieces than a part may have, or is too light or too heavy for one.
@@ -105,7 +112,7 @@ def import_part(
                 f"{HEAVIEST_KG / 1e3:g} t are allowed, so give another --density, or scale the part."
             )
         try:
-            pieces = cut(raw, others)
+            pieces = cut(raw, others, mates)
         except InputError as error:
             raise InputError(f"{source}: {error}") from error
         corners = sum(len(piece.corners) for piece in pieces.pieces)

@@ -3,11 +3,11 @@
 from collections.abc import Container, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from apo_bench.cad.assembled import coming_near
+from apo_bench.cad.assembled import coming_near, mates_of
 from apo_bench.cad.import_report import named_places, write_places
 from apo_bench.cad.importing import import_part, raw_solids
 from apo_bench.cad.solids.naming import free_name, part_name
@@ -49,8 +49,9 @@ def import_assembly(files: Sequence[Path], folder: Path, unit: str | None = None
             "ones."
         )
     parts: dict[str, ImportedSolid] = {}
-    for (source, raw), others in zip(found, coming_near([raw for _, raw in found]), strict=True):
-        part = import_solid(raw, others, folder, source, parts)
+    raws = [raw for _, raw in found]
+    for (source, raw), others, mates in zip(found, coming_near(raws), mates_of(raws), strict=True):
+        part = import_solid(raw, others, folder, source, parts, mates)
         parts[part.name] = part
     copies = named_places({name: part.places for name, part in parts.items()})
     sources = ", ".join(file.name for file in files)
@@ -72,7 +73,9 @@ def solids_at(file: Path, unit: str | None = None, places: Sequence[Array] = (np
     ]
 
 
-def import_solid(raw: RawSolid, others: Array, folder: Path, source: str, used: Container[str]) -> ImportedSolid:
+def import_solid(
+    raw: RawSolid, others: Array, folder: Path, source: str, used: Container[str], mates: Any = None
+) -> ImportedSolid:
     """Write one solid of an assembly as a part.
 
     Its frame lies at the part, wherever the file has its origin: a pose that is seen turned a little turns a part about
@@ -81,6 +84,7 @@ def import_solid(raw: RawSolid, others: Array, folder: Path, source: str, used: 
     Args:
         others: What comes near to it, as `coming_near` has it.
         used: Names that it cannot have.
+        mates: All others where they are, as `mates_of` has them.
 
     Raises:
         InputError: It makes no part.
@@ -88,7 +92,8 @@ def import_solid(raw: RawSolid, others: Array, folder: Path, source: str, used: 
     folder.mkdir(parents=True, exist_ok=True)
     name = free_name(part_name(raw.name), used)
     foot = _foot(raw)
-    part = import_part(_shifted(raw, -foot), name, folder, f"{source}, {raw.name}", others=others - foot)
+    mates = None if mates is None else mates.translate(-foot)
+    part = import_part(_shifted(raw, -foot), name, folder, f"{source}, {raw.name}", others=others - foot, mates=mates)
     said = [f"{name}: {len(part.solid.faces)} flat and {len(part.solid.rounds)} round faces"]
     said += [f"{name}.{face} can make no contact: {why}" for face, why in part.refused.items()]
     return ImportedSolid(name, [place._replace(T=place.T @ pose.at(foot)) for place in raw.places], said)

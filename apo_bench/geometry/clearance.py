@@ -14,13 +14,16 @@ _PARALLEL = 1e-7
 """A side lies on a face if it is this near to its plane, [m], or touches its cylinder or cone so nearly."""
 _SLIVER = 1e-6
 """A side that covers less than this part of itself of a flat face only borders on it."""
+_CRUMBS = 0.01
+"""Pieces that the clearance swallows are left out up to this part of the volume."""
 _THINNEST_M = 5e-5
 """Half of what a box is thick at least, [m]; what is thinner, MuJoCo takes for nothing. What is left of another piece
 must contain a ball of this radius."""
 
 
 def physical_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
-    """The pieces of the part as it is made, same names and order.
+    """The pieces of the part as it is made, same names and order; those that recede to nothing, if they are hardly any
+    of it, are left out.
 
     Every side of a piece that carries a fit face, or a piece of one, moves into it by the clearance; so a round hole
     gets wider. The nominal
@@ -48,7 +51,23 @@ def _receded_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
     if all_boxes(solid.pieces):
         return tuple(_receded(solid, box, clearance_m) for box in solid.pieces if isinstance(box, Box))
     hulls = [p if isinstance(p, Hull) else Hull(p.name, p.corners) for p in solid.pieces]
-    return tuple(receded_hull(solid, hull, clearance_m) for hull in hulls)
+    kept = list[Piece]()
+    gone_m3 = 0.0
+    for hull in hulls:
+        try:
+            kept.append(receded_hull(solid, hull, clearance_m))
+        except InputError:
+            # What lies behind a fit face and is thinner than the clearance goes with it, if it is hardly anything.
+            gone_m3 += _volume(hull)
+            if gone_m3 > _CRUMBS * solid.volume:
+                raise
+    return tuple(kept)
+
+
+def _volume(hull: Hull) -> float:
+    from scipy.spatial import ConvexHull
+
+    return float(ConvexHull(hull.corners).volume)
 
 
 def _receded(solid: Solid, box: Box, clearance_m: float) -> Box:

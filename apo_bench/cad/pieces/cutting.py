@@ -1,12 +1,13 @@
 """Solids cut into convex pieces: along the planes of reflex edges, then around round holes, [mm]."""
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from apo_bench.cad.pieces.corners import corners_of, extremes, is_thick, without_near
-from apo_bench.cad.pieces.halving import at_shoulders, convex_parts, settled
+from apo_bench.cad.pieces.halving import HAIR, at_shoulders, convex_parts, settled
+from apo_bench.cad.pieces.keeping_out import keeping_out
 from apo_bench.cad.pieces.refining import Beside
 from apo_bench.cad.pieces.round_walls import as_cylinders, bored, least_pieces, with_round_shafts
 from apo_bench.cad.solids.bodies import body_of
@@ -39,11 +40,12 @@ class Cut(NamedTuple):
     """Round holes that are not there, since the part would have too many pieces with them."""
 
 
-def cut(raw: RawSolid, others: Array | None = None) -> Cut:
+def cut(raw: RawSolid, others: Array | None = None, mates: Any = None) -> Cut:
     """The convex pieces of a solid: flat ones exact, round holes as wedges that touch the fitted wall.
 
     Args:
         others: Points of what comes near to it, (k, 3), [mm]; None: nothing is known of others.
+        mates: All others where they are, as one body of manifold3d, as far as that is known.
 
     Raises:
         InputError: The mesh makes no solid, or there are more pieces than a part may have.
@@ -65,7 +67,10 @@ def cut(raw: RawSolid, others: Array | None = None) -> Cut:
     beside = Beside(size, flats, None if others is None else cKDTree(others))
     outlines: list[Array] = []
     shafts = [r for r in raw.regions if r.is_round and not r.hole and r.square]
-    for part in at_shoulders(convex_parts(body, beside), shafts, size):
+    parts = convex_parts(body, beside)
+    if mates is not None:
+        parts = keeping_out(parts, body, mates, HAIR * size)
+    for part in at_shoulders(parts, shafts, size):
         coarse = without_near(settled(corners_of(part.body), part.planes, size))
         if len(coarse) < 4 or not is_thick(coarse):
             continue

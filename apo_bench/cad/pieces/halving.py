@@ -14,7 +14,7 @@ from apo_bench.geometry import Array
 
 _MOST_CUTS = 400
 _TRIES = 6
-_HAIR = 2e-6
+HAIR = 2e-6
 _MOST_FREE_PLANES = 80
 _MOST_BISECTED = 40
 _ROUGH = 0.01
@@ -26,7 +26,7 @@ larger; they need not have more triangles."""
 def convex_parts(solid: Any, beside: Beside) -> Iterator[CutPart]:
     """Parts that are convex, or that stand for a hollow free shape with their hull."""
     volume = solid.volume()
-    yield from refined(_parts(solid, beside.size, beside.flats, volume), beside, volume, _HAIR * beside.size)
+    yield from refined(_parts(solid, beside.size, beside.flats, volume), beside, volume, HAIR * beside.size)
 
 
 def _parts(solid: Any, size: float, flats: Array, volume: float) -> Iterator[CutPart]:
@@ -59,7 +59,7 @@ def _cut(
             # no plane of a reflex edge may reach it.
             planes = _planes_to_cut(body, size, flats, only_flats) if cuts[0] > 0 else []
             for n, d in [*planes[:_TRIES], *_through_cavity(body, least)]:
-                halves = each.halves(n, d, _HAIR * size)
+                halves = each.halves(n, d, HAIR * size)
                 if min(half.body.volume() for half in halves) > least:
                     cuts[0] -= 1
                     to_cut += halves
@@ -83,7 +83,7 @@ def _planes_to_cut(body: Any, size: float, flats: Array, only_flats: bool) -> li
     for plane in _reflex_planes(body, size):
         # The side of a body is rounded by the cuts before; the plane of the face that it lies on is not.
         cosine = flats[:, :3] @ plane[:3]
-        same = (np.abs(cosine) > 1.0 - 1e-6) & (np.abs(flats[:, 3] * np.sign(cosine) - plane[3]) < _HAIR * size)
+        same = (np.abs(cosine) > 1.0 - 1e-6) & (np.abs(flats[:, 3] * np.sign(cosine) - plane[3]) < HAIR * size)
         planes += [*flats[same], *([] if only_flats else [plane])][:1]
     return [(plane[:3], float(plane[3])) for plane in planes]
 
@@ -131,7 +131,7 @@ def at_shoulders(parts: Iterator[CutPart], shafts: Sequence[Region], size: float
         slices = [part]
         if len(mine) > 1:
             for n, d in ((s.direction, float(s.point @ s.direction) + end) for s in mine for end in s.span):
-                slices = [half for each in slices for half in _across(each, n, d, _HAIR * size)]
+                slices = [half for each in slices for half in _across(each, n, d, HAIR * size)]
         yield from slices
 
 
@@ -149,7 +149,7 @@ def settled(corners: Array, planes: Array, size: float) -> Array:
     for _ in range(4):
         for n, d in zip(planes[:, :3], planes[:, 3], strict=True):
             off = corners @ n - d
-            off[np.abs(off) > 3.0 * _HAIR * size] = 0.0
+            off[np.abs(off) > 3.0 * HAIR * size] = 0.0
             corners -= np.outer(off, n)
     return corners
 
