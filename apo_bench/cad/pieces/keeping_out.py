@@ -19,6 +19,9 @@ _MOST_MORE = 200
 """So many pieces more than without others at most."""
 _TRIES = 8
 _BETTER = 0.8
+_MOST_LOST = 0.05
+_LEFT = 0.01
+"""Of a part so much may be trimmed, if no more than this part of what reaches into others is left then."""
 _SLIVER = 1e-7
 
 
@@ -36,7 +39,7 @@ def keeping_out(parts: Iterable[CutPart], solid: Any, mates: Any, hair: float) -
         part = to_cut.pop()
         pieces = _apart(part, solid, mates, hair, least) if more > 0 else [part]
         if len(pieces) < 2:
-            yield part
+            yield _trimmed(part, solid, mates, hair)
         else:
             more -= len(pieces) - 1
             to_cut += pieces
@@ -60,6 +63,21 @@ def _apart(part: CutPart, solid: Any, mates: Any, hair: float, least: float) -> 
         if len(bodies) > 1 and left < smallest:
             best, smallest = bodies, left
     return best
+
+
+def _trimmed(part: CutPart, solid: Any, mates: Any, hair: float) -> CutPart:
+    """The hull of a part less what it reaches into others, if a plane that takes that away takes little else."""
+    hull = part.body.hull()
+    near, own = (_beside(body, hull) for body in (mates, solid))
+    into = (hull ^ near) - own
+    if into.is_empty():
+        return part
+    least = (1.0 - _MOST_LOST) * hull.volume()
+    for n, d in _sides(into):
+        body = hull.trim_by_plane(n, d + hair)
+        if body.volume() > least and ((body ^ near) - own).volume() < _LEFT * into.volume():
+            return CutPart(body, part.planes)
+    return part
 
 
 def _beside(body: Any, hull: Any) -> Any:

@@ -66,9 +66,10 @@ def simulated_pieces(solid: Solid, clearance_m: float) -> Mapping[str, tuple[Pie
     Remembered, since copies of a part, and the worlds of hands and of the arm, have the same.
     """
     pieces = physical_pieces(solid, clearance_m)
+    nothing: Mapping[str, tuple[Piece, ...]] = {piece.name: () for piece in solid.pieces}
     if not any(face.hole and face.kind != "rim" for face in solid.rounds.values()):
-        return {piece.name: (piece,) for piece in pieces}
-    return _cut(solid, pieces, clearance_m)
+        return {**nothing, **{piece.name: (piece,) for piece in pieces}}
+    return {**nothing, **_cut(solid, pieces, clearance_m)}
 
 
 def _cut(solid: Solid, pieces: tuple[Piece, ...], clearance_m: float) -> Mapping[str, tuple[Piece, ...]]:
