@@ -16,7 +16,7 @@ Own = Sequence[Line]
 
 
 def came_to(own: Own) -> str:
-    """`scenario`, or what stopped it: `import`, `draft`, `check`, `failed`; `grasp`, `turning` count apart."""
+    """`scenario`, or what stopped it: `import`, `draft`, `check`, `human`, `failed`; `grasp`, `turning` count apart."""
     if any("failed" in line for line in own):
         return "failed"
     if any("refused" in line for line in own):
@@ -24,8 +24,9 @@ def came_to(own: Own) -> str:
     if any(line.get("draft") for line in own):
         return "draft"
     wrong = list(_wrong(own))
+    tried = [line["success"] for line in own if "success" in line]
     if not wrong:
-        return "scenario"
+        return "human" if tried and all(success is None for success in tried) else "scenario"
     if all(_GRASP.search(sentence) or _TURNING.search(sentence) for sentence in wrong):
         return "turning" if any(_TURNING.search(sentence) for sentence in wrong) else "grasp"
     return "check"
@@ -48,8 +49,8 @@ Written by `python benchmarks/foreign.py benchmarks/foreign.json FOLDER --page d
 fixed before its first file was imported; where each file is from, its licence and its hash stand there, and nothing of
 the files is kept. Parts are imported at their places, a scenario is drafted without a hand and checked, and trials are
 run at 1 mm and 1 degree. What came of it: `scenario`; or `import` (a file makes no part), `draft` (no scenario),
-`check` (one that cannot be done), `grasp`, `turning` (that cannot be held, or needs turning over), `failed` (an error
-of this program). `code` is the commit that was run; an assembly without a line was not run.
+`check` (one that cannot be done), `grasp`, `turning` (that cannot be held, or needs turning over), `human` (the hands
+that demonstrate never get it right, so no trial counts), `failed` (an error of this program). `code` is the commit that was run; an assembly without a line was not run.
 
 """
 
@@ -71,7 +72,7 @@ def table(tried: Sequence[tuple[str, str, Own]]) -> str:
         made += [f"## {half}: {len(those)} assemblies", "", *_rows(those), "", *_sums([own for _, own in those]), ""]
         made += ["Sentences, numbers and names left out:", "", *_sentences(own for _, own in those), ""]
         made += [f"- {name}: {sentence}" for name, own in those for sentence in dict.fromkeys(_said(own))]
-        wrong = [(name, line) for name, own in those for line in own if line.get("success") is False]
+        wrong = [(name, line) for name, own in those for line in own if line.get("success", True) is not True]
         wrong = [(name, line) for name, line in wrong if line["method"] in METHODS[:2]]
         made += ["", "Trials that failed:", ""] if wrong else []
         made += [f"- {name}, `{x['method']}`, seed {x['seed']}: {x['code']}, {x['sentence']}" for name, x in wrong]

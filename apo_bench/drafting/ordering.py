@@ -24,6 +24,8 @@ from apo_bench.prediction.stability import BALANCED, imbalance
 
 _FALLS_M = 7e-4
 """What hangs in a hole falls by its play."""
+_CARRIES = 1e-3
+"""Of the normal of a contact that carries, upwards."""
 _MOST_LOOKS = 4000
 """Sets of parts that are looked at before the search ends."""
 _LARGEST_GROUP = 4
@@ -158,6 +160,9 @@ class OrderSearch:
             words = f"'{main}' would not keep its balance on {others}, which would be there before it"
             return Why(2, partial(str, words))
         arrival = arrive(assembly, moves, closes, poses)
+        if all(each.normal @ UP < _CARRIES for each in arrival.touched):
+            words = f"'{main}' would only touch upright walls of {others}, so nothing carries it without screws or glue"
+            return Why(2, partial(str, words))
         if not arrival.free:
             return Why(_TESTS - 1, partial(self._blocked, arrival, moves, rest, others))
         way = poses[main][:3, :3] @ arrival.line.direction
