@@ -50,7 +50,8 @@ fixed before its first file was imported; where each file is from, its licence a
 the files is kept. Parts are imported at their places, a scenario is drafted without a hand and checked, and trials are
 run at 1 mm and 1 degree. What came of it: `scenario`; or `import` (a file makes no part), `draft` (no scenario),
 `check` (one that cannot be done), `grasp`, `turning` (that cannot be held, or needs turning over), `human` (the hands
-that demonstrate never get it right, so no trial counts), `failed` (an error of this program). `code` is the commit that was run; an assembly without a line was not run.
+that demonstrate never get it right, so no trial counts), `failed` (an error of this program). `code` is the commit that
+was run; an assembly without a line was not run.
 
 """
 

@@ -26,7 +26,7 @@ _CLOSED_RAD = 1e-4
 _ROUNDS = 8
 _ARM_M = 0.05
 """Turns count as what they move at this distance."""
-_DEEP_M = 2e-5
+DEEP_M = 2e-5
 """Parts that are deeper in each other do not only touch."""
 NO_PLAY_MM = 1e-3
 _COAXIAL_M = 1e-4
@@ -76,7 +76,7 @@ def clashes(
     for a, b in combinations(solids, 2):
         deep = intrusion(solids[a], poses[a], solids[b], poses[b])
         tight = next(_tight(solids, poses, a, b, clearance_mm), "")
-        if tight or deep > _DEEP_M:
+        if tight or deep > DEEP_M:
             sentences.append(
                 tight or _inside(poses, a, b, deep, files, max(given_mm.get(a, 0.0), given_mm.get(b, 0.0)))
             )
@@ -87,7 +87,8 @@ def _inside(poses: Poses, a: str, b: str, deep_m: float, files: Mapping[str, Pat
     """What is wrong with two parts whose pieces are so deep in each other."""
     meshes = [drawn_mesh(files[part]) if part in files else None for part in (a, b)]
     drawn = overlap(meshes[0], poses[a], meshes[1], poses[b]) if meshes[0] and meshes[1] else None
-    if drawn is not None and drawn.depth_m <= _DEEP_M + 1e-3 * given_mm:
+    is_given = drawn is not None and drawn.depth_m <= DEEP_M + 1e-3 * given_mm
+    if drawn is not None and is_given and deep_m > drawn.depth_m + DEEP_M:
         return (
             f"'{a}' and '{b}' are {1e3 * drawn.depth_m:.3g} mm inside each other as drawn, but the convex pieces that "
             f"stand for them are so by {1e3 * deep_m:.3g} mm: an error of the import, not of the file, whose pieces of "
@@ -97,7 +98,7 @@ def _inside(poses: Poses, a: str, b: str, deep_m: float, files: Mapping[str, Pat
     if drawn is not None:
         at = pose.apply(np.linalg.inv(poses[a]), drawn.at[None])[0]
         where = f" as drawn, deepest at ({', '.join(f'{round(1e3 * x, 3) + 0.0:g}' for x in at)}) mm of '{a}'"
-        if deep_m > drawn.depth_m + _DEEP_M:
+        if deep_m > drawn.depth_m + DEEP_M:
             where += f" (the convex pieces that stand for them {1e3 * deep_m:.3g} mm)"
         deep_m = drawn.depth_m
     return (
