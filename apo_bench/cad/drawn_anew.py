@@ -1,6 +1,6 @@
 """When a mesh is drawn anew: where its faces have corners inside of them, or are hidden by noise, [mm]."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,6 +15,8 @@ from apo_bench.cad.faces.rough import patches_of, rough_of, together
 from apo_bench.cad.meshes.crossings import crossings
 from apo_bench.cad.solids.bodies import body_of, mesh_of
 from apo_bench.cad.solids.raw_solid import Mesh, Region
+from apo_bench.cad.time_limit import limit_of, time_limit
+from apo_bench.errors import InputError
 from apo_bench.geometry import WHOLE_TURN
 
 _EXACT = 1e-6
@@ -31,6 +33,8 @@ _FEW = 0.5
 _INSIDE = 0.02
 """A mesh of so many triangles, and with faces on so much of its surface, has so many corners inside of them if it was
 remeshed; drawing anew takes long, and does not help otherwise."""
+_PART_OF_TIME = 0.4
+"""Of what reading the file may take; a mesh for which that does not do is left as it is."""
 _VOLUME = 0.02
 """... and changes its volume by no more than this part."""
 
@@ -66,9 +70,27 @@ def faces_of(mesh: Mesh, fewest: int) -> Faces:
         if _share(fewer) > share + _MORE:
             share = _share(fewer)
             best = fewer
-    for near in _NEAR_MM if _may_be_rough(as_is, share) else ():
-        if share > _ALL or near > _NEAREST * mesh.extent:
-            break
+    if not _may_be_rough(as_is, share):
+        return best
+    limit_s = _PART_OF_TIME * limit_of(len(mesh.triangles))
+    try:
+        with time_limit("drawing the mesh anew", "save it with fewer triangles", limit_s):
+            for anew in _anew(mesh, fewest):
+                if _share(anew) > share + _MORE:
+                    share = _share(anew)
+                    best = anew
+                if share > _ALL:
+                    break
+    except InputError as error:  # faces as they were found are better than none
+        best = best._replace(said=(*best.said, str(error).split(";")[0] + ", so it was left as it is"))
+    return best
+
+
+def _anew(mesh: Mesh, fewest: int) -> Iterator[Faces]:
+    """The mesh drawn anew, with corners allowed to be farther and farther off its faces."""
+    for near in _NEAR_MM:
+        if near > _NEAREST * mesh.extent:
+            return
         rough = rough_of(mesh, near, fewest)
         patches = together(rough, regular(rough, with_rings(rough, patches_of(rough), fewest)))
         drawn = redrawn(rough, seen_from_corners(rough, patches))
@@ -78,11 +100,7 @@ def faces_of(mesh: Mesh, fewest: int) -> Faces:
             f"it was drawn anew, as corners are up to {near:g} mm off its faces: {len(mesh.triangles):,} triangles "
             f"became {len(drawn.mesh.triangles):,}, and corners moved by {drawn.moved:.2g} mm at most"
         )
-        anew = Faces(drawn.mesh, drawn.regions, facets_of(drawn.mesh).of, (said,))
-        if _share(anew) > share + _MORE:
-            share = _share(anew)
-            best = anew
-    return best
+        yield Faces(drawn.mesh, drawn.regions, facets_of(drawn.mesh).of, (said,))
 
 
 def _may_be_rough(faces: Faces, share: float) -> bool:

@@ -2,6 +2,7 @@
 
 import signal
 import threading
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
@@ -26,7 +27,7 @@ def limit_of(triangles: float) -> float:
 
 @contextmanager
 def time_limit(what: str, remedy: str, limit_s: float = _LIMIT_S) -> Iterator[None]:
-    """Raise an `InputError` if more time of the processor is taken.
+    """Raise an `InputError` if more time of the processor is taken. One limit may stand within another one.
 
     Nothing is limited outside of the main thread, nor on systems without such a clock.
     """
@@ -34,7 +35,10 @@ def time_limit(what: str, remedy: str, limit_s: float = _LIMIT_S) -> Iterator[No
         yield
         return
     before = signal.signal(signal.SIGPROF, _stop)
-    signal.setitimer(signal.ITIMER_PROF, limit_s)
+    begin = time.process_time()
+    left, _ = signal.setitimer(signal.ITIMER_PROF, limit_s)
+    if left:  # within a limit that ends before this one
+        signal.setitimer(signal.ITIMER_PROF, min(limit_s, left))
     try:
         yield
     except _Late:
@@ -42,6 +46,8 @@ def time_limit(what: str, remedy: str, limit_s: float = _LIMIT_S) -> Iterator[No
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.signal(signal.SIGPROF, before)
+        if left:
+            signal.setitimer(signal.ITIMER_PROF, max(left - (time.process_time() - begin), 1e-3))
 
 
 def _stop(number: int, frame: FrameType | None) -> Never:
