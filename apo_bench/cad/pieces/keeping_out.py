@@ -19,6 +19,8 @@ _MOST_MORE = 200
 """So many pieces more than without others at most."""
 _TRIES = 8
 _BETTER = 0.8
+_FREE = 0.05
+"""A cut is worth it that leaves so much less in others, or so much of the part free of them."""
 _MOST_LOST = 0.05
 _LEFT = 0.01
 """Of a part so much may be trimmed, if no more than this part of what reaches into others is left then."""
@@ -59,9 +61,12 @@ def _apart(part: CutPart, solid: Any, mates: Any, hair: float, least: float) -> 
         halves = whole.halves(n, d, hair)
         bodies = [CutPart(body, half.planes) for half in halves for body in half.body.decompose()]
         bodies = [each for each in bodies if each.body.volume() > least]
-        left = sum(((each.body.hull() ^ near) - own).volume() for each in bodies)
-        if len(bodies) > 1 and left < smallest:
-            best, smallest = bodies, left
+        left = [((each.body.hull() ^ near) - own).volume() for each in bodies]
+        # Around others the first cut takes a side off that is free, and no more.
+        free = sum(each.body.volume() for each, more in zip(bodies, left, strict=True) if more < least)
+        worth = sum(left) - (free > _FREE * whole.body.volume()) * into.volume() / 2.0
+        if len(bodies) > 1 and worth < smallest:
+            best, smallest = bodies, worth
     return best
 
 
