@@ -12,9 +12,9 @@ from itertools import combinations
 from apo_bench.assembly import Contact, PartFace, contact_kind, geometric_play
 from apo_bench.assembly.facing import facing
 from apo_bench.drafting.posed import PosedPart
-from apo_bench.drafting.touching import DEEP_M, NEAR_M, NEAR_RAD, NO_PLAY_MM, SHARE, walls_without_play
+from apo_bench.drafting.touching import NEAR_M, NEAR_RAD, NO_PLAY_MM, SHARE, walls_without_play
 from apo_bench.errors import InputError
-from apo_bench.geometry import intrusion, physical_pieces
+from apo_bench.geometry import physical_pieces
 from apo_bench.parts.receding import with_fit
 
 LOOSEN_MM = 0.2
@@ -38,7 +38,7 @@ def loosened(
         wide, thin = sorted(pair, key=lambda each: -each.solid.volume)
         why = ""
         for own, other in ((thin, wide), (wide, thin)):
-            tight = _tight(own, made[other.name], most_mm)
+            tight = _tight(own, other, most_mm)
             before = made[own.name].fit
             fit = {**before, **{face: max(mm, before.get(face, 0.0)) for face, mm in tight.items()}}
             try:
@@ -50,11 +50,9 @@ def loosened(
             if tight:
                 made[own.name] = replace(own, solid=solid, fit=fit)
                 notes.append(_said(own.name, other.name, tight))
-            # Where faces of the one do not do, those of the other one recede, too.
-            if own is wide or intrusion(solid, own.T, made[other.name].solid, other.T) <= DEEP_M:
-                break
+            break
         else:
-            notes += [why] if why else []
+            notes.append(why)
     return tuple(made.values()), tuple(notes)
 
 

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from itertools import product
+
 import numpy as np
 import pytest
 
 from apo_bench import InputError
-from apo_bench.geometry import Face, Solid, physical_pieces
+from apo_bench.geometry import Face, Hull, Solid, physical_pieces
 from apo_bench.parts import load_part
 from apo_bench.parts.faces import SIDES, unite
 
@@ -62,3 +65,24 @@ def test_a_side_with_a_fit_face_and_another_cannot_recede():
     }
     with pytest.raises(InputError, match="'left' and the face 'right'"):
         physical_pieces(Solid("odd", halves, (bar,), np.zeros(3), bar.half.prod() * 8), 1e-4)
+
+
+def layered(thin_m: float) -> Solid:
+    """A cube of 20 mm of two pieces, of which the upper one is thin and has the fit face."""
+
+    def slab(name: str, low: float, high: float) -> Hull:
+        return Hull(name, np.array(list(product((-0.01, 0.01), (-0.01, 0.01), (low, high)))))
+
+    top = Face(
+        "top", np.array([[-0.01, -0.01, 0.02], [0.01, -0.01, 0.02], [0.01, 0.01, 0.02], [-0.01, 0.01, 0.02]]), ()
+    )
+    pieces = (slab("thick", 0.0, 0.02 - thin_m), slab("thin", 0.02 - thin_m, 0.02))
+    return Solid("cube", {"top": replace(top, fit=True)}, pieces, np.array([0.0, 0.0, 0.01]), 8e-6)
+
+
+def test_a_piece_that_is_hardly_any_of_a_part_recedes_to_nothing():
+    (left,) = physical_pieces(layered(1.5e-4), 2.5e-4)
+    assert left.name == "thick"
+    assert [piece.name for piece in physical_pieces(layered(1.5e-4), 2e-5)] == ["thick", "thin"]
+    with pytest.raises(InputError, match=r"leaves less than 0\.1 mm of piece 'thin' of part 'cube'"):
+        physical_pieces(layered(2.5e-4), 2.5e-4)
