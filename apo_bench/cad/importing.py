@@ -31,7 +31,8 @@ _BYTES = 50
 """Of a triangle in an STL file; in others it has more."""
 _RAYS = 720
 _LEAST_SHARE = 0.5
-"""So much of a flat face must lie on the pieces where these stand for free shapes."""
+_NEARLY_ALL = 0.98
+"""So much of a flat face must lie on the pieces: where these stand for free shapes, and elsewhere."""
 _FILLED = (
     "the hole is filled: with all of its round holes the part would take too many convex pieces, and nothing that the "
     "file has comes into this one, or it is one of the smallest"
@@ -132,9 +133,13 @@ def import_part(
         faces: list[Face | RoundFace] = [*flats, *rounds]
         for i, face in enumerate(faces):
             reason = _why_not(solid, face)
-            # A flat face beside a free shape is stated as far as the pieces that stand for the shape hold it.
-            less = supported(face, solid.pieces) if reason and isinstance(face, Face) and pieces.hulls else None
-            if less is not None and less[1] > _LEAST_SHARE and not _why_not(solid, less[0]):
+            # A flat face is stated as far as pieces hold it: some stand for free shapes, and slivers are left out.
+            less = supported(face, solid.pieces) if reason and isinstance(face, Face) else None
+            if (
+                less is not None
+                and less[1] > (_LEAST_SHARE if pieces.hulls else _NEARLY_ALL)
+                and not _why_not(solid, less[0])
+            ):
                 flats[i], shares[face.name] = less
             elif reason:
                 refused[face.name] = reason
