@@ -21,7 +21,7 @@ from apo_bench.cad.solids.raw_solid import RawSolid, without_copies
 from apo_bench.cad.step.step_file import STEP_SUFFIXES, read_step
 from apo_bench.cad.time_limit import limit_of, time_limit
 from apo_bench.errors import InputError
-from apo_bench.geometry import Array, Face, Hull, RoundFace, Solid
+from apo_bench.geometry import Array, Face, Hull, RoundFace, Solid, passage
 from apo_bench.parts import load_part
 from apo_bench.parts.agreement import check_faces, supported
 from apo_bench.parts.allowed import HEAVIEST_KG, LIGHTEST_KG, MOST_CORNERS_IN_ALL, MOST_FACES
@@ -218,26 +218,11 @@ def _free_radius(solid: Solid, wall: RoundFace) -> float:
         share = 0.02 if wall.radii[0] < wall.radii[1] else 0.98
     at = wall.point + (wall.span[0] + share * wall.length) * wall.axis
     reach = 2.0 * max(wall.radii)
-    near = [
-        _nearest(piece.planes, at, out)
+    ways = (
+        passage(piece.planes, at, out)
         for piece in solid.pieces
         if isinstance(piece, Hull) and np.abs(at - piece.center).max() < piece.half.max() + reach
-    ]
-    return min(near, default=np.inf)
-
-
-def _nearest(planes: Array, at: Array, out: Array) -> float:
-    """Where rays from a point first enter a piece; infinite if none does.
-
-    A ray x + t v crosses the side n . x = d at t = (d - n . x) / (n . v): into the piece if n . v < 0, else out of it.
-    It is inside of all sides at once from the last way in to the first way out.
-    """
-    rate = planes[:, :3] @ out.T
-    room = (planes[:, 3] - planes[:, :3] @ at)[:, None]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        cross = room / rate
-    never = np.where((np.abs(rate) <= 1e-12) & (room < 0.0), np.inf, -np.inf)
-    enter = np.where(rate < -1e-12, cross, never).max(axis=0)
-    leave = np.where(rate > 1e-12, cross, np.inf).min(axis=0)
-    hit = (enter < leave - 1e-9) & (leave > 0.0)
-    return float(np.maximum(enter[hit], 0.0).min(initial=np.inf))
+    )
+    return min(
+        (float(np.maximum(enter, 0.0)[leave > 0.0].min(initial=np.inf)) for enter, leave in ways), default=np.inf
+    )
