@@ -18,6 +18,7 @@ import resource
 import subprocess
 import sys
 import time
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -231,7 +232,7 @@ def main() -> None:
     ]
     if given.page:
         there = [(each.name, each.half, own) for each in chosen if (own := _own(given.out, each.name))]
-        given.page.write_text(page(there), encoding="utf-8")
+        given.page.write_text(page(there, Counter(each.half for each in chosen)), encoding="utf-8")
         return
     ended = {line["assembly"] for line in _lines(given.out) if line.get("ended", -1) >= given.seeds}
     for each in chosen:

@@ -56,9 +56,14 @@ was run; an assembly without a line was not run.
 """
 
 
-def page(tried: Sequence[tuple[str, str, Own]]) -> str:
-    """The table as a page of results."""
-    return _HEAD + table(tried).rstrip() + "\n"
+def page(tried: Sequence[tuple[str, str, Own]], listed: Mapping[str, int]) -> str:
+    """The table as a page of results.
+
+    Args:
+        listed: Half -> how many assemblies the list has in it.
+    """
+    runs = ", ".join(f"{sum(each == half for _, each, _ in tried)} of {many} {half}" for half, many in listed.items())
+    return f"{_HEAD}Run, of those of the list: {runs}.\n\n{table(tried).rstrip()}\n"
 
 
 def table(tried: Sequence[tuple[str, str, Own]]) -> str:
