@@ -51,9 +51,12 @@ def test_an_assembly_is_counted_by_what_stopped_it() -> None:
     tried = [(end, "open", [*own, {"ended": 1, "code": "c0de"}]) for end, own in ends.items()]
     said = table(tried)
     assert said.count("| c0de |") == len(ends)
-    assert page(tried).startswith("# Assemblies that others drew")
-    assert said.rstrip() in page(tried)
+    assert page(tried, {"open": 1}).startswith("# Assemblies that others drew")
+    assert said.rstrip() in page(tried, {"open": 1})
     assert "scenarios, of those not refused for a grasp or for turning over: 1 of 5" in said
     assert "files imported: 7 of 8" in said
     assert "| scenario | 1 of 1, 6, 2, 0" not in said
     assert "| scenario | 1 of 1 | 6, 2, 0 | 3 flat on flat | scenario | 1 of 1 |" in said
+    assert "Run, of those of the list: " in page(tried, {"open": 9})
+    assert came_to([{"wrong": []}, {"success": None}, {"success": None}]) == "human"
+    assert came_to([{"wrong": []}, {"success": None}, {"success": False}]) == "scenario"
