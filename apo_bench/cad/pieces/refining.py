@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.cad.pieces.corners import LEFT_MM, reduced
+from apo_bench.cad.pieces.corners import LEFT_MM, is_thick, reduced
 from apo_bench.cad.pieces.cut_part import CutPart
 from apo_bench.cad.pieces.misfit import depths
 from apo_bench.cad.solids.bodies import mesh_of
@@ -127,7 +127,8 @@ def _worst(part: CutPart, beside: Beside) -> _Worst:
         length = np.linalg.norm(mesh.across, axis=1)
         normals = mesh.across[sides & (length > 0.0)] / length[sides & (length > 0.0), None]
         return _Worst(float(share[k]), points[k], normals)
-    if beside.others is not None and not len(points):
+    # What is thinner than a sheet is left out later.
+    if beside.others is not None and not len(points) and is_thick(mesh.corners):
         off = -depths(mesh.corners, _planes(reduced(mesh.corners, beside.flats, part.planes)))
         lost = mesh.corners[off > LEFT_MM]
         if beside.near(lost).any():
