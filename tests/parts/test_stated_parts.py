@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError
+from apo_bench.geometry import physical_pieces
 from apo_bench.io.documents import JsonNode
 from apo_bench.parts import load_part, part_names, part_path, read_part
 from apo_bench.parts.load import check_part
@@ -279,12 +280,17 @@ def test_pieces_of_many_sides_are_refused(part: Path) -> None:
 
 
 def test_a_fit_hole_whose_pieces_touch_it_in_corners_is_refused(tmp_path: Path) -> None:
-    """Triangles that fan out from corners of the wall have no side on it."""
+    """Triangles that fan out from corners of the wall have no side on it; where they are hardly anything of the part,
+    they recede to nothing, and the hole gets wider all around."""
     hole = circle(5, name="bore", sides=64)
-    body = extrude(rectangle(60, 40), 0, 10, holes=[hole])
+    body = extrude(rectangle(12, 12), 0, 10, holes=[hole])
     marked = replace(body, rounds=tuple(replace(wall, fit=True) for wall in body.rounds))
     assert load_part(write_part("free", body, tmp_path, source="a test", licence="none")).rounds["bore"].hole
     assert "touch it in a corner only" in refusal(write_part("fan", marked, tmp_path, source="a test", licence="none"))
+    large = extrude(rectangle(60, 40), 0, 10, holes=[hole])
+    fitting = replace(large, rounds=tuple(replace(wall, fit=True) for wall in large.rounds))
+    solid = load_part(write_part("wide", fitting, tmp_path, source="a test", licence="none"))
+    assert len(physical_pieces(solid, 2.5e-4)) < len(solid.pieces)
     banded = extrude(rectangle(60, 40), 0, 10, holes=[circle(5, name="bore", sides=64, fit=True)])
     assert load_part(write_part("band", banded, tmp_path, source="a test", licence="none")).fits
 
