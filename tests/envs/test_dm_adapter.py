@@ -17,6 +17,14 @@ dm_env = pytest.importorskip("dm_env")
 from dm_env import specs, test_utils  # noqa: E402
 
 
+@pytest.fixture(autouse=True)
+def nothing_to_draw_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    """dm_control takes hold of a graphics driver when it is imported, its viewer by PyOpenGL; later tests of this
+    process draw by EGL."""
+    monkeypatch.setenv("MUJOCO_GL", "disable")
+    monkeypatch.setenv("PYOPENGL_PLATFORM", "egl")
+
+
 def short() -> gymnasium.Env[Any, Any]:
     return gymnasium.make("APOReplay-v0", scenario="block_on_block", level=0.0, careless=0.0, grasp="weld")
 
