@@ -30,7 +30,7 @@ import numpy as np
 from apo_bench import Demonstration, Observation, draw_layout, load_scenario
 from apo_bench.assembly import lowered_observation
 from apo_bench.correction.correctors import correct
-from apo_bench.correction.learned.correctors import learned_set
+from apo_bench.correction.learned.correctors import GROSS_SCALE, learned_set
 from apo_bench.correction.learned.network import forward, shapes
 from apo_bench.correction.learned.tokens import Tokens, tokens
 from apo_bench.generated import FAMILIES
@@ -54,7 +54,6 @@ EACH = 30
 STEPS = 6000
 BATCH = 64
 RATE = 2e-3
-GROSS_SCALE = 40.0
 TRIED = (
     "stick_in_tower",
     "carried_bridge",
