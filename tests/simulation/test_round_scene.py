@@ -1,5 +1,6 @@
 """Scenes of convex pieces: their geoms are where the part has them, and what is round rests."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import mujoco
@@ -86,6 +87,22 @@ def test_parts_of_boxes_are_simulated_as_their_file_says_them():
             assert int(geom.condim[0]) == 3
     spec = room_with_parts(scenario, scene.clearance_mm, scene.physics)
     assert not any(body.explicitinertial for body in spec.bodies)
+
+
+def test_a_piece_that_goes_on_along_the_tangent_of_a_hole_is_no_wall_of_it():
+    solid = solid_of("plate", PLATE)
+    (hole,) = (face for face in solid.rounds.values() if face.hole)
+    out, along = (np.array([np.cos(a), np.sin(a), 0.0]) for a in np.radians([40.0, -50.0]))
+    corners = [
+        hole.point + (hole.radii[0] + d) * out + t * along + [0.0, 0.0, z]
+        for d in (0.0, 1e-3)
+        for t in (0.025, 0.03)
+        for z in (0.0, 0.01)
+    ]
+    beside = Hull("beside", np.array(corners))
+    (made,) = simulated_pieces(replace(solid, pieces=(*solid.pieces, beside)), 0.0)["beside"]
+    assert isinstance(made, Hull)
+    assert np.abs(made.center - beside.center).max() < 2.0 * SAGITTA_M
 
 
 @pytest.mark.parametrize("clearance_m", [0.0, 0.00025])

@@ -126,9 +126,10 @@ def _walls(face: RoundFace, pieces: Iterable[Piece], clearance_m: float) -> Iter
         return
     widest = max(face.radii) + clearance_m * face.fit
     for hull, outwards, u in wedges:
-        far = float((hull.corners @ u).max() - face.point @ u)
-        thick = min(_THICK_M, (far - widest) / 2)
-        if thick > _THINNEST_M:
+        out = (hull.corners - face.point) @ u
+        thick = min(_THICK_M, (float(out.max()) - widest) / 2)
+        # A piece may go on along the tangent, far from the wall: beside a pocket whose corners are rounded.
+        if thick > _THINNEST_M and out.min() < widest + thick:
             yield _Wall(hull, face, outwards, np.append(u, u @ face.point + widest + thick), widest + thick)
 
 
