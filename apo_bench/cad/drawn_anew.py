@@ -21,18 +21,21 @@ from apo_bench.geometry import WHOLE_TURN
 
 _EXACT = 1e-6
 """Corners this near to a flat piece, in parts of the size, are left out of it."""
-_NEAR_MM = (0.045, 0.1, 0.2)
+_NEAR_MM = (0.01, 0.045, 0.1, 0.2)
 _NEAREST = 4e-3
 """How far corners may be off their faces: the first of these with which nearly all of the surface is faces, and no more
 than this part of the size."""
 _ALL = 0.998
 _MORE = 0.005
 """A mesh is drawn anew if that makes so much more of its surface faces."""
+_SIMPLER = 0.5
+"""... or if the faces that it has then are less than this part as many, and all of the surface."""
 _SMALL = 1500
 _FEW = 0.5
 _INSIDE = 0.02
+_MANY = 0.05
 """A mesh of so many triangles, and with faces on so much of its surface, has so many corners inside of them if it was
-remeshed; drawing anew takes long, and does not help otherwise."""
+remeshed, or so many faces, both for each of its own; drawing anew takes long, and does not help otherwise."""
 _PART_OF_TIME = 0.4
 """Of what reading the file may take; a mesh for which that does not do is left as it is."""
 _VOLUME = 0.02
@@ -76,7 +79,7 @@ def faces_of(mesh: Mesh, fewest: int) -> Faces:
     try:
         with time_limit("drawing the mesh anew", "save it with fewer triangles", limit_s):
             for anew in _anew(mesh, fewest):
-                if _share(anew) > share + _MORE:
+                if _share(anew) > share + _MORE or _is_simpler(anew, best):
                     share = _share(anew)
                     best = anew
                 if share > _ALL:
@@ -104,12 +107,12 @@ def _anew(mesh: Mesh, fewest: int) -> Iterator[Faces]:
 
 
 def _may_be_rough(faces: Faces, share: float) -> bool:
-    """Whether drawing a mesh anew may help: it is small, hardly any face is found, or faces have corners inside.
+    """Whether drawing a mesh anew may help: it is small, hardly a face is found, or too many, or corners lie inside.
 
     What CAD tessellates has its corners on the borders of faces; what is no face there is a free shape.
     """
     mesh = faces.mesh
-    if len(mesh.triangles) < _SMALL or share < _FEW:
+    if len(mesh.triangles) < _SMALL or share < _FEW or len(faces.regions) > _MANY * len(mesh.triangles):
         return True
     inner = 0
     for region in faces.regions:
@@ -141,6 +144,12 @@ def _share(faces: Faces) -> float:
     areas = np.linalg.norm(faces.mesh.across, axis=1)
     good = (r.triangles for r in faces.regions if r.kind == "plane" or (r.is_round and _is_plain(faces.mesh, r)))
     return float(sum(areas[triangles].sum() for triangles in good) / areas.sum())
+
+
+def _is_simpler(anew: Faces, before: Faces) -> bool:
+    """Whether a mesh drawn anew has faces everywhere, and few: its sides had become faces of their own before."""
+    everywhere = all(region.kind == "plane" or region.is_round for region in anew.regions)
+    return everywhere and len(anew.regions) < _SIMPLER * len(before.regions)
 
 
 def _is_plain(mesh: Mesh, wall: Region) -> bool:

@@ -14,7 +14,7 @@ from apo_bench.cad.drawn_anew import faces_of
 from apo_bench.cad.importing import Imported, import_part, raw_solids
 from apo_bench.cad.solids.bodies import mesh_of
 from tests.cad.held import hold
-from tests.cad.made import MADE, block, write_triangles
+from tests.cad.made import MADE, block, rod, write_triangles
 
 
 def imported(triangles: Any, folder: Path) -> Imported:
@@ -54,6 +54,19 @@ def test_corners_anywhere_on_a_wall_are_of_one_wall(tmp_path: Path) -> None:
     made = MADE["plate"]()
     done = imported(triangles_of(made.mesh.refine_to_length(4.0), 0.003), tmp_path)
     hold(done, made._replace(volume=1e9 * done.solid.volume), 0.02)
+
+
+def test_a_fine_shaft_with_flats_in_a_file_with_three_decimals_has_no_face_for_each_side(tmp_path: Path) -> None:
+    """Corners off by a micrometre turn the narrow sides of a bore by half a degree; the flats end on the wall."""
+    chamfered = rod(4.986, 19, n=144) + rod(4.986, 0.486, (0, 0, 19), 4.5, n=144)
+    cut = block(20, 8, 12, (0, 8, -1)) + block(20, 8, 12, (0, -8, -1))
+    made = (chamfered - cut - rod(2.458, 30, (0, 0, -1), n=144)).refine_to_length(2.0)
+    _, (raw,) = raw_solids(write_triangles(triangles_of(made).round(3), tmp_path / "a.stl"), None)
+    kinds = [region.kind for region in raw.regions]
+    assert (kinds.count("plane"), kinds.count("cylinder"), kinds.count("cone"), len(kinds)) == (6, 2, 1, 9)
+    assert sorted(region.radii[0] for region in raw.regions if region.kind == "cylinder") == pytest.approx(
+        [2.458, 4.986], abs=1e-3
+    )
 
 
 def test_what_is_fine_as_it_is_stays_as_it_is(tmp_path: Path) -> None:

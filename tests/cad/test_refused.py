@@ -164,6 +164,16 @@ def test_cracks_are_closed_within_a_width_that_is_said(tmp_path: Path) -> None:
     assert dict(import_part(raw, "a", tmp_path, "a.stl").refused) == {}
 
 
+def test_large_triangles_beside_small_ones_leave_no_crack(tmp_path: Path) -> None:
+    """Sides that were subdivided, below a top that was not: each edge of it has corners on the other side only."""
+    given = triangles(block(24, 24, 9).refine(8))
+    top = np.array([[[-12, -12, 9], [12, -12, 9], [12, 12, 9]], [[-12, -12, 9], [12, 12, 9], [-12, 12, 9]]])
+    given = np.concatenate([given[(given[:, :, 2] < 9).any(axis=1)], top])
+    _, (raw,) = raw_solids(write_triangles(given, tmp_path / "a.stl"), None)
+    assert sum(region.kind == "plane" for region in raw.regions) == len(raw.regions) == 6
+    assert raw.mesh.volume == pytest.approx(24 * 24 * 9)
+
+
 def test_units_are_as_asked(tmp_path: Path) -> None:
     path = write_stl(block(2, 1, 1), tmp_path / "a.stl")
     _, (raw,) = raw_solids(path, "in")

@@ -138,15 +138,20 @@ class _Drawing:
                 around[k].append(edge)
         faces = range(len(self.surfaces))
         anew = {k for k in faces if self._is_plain(k, around[k])}
-        for edge in self.edges:
-            edge.drawn = self._drawn(edge) if anew.issuperset(edge.of) else edge.corners
-        for k in faces:
-            directed = [e.drawn if e.of[0] == k else e.drawn[::-1] for e in around[k]]
-            new = None
-            if k in anew:
-                is_flat = isinstance(self.surfaces[k], Plane)
-                new = self._flat(k, directed) if is_flat else self._strips(k, directed)
-            self.triangles.append(self.mesh.triangles[self.owner == k] if new is None else new)
+        while True:
+            for edge in self.edges:
+                edge.drawn = self._drawn(edge) if anew.issuperset(edge.of) else edge.corners
+            drawn = ((k, self._within(k, around[k])) for k in sorted(anew))
+            new = {k: triangles for k, triangles in drawn if triangles is not None}
+            if len(new) == len(anew):
+                break
+            anew = set(new)  # what cannot be drawn between new borders keeps its own ones
+        self.triangles = [new.get(k, self.mesh.triangles[self.owner == k]) for k in faces]
+
+    def _within(self, k: int, edges: list[_Edge]) -> Any:
+        """Triangles of a face between its borders as they are drawn; None if they make none."""
+        directed = [edge.drawn if edge.of[0] == k else edge.drawn[::-1] for edge in edges]
+        return (self._flat if isinstance(self.surfaces[k], Plane) else self._strips)(k, directed)
 
     def _is_plain(self, k: int, edges: list[_Edge]) -> bool:
         """Whether a face can be drawn from its borders: a flat one, or a wall between two level ends."""

@@ -109,13 +109,17 @@ def patches_of(rough: Rough) -> list[Patch]:
 
 def _patches_in(rough: Rough, group: Any) -> Iterator[Patch]:
     """Faces in a smooth part of the surface: one that is all of it, or the largest ones that grow from seeds."""
-    total = rough.areas[group].sum()
+    strong = group[~rough.weak[group]]
+    strong = strong if len(strong) else group
     for kind in ("plane", "cylinder", "cone"):
-        surface = _fitted(rough, kind, group)
+        surface = _fitted(rough, kind, strong)
         if surface is not None:
             mine, hole = _on(rough, surface, group)
-            if rough.areas[mine].sum() > _WHOLE * total:
-                yield Patch(surface, group, hole)
+            if rough.areas[np.intersect1d(mine, strong)].sum() > _WHOLE * rough.areas[strong].sum():
+                stray = np.setdiff1d(group, np.concatenate([mine, strong]))  # narrow, and of another face
+                yield Patch(surface, np.setdiff1d(group, stray), hole)
+                if len(stray):
+                    yield Patch(None, stray)
                 return
     least = _LEAST * rough.areas.sum()
     left = group
