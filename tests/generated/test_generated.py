@@ -117,7 +117,7 @@ def test_contact_corrects_it(scenario: Scenario) -> None:
     assert goal_errors(assembly, layout.start, layout.goals, correction.goals)[0] < 0.02
 
 
-@pytest.mark.parametrize("name", ["generated:grooves:2", "generated:rods:0", "generated:castles:2"])
+@pytest.mark.parametrize("name", ["generated:grooves:2", "generated:rods:0", "generated:rods:2", "generated:castles:2"])
 def test_parts_are_as_their_files_say(name: str) -> None:
     """The loader leaves out this check of parts that it has just written."""
     for path in scenario_path(name).parent.glob("*.xml"):

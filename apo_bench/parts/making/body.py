@@ -125,9 +125,16 @@ def _joined_flats(flats: Sequence[Face]) -> Iterable[Face]:
                 by_name.setdefault((face.name, face.fit), []).append(area)
             for (name, fit), areas in by_name.items():
                 rest = shapely.set_precision(shapely.unary_union(areas), 0.0).difference(against)
-                for polygon in polygons_of(rest):
+                for polygon in _apart(rest):
                     if not polygon.buffer(-_NARROW_M / 2).is_empty:
                         yield _face(name, fit, polygon, to_plane, d, sign)
+
+
+def _apart(area: Any) -> Iterable[Any]:
+    """Polygons; what hangs together in a point alone is apart, since no file has the point twice."""
+    for polygon in polygons_of(area):
+        parts = [*polygons_of(shapely.set_precision(polygon, _SAME_M))]
+        yield from parts if len(parts) > 1 else [polygon]
 
 
 def _plane(n: Array) -> Array:
