@@ -105,7 +105,7 @@ def _with_cracks_closed(mesh: Mesh, width: float) -> Mesh:
 
 
 def _cut_at_corners(mesh: Mesh, width: float) -> Mesh:
-    """With triangles cut where corners of other open edges lie on an open edge of theirs, so that fewer needles are added."""
+    """With triangles cut where corners of other open edges lie on an open edge of theirs: fewer needles are added."""
     for k in range(3):
         is_open = _are_open(mesh)
         rim = np.unique(mesh.sides[is_open])
