@@ -1,6 +1,6 @@
 """Regions become what a part file states: faces that can make contacts, and moments, [m]."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 import numpy as np
@@ -8,7 +8,7 @@ import numpy as np
 from apo_bench.cad.pieces.cutting import Cut
 from apo_bench.cad.solids.bodies import mesh_of
 from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, Region, square_to
-from apo_bench.geometry import Array, Face, RoundFace, sides_of, straightened
+from apo_bench.geometry import Array, Face, Hull, RoundFace, sides_of, straightened
 from apo_bench.parts.making.moments import Moments
 from apo_bench.parts.making.outline import COARSE_SIDES
 
@@ -115,12 +115,9 @@ def solid_moments(raw: RawSolid, cut: Cut) -> Moments:
     it. It is not asked of flat and round solids: a kernel integrates faces that are trimmed badly up to a hundredth
     wrong.
     """
-    import manifold3d
-
     if cut.hulls or cut.filled:
-        pieces = [manifold3d.Manifold.hull_points(1e3 * piece.corners) for piece in cut.pieces]
-        moments = _mesh_moments(mesh_of(manifold3d.Manifold.batch_boolean(pieces, manifold3d.OpType.Add)))
-    elif raw.moments is not None and not all(r.kind == "plane" or r.square for r in raw.regions):
+        return moments_of_pieces(cut.pieces)
+    if raw.moments is not None and not all(r.kind == "plane" or r.square for r in raw.regions):
         moments = raw.moments
     else:
         moments = _mesh_moments(raw.mesh)
@@ -128,6 +125,14 @@ def solid_moments(raw: RawSolid, cut: Cut) -> Moments:
             if region.square:
                 moments = moments.plus(_behind_strips(raw, region))
     return moments.in_metres
+
+
+def moments_of_pieces(pieces: Iterable[Hull]) -> Moments:
+    """[m]: of what the pieces fill."""
+    import manifold3d
+
+    hulls = [manifold3d.Manifold.hull_points(1e3 * piece.corners) for piece in pieces]
+    return _mesh_moments(mesh_of(manifold3d.Manifold.batch_boolean(hulls, manifold3d.OpType.Add))).in_metres
 
 
 def _mesh_moments(mesh: Mesh) -> Moments:

@@ -11,7 +11,7 @@ import numpy as np
 
 from apo_bench.cad.drawn_anew import faces_of
 from apo_bench.cad.faces.facets import FEWEST_SIDES
-from apo_bench.cad.from_regions import contact_faces, solid_moments
+from apo_bench.cad.from_regions import contact_faces, moments_of_pieces, solid_moments
 from apo_bench.cad.meshes.mesh_file import CadFile, read_meshes
 from apo_bench.cad.meshes.shells import CROSSED_A_LITTLE, check_uncrossed, closed_solids
 from apo_bench.cad.pieces.cutting import Cut, cut
@@ -33,6 +33,9 @@ _RAYS = 720
 _LEAST_SHARE = 0.5
 _NEARLY_ALL = 0.98
 """So much of a flat face must lie on the pieces: where these stand for free shapes, and elsewhere."""
+_SLIVERS = 0.01
+"""What is left out of pieces as too thin may be so much of the part; then the part has the volume of its pieces."""
+_MATTER = re.compile(r"\S+, (volume_mm3|centroid_mm|inertia_mm5): ")
 _FILLED = (
     "the hole is filled: with all of its round holes the part would take too many convex pieces, and nothing that the "
     "file has comes into this one, or it is one of the smallest"
@@ -184,6 +187,10 @@ def _as_read(write: Callable[[Body], Path], body: Body, refused: dict[str, str],
             path.with_suffix(".toml").unlink(missing_ok=True)
             face = re.match(r"\S+, faces, (\w+): ([^;]*)", why)
             left = [f.name for faces in (body.flats, body.rounds) for f in faces]
+            own = moments_of_pieces(body.pieces) if _MATTER.match(why) else body.moments
+            if 0.0 < abs(own.size - body.moments.size) < _SLIVERS * own.size:
+                body = replace(body, moments=own)
+                continue
             if face is None or face[1] not in left or len(left) == 1:
                 raise InputError(
                     f"{source}: the import fails, by no fault of the file: the pieces that it cuts the solid into "

@@ -16,6 +16,8 @@ import pytest
 from scipy.spatial import ConvexHull
 
 from apo_bench import InputError
+from apo_bench.cad import importing
+from apo_bench.cad.from_regions import solid_moments
 from apo_bench.cad.importing import import_part, raw_solids
 from apo_bench.cad.step.from_brep import raw_of
 from apo_bench.cad.step.surfaces import BrepFace, BrepSolid
@@ -172,6 +174,22 @@ def test_large_triangles_beside_small_ones_leave_no_crack(tmp_path: Path) -> Non
     _, (raw,) = raw_solids(write_triangles(given, tmp_path / "a.stl"), None)
     assert sum(region.kind == "plane" for region in raw.regions) == len(raw.regions) == 6
     assert raw.mesh.volume == pytest.approx(24 * 24 * 9)
+
+
+def test_what_pieces_leave_out_is_no_matter_of_the_part_up_to_a_hundredth(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = write_triangles(triangles(block(20, 20, 20)), tmp_path / "a.stl")
+    _, (raw,) = raw_solids(path, None)
+
+    def larger(by: float) -> None:
+        monkeypatch.setattr(importing, "solid_moments", lambda *of: solid_moments(*of).plus(solid_moments(*of), by))
+
+    larger(0.004)
+    assert import_part(raw, "a", tmp_path, "a.stl").solid.volume == pytest.approx(8e-6)
+    larger(0.02)
+    with pytest.raises(InputError, match="by no fault of the file: .* volume_mm3"):
+        import_part(raw, "a", tmp_path, "a.stl")
 
 
 def test_units_are_as_asked(tmp_path: Path) -> None:
