@@ -50,6 +50,13 @@ def cut(raw: RawSolid, others: Array | None = None, mates: Any = None) -> Cut:
     Raises:
         InputError: The mesh makes no solid, or there are more pieces than a part may have.
     """
+    trimmed, is_one = _cut(raw, others, mates, True)
+    # What is taken off hulls may be all that holds two of them together.
+    return trimmed if is_one else _cut(raw, others, mates, False)[0]
+
+
+def _cut(raw: RawSolid, others: Array | None, mates: Any, trims: bool) -> tuple[Cut, bool]:
+    """The pieces, and whether all of them hang together."""
     import manifold3d
     from scipy.spatial import ConvexHull, cKDTree
 
@@ -64,7 +71,7 @@ def cut(raw: RawSolid, others: Array | None = None, mates: Any = None) -> Cut:
         body = body.simplify(min(1e-3 * size, 0.01))
     grown = list[float]()
     flats = np.array([(*r.direction, r.direction @ r.point) for r in raw.regions if r.kind == "plane"]).reshape(-1, 4)
-    beside = Beside(size, flats, None if others is None else cKDTree(others))
+    beside = Beside(size, flats, None if others is None else cKDTree(others), trims)
     outlines: list[Array] = []
     shafts = [r for r in raw.regions if r.is_round and not r.hole and r.square]
     parts = convex_parts(body, beside)
@@ -98,19 +105,21 @@ def cut(raw: RawSolid, others: Array | None = None, mates: Any = None) -> Cut:
             "out fillets and free surfaces."
         )
     filled = tuple(bore.name for bore in bores if bore not in kept)
-    whole, lost = _without_crumbs(list(as_cylinders(pieces, shafts)), _CRUMB * raw.mesh.volume)
-    return Cut(tuple(whole), sum([*grown, *(-each for each in lost)]), len(grown) + len(lost), filled)
+    whole, lost, is_one = _without_crumbs(list(as_cylinders(pieces, shafts)), _CRUMB * raw.mesh.volume)
+    return Cut(tuple(whole), sum([*grown, *(-each for each in lost)]), len(grown) + len(lost), filled), is_one
 
 
-def _without_crumbs(pieces: list[Hull], most: float) -> tuple[list[Hull], list[float]]:
-    """Without what hangs on nothing once free shapes are trimmed, if it is no more than that, and how much that is."""
+def _without_crumbs(pieces: list[Hull], most: float) -> tuple[list[Hull], list[float], bool]:
+    """Without what hangs on nothing once free shapes are trimmed, if it is no more than that; how much that is; and
+    whether nothing else hangs on nothing."""
     from scipy.spatial import ConvexHull
 
     groups = sorted(touching_groups(pieces) or (), key=len)
     lost = [(group, sum(ConvexHull(1e3 * pieces[k].corners).volume for k in group)) for group in groups[:-1]]
     crumbs = [(group, volume) for group, volume in lost if volume < most]
     gone = {k for group, _ in crumbs for k in group}
-    return [piece for k, piece in enumerate(pieces) if k not in gone], [volume for _, volume in crumbs]
+    left = [piece for k, piece in enumerate(pieces) if k not in gone]
+    return left, [volume for _, volume in crumbs], len(crumbs) == len(lost)
 
 
 def _bored(outlines: Sequence[Array], bores: Sequence[Region], flats: Array) -> list[Hull] | None:

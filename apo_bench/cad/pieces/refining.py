@@ -51,6 +51,8 @@ class Beside:
     """Planes of its flat faces, (k, 4)."""
     others: Any = None
     """A tree of points of what comes near to it, on its way and in its place; None: nothing is known of others."""
+    trims: bool = True
+    """Whether what sticks out of the solid is taken off its hulls."""
 
     @property
     def most(self) -> int:
@@ -106,7 +108,7 @@ def refined(parts: Iterable[CutPart], beside: Beside, volume: float, hair: float
         pieces = _best(part, worst, _SLIVER * volume, hair) if more else [part]
         if len(pieces) < 2:
             done += 1
-            yield _within(part, beside)
+            yield _within(part, beside) if beside.trims else part
         else:
             for each in pieces:
                 worst = _worst(each, beside)
