@@ -27,6 +27,8 @@ from apo_bench.parts.agreement import check_faces, supported
 from apo_bench.parts.allowed import HEAVIEST_KG, LIGHTEST_KG, MOST_CORNERS_IN_ALL, MOST_FACES
 from apo_bench.parts.making import Body, solid_of, write_part
 
+_CUTTING = 3.0
+"""Of the time for reading a file so much may go to cutting each of its solids."""
 _BYTES = 50
 """Of a triangle in an STL file; in others it has more."""
 _RAYS = 720
@@ -107,7 +109,7 @@ def import_part(
     with time_limit(
         f"{source}: cutting the part into convex pieces",
         "leave out small holes, fillets and free surfaces",
-        limit_of(len(raw.mesh.triangles)),
+        _CUTTING * limit_of(len(raw.mesh.triangles)),
     ):
         weight = 1e-9 * density * raw.mesh.volume
         if not LIGHTEST_KG <= weight <= HEAVIEST_KG:
