@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.assembly import Correction, Observation, Outcome, Plan, Reached, Snapshot
+from apo_bench.assembly import Correction, Observation, Outcome, Plan, Reached, Snapshot, placements
 from apo_bench.envs.robot import RobotSettings
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import Verdict, judge
@@ -56,11 +56,15 @@ class Begun:
         """By how much the part is off where its neighbours, as they stand now, want it; as `TipControl.off`."""
         assembly = self.plan.assembly
         k = self.start.operation
-        main = assembly.operations[k].main
-        true = {**self.start.parts, **{assembly.operations[i].main: self.goals[i] for i in range(k)}}
+        operation = assembly.operations[k]
+        true = placements(assembly, self.plan.start, self.goals)[k]
         now = control.poses()
-        besides = sorted({of.part for contact in assembly.operations[k].contacts for of in contact} - {main})
-        return control.off([now[part] @ pose.inverse(true[part]) @ self.goals[k] for part in besides])
+        # Where a part in the hand, the main one or one that it carries, belongs beside a part that stands.
+        pairs = sorted({(contact.manipulated.part, contact.environment.part) for contact in operation.contacts})
+        wanted = [
+            now[there] @ pose.inverse(true[there]) @ true[held] @ pose.inverse(now[held]) for held, there in pairs
+        ]
+        return control.off([T @ now[operation.main] for T in wanted])
 
 
 class Trials(NamedTuple):
