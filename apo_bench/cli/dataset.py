@@ -39,7 +39,9 @@ def dataset_make(
     seed: Annotated[int, typer.Option(help="First seed; those of tracks and of the headline are small.")] = _FIRST_SEED,
     format: Annotated[str, typer.Option(help="parquet, lerobot or minari.")] = "parquet",
     record: Annotated[str, typer.Option(help="replays, or insertions: APOInsert-v0 led by a policy.")] = "replays",
-    policy: Annotated[str, typer.Option(help="Of insertions: expert, straight or module:function.")] = "expert",
+    policy: Annotated[
+        str, typer.Option(help="Of insertions: expert, straight, dagger-insert, or your own.")
+    ] = "expert",
     **options: Any,
 ) -> None:
     """Run trials and write what was seen, planned and true, and all frames, with a card for people and programs."""

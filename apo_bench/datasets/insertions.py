@@ -61,7 +61,8 @@ def insertions(
     """Have a policy insert, trial by trial, all scenarios one after the other.
 
     Args:
-        policy: One of `POLICIES`, or `module:function` of the environment and what is seen.
+        policy: One of `POLICIES`, or `module:function` of the environment and what is seen, or `module:class`, of which
+            each episode makes one.
         say: Is told in a sentence of each trial that does not come to the operation.
 
     Raises:
@@ -96,10 +97,11 @@ def _rollouts(trials: Iterable[TrialSettings], policy: str, act: Any, say: Calla
             say(str(error))
             continue
         scenario, k = env.scene.scenario, env.operation
+        decide = act() if isinstance(act, type) else act
         sights, actions, rewards = [seen], [], []
         over = False
         while not over:
-            actions.append(np.clip(act(env, seen), -1.0, 1.0).astype(np.float32))
+            actions.append(np.clip(decide(env, seen), -1.0, 1.0).astype(np.float32))
             seen, reward, over, _, info = env.step(actions[-1])
             sights.append(seen)
             rewards.append(reward)

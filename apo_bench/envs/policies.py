@@ -12,8 +12,13 @@ from apo_bench.geometry import Array
 from apo_bench.records import NO_ROBOT_ERROR, TrialSettings
 
 POLICIES: Mapping[str, str] = MappingProxyType(
-    {"expert": "apo_bench.envs.policies:expert", "straight": "apo_bench.envs.policies:straight"}
+    {
+        "dagger-insert": "apo_bench.envs.dagger_insert:DaggerInsert",
+        "expert": "apo_bench.envs.policies:expert",
+        "straight": "apo_bench.envs.policies:straight",
+    }
 )
+"""By name; one that remembers is a class, of which each episode makes one."""
 _GAIN = 0.5
 """Of what it is off, so much is made up for with each action."""
 

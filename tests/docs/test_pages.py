@@ -173,7 +173,7 @@ def test_printed_numbers_are_compared_to_rounding_and_words_exactly(printed: str
 
 
 def test_pages_and_notebooks_use_what_the_package_exports() -> None:
-    """But for quantiles of two estimators' noise, tools of parts, dm_env, touches, pairs, tracking, own tests."""
+    """But for quantiles of two estimators' noise, tools of parts, dm_env, touches, pairs, learners, tracking, tests."""
     code = {page: [block.text for block in blocks(page) if block.language == "python"] for page in PAGES}
     for path in (ROOT / "notebooks").glob("*.ipynb"):
         cells = json.loads(path.read_text(encoding="utf-8"))["cells"]
@@ -186,10 +186,13 @@ def test_pages_and_notebooks_use_what_the_package_exports() -> None:
     }
     assert sum(map(len, code.values())) > 10
     assert inner == {
+        "apo_bench.correction.learned.class_mean",
         "apo_bench.correction.touches",
         "apo_bench.datasets",
         "apo_bench.envs",
         "apo_bench.envs.apo_track",
+        "apo_bench.envs.dagger_insert",
+        "apo_bench.envs.policies",
         "apo_bench.envs.tracking",
         "apo_bench.observation.fitting.quantiles",
         "apo_bench.parts",
