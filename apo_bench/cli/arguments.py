@@ -6,7 +6,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.io.ordinary_files import check_target
 
 NO_RESULT = 1
@@ -39,8 +39,9 @@ def _converted(text: str, option: str, kind: type[_Number], called: str, example
 def words(text: str, option: str) -> tuple[str, ...]:
     """`oracle,none` as its entries."""
     entries = tuple(word.strip() for word in text.split(","))
-    if not all(entries):
-        raise InputError(f"{option} '{text}' was given; at least one entry is needed, with single commas between them.")
+    require(
+        all(entries), f"{option} '{text}' was given; at least one entry is needed, with single commas between them."
+    )
     return entries
 
 
@@ -59,20 +60,25 @@ def check_outputs(outputs: Iterable[Output], inputs: Sequence[Path] = ()) -> Non
         if path is None:
             continue
         check_writable(path, option, endings)
-        if any(path.exists() and source.exists() and path.samefile(source) for source in inputs):
-            raise InputError(f"{option} {path} is a file that is read; name another, so that it is kept.")
+        require(
+            not any(path.exists() and source.exists() and path.samefile(source) for source in inputs),
+            f"{option} {path} is a file that is read; name another, so that it is kept.",
+        )
 
 
 def check_writable(path: Path, option: str, endings: tuple[str, ...]) -> None:
     """Refuse, before any work is done, a file that has another ending or cannot be written."""
     allowed = " or ".join(endings)
-    if path.suffix.lower() not in endings:
-        raise InputError(f"{option} {path} was given; a file name that ends in {allowed} is allowed.")
+    require(
+        path.suffix.lower() in endings, f"{option} {path} was given; a file name that ends in {allowed} is allowed."
+    )
     if not path.is_dir():
         check_target(path)
     folder = path.parent
-    if path.is_dir() or not folder.is_dir() or not os.access(path if path.exists() else folder, os.W_OK):
-        raise InputError(f"{option} {path} cannot be written; name a file in a folder that exists and can be written.")
+    require(
+        not path.is_dir() and folder.is_dir() and os.access(path if path.exists() else folder, os.W_OK),
+        f"{option} {path} cannot be written; name a file in a folder that exists and can be written.",
+    )
 
 
 @contextmanager

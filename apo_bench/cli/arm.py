@@ -8,6 +8,7 @@ import typer
 
 from apo_bench.cli.arguments import check_outputs
 from apo_bench.cli.help_groups import Grouped
+from apo_bench.scenario.file import load_scenario
 
 arm = typer.Typer(name="arm", cls=Grouped, rich_markup_mode=None, help="Arms: those that come along, and any other.")
 
@@ -40,7 +41,6 @@ def arm_check(
     out: Annotated[Path | None, typer.Option(help="Draw it at the table into this file: .png.")] = None,
 ) -> None:
     """Say what an arm can do at the table: reach, errors of its tip, stiffness, gripper, room along a plan."""
-    from apo_bench.scenario.file import load_scenario
     from apo_bench.show.arm_text import check_lines
     from apo_bench.simulation.arm_checks.arm_check import check_arm
     from apo_bench.simulation.arms.finding import find_arm

@@ -13,6 +13,7 @@ from apo_bench.cli.arguments import path_given, writing
 from apo_bench.cli.help_groups import Grouped
 from apo_bench.cli.setting_options import ScenarioArgument, takes, trial_options
 from apo_bench.errors import require
+from apo_bench.scenario.file import load_scenario
 
 dataset = typer.Typer(
     name="dataset", cls=Grouped, rich_markup_mode=None, help="Data to learn from: whole trials as tables."
@@ -44,7 +45,6 @@ def dataset_make(
 ) -> None:
     """Run trials and write what was seen, planned and true, and all frames, with a card for people and programs."""
     from apo_bench.datasets.making import make_dataset
-    from apo_bench.scenario.file import load_scenario
     from apo_bench.trial.request import Request, requested_settings
 
     require(record in ("replays", "insertions"), f"--record {record} was given; replays or insertions is allowed.")

@@ -9,7 +9,8 @@ from apo_bench.cli.arguments import NO_RESULT, check_outputs, writing
 from apo_bench.cli.help_groups import Grouped
 from apo_bench.cli.printing import print_json
 from apo_bench.cli.setting_options import AsJson
-from apo_bench.errors import InputError
+from apo_bench.errors import require
+from apo_bench.records import check
 
 _HELP = "Noise models: list, cards, fits to measured poses, noise learned from observations."
 _NAME = "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name."
@@ -48,7 +49,6 @@ def print_noise_card(
 ) -> None:
     """Print the card of a noise model: formula, frame, parameters, and a histogram of its errors."""
     from apo_bench.observation.noise import Level
-    from apo_bench.records import check
     from apo_bench.show.noise_card import draw_errors, draw_histogram, noise_card
 
     check("level_mm", level, called="level")
@@ -190,8 +190,7 @@ def _observation_files(paths: list[Path]) -> list[Path]:
     files = list[Path]()
     for path in paths:
         inside = sorted(path.glob("*.json")) if path.is_dir() else [path]
-        if not inside:
-            raise InputError(f"the folder {path} holds no .json file; name a folder of observations.")
+        require(inside, f"the folder {path} holds no .json file; name a folder of observations.")
         files += inside
     return files
 

@@ -12,7 +12,7 @@ from apo_bench.cli.arguments import path_given, writing
 from apo_bench.cli.help_groups import Grouped
 from apo_bench.cli.printing import print_json
 from apo_bench.cli.setting_options import AsJson
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 
 if TYPE_CHECKING:
     from apo_bench.cad.importing import Imported
@@ -44,15 +44,15 @@ def part_import(
     from apo_bench.cad.solids.naming import renamed
 
     names = _pairs(name or [])
-    if not 1.0 <= density <= 25_000.0:
-        raise InputError(f"--density {density:g} was given; 1 to 25000 kg/m^3 are allowed.")
-    if fewest_sides is not None and not 5 <= fewest_sides <= 64:
-        raise InputError(f"--round {fewest_sides} was given; 5 to 64 sides are allowed.")
+    require(1.0 <= density <= 25_000.0, f"--density {density:g} was given; 1 to 25000 kg/m^3 are allowed.")
+    require(
+        fewest_sides is None or 5 <= fewest_sides <= 64, f"--round {fewest_sides} was given; 5 to 64 sides are allowed."
+    )
     source, raws = raw_solids(file, unit, *(() if fewest_sides is None else (fewest_sides,)))
-    if names and len(raws) > 1:
-        raise InputError(
-            f"--name was given, and {file} holds {len(raws)} different solids; import them from files of their own."
-        )
+    require(
+        not names or len(raws) <= 1,
+        f"--name was given, and {file} holds {len(raws)} different solids; import them from files of their own.",
+    )
     raws = [renamed(raw, names) for raw in raws]
     with writing(f"--out {out}"):
         out.mkdir(parents=True, exist_ok=True)
@@ -65,8 +65,7 @@ def part_import(
         _say(f"Wrote {poses}: {len(places)} places of {len(imported)} parts", as_json)
     if as_json:
         print_json(report_form(source, file, imported, poses))
-    if left_out:
-        raise InputError(f"{file}: {len(left_out)} of its solids became no parts: {' '.join(left_out)}")
+    require(not left_out, f"{file}: {len(left_out)} of its solids became no parts: {' '.join(left_out)}")
 
 
 def _written(
@@ -110,7 +109,9 @@ def _pairs(renamings: list[str]) -> Mapping[str, str]:
     names: dict[str, str] = {}
     for renaming in renamings:
         old, equals, new = renaming.partition("=")
-        if not (old and equals and new) or old in names:
-            raise InputError(f"--name {renaming} was given; FACE=NEW is allowed, each face once, such as hole1=bore.")
+        require(
+            old and equals and new and old not in names,
+            f"--name {renaming} was given; FACE=NEW is allowed, each face once, such as hole1=bore.",
+        )
         names[old] = new
     return names

@@ -8,9 +8,11 @@ import typer
 from apo_bench.cli.arguments import NO_RESULT, check_outputs
 from apo_bench.cli.printing import console, print_json
 from apo_bench.cli.setting_options import AsJson, ScenarioArgument, StatedDeg, StatedMm, takes, trial_options
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import require_known
 from apo_bench.files.deviations import assumed_deviations
 from apo_bench.io.processes import redirect_output
+from apo_bench.records import RECOGNISED
+from apo_bench.scenario.file import load_scenario
 
 
 def eye_command(
@@ -58,14 +60,11 @@ def recognise_command(
     **options: Any,
 ) -> None:
     """Find the contacts of what was seen, and say how they differ from those of the scenario."""
-    from apo_bench.records import RECOGNISED
-    from apo_bench.scenario.file import load_scenario
     from apo_bench.show.recognised_text import confidence_line, difference_lines, evidence_table, recognition_form
     from apo_bench.trial.recognised_contacts import recognise_by
     from apo_bench.trial.request import looked_at
 
-    if relations not in RECOGNISED:
-        raise InputError(unknown("way of recognising", relations, RECOGNISED))
+    require_known("way of recognising", relations, RECOGNISED)
     name = load_scenario(scenario).name
     with redirect_output(as_json):
         seen, assumed = looked_at(scenario, observation, options, deviation_mm, deviation_deg)

@@ -10,6 +10,19 @@ from apo_bench.cli.help_groups import Grouped
 from apo_bench.cli.printing import print_json
 from apo_bench.cli.setting_options import AsJson
 from apo_bench.errors import InputError
+from apo_bench.statistics import (
+    ERROR,
+    evidence,
+    least_discordant,
+    margin_power,
+    margin_trials,
+    paired_power,
+    paired_trials,
+    percent,
+    rate_trials,
+    shares,
+    wilson_half_width,
+)
 
 _HELP = "How many trials it takes: for a rate, for a difference, for no loss; and what so many can show."
 _QUESTIONS = """How many trials does it take?
@@ -44,8 +57,6 @@ def power_rate(
     as_json: AsJson = False,
 ) -> None:
     """Trials for a success rate: until Wilson's 95 % interval is narrow enough."""
-    from apo_bench.statistics import rate_trials, wilson_half_width
-
     n = rate_trials(rate, half_width)
     reached = wilson_half_width(rate, n)
     _say(
@@ -67,8 +78,6 @@ def power_pairs(
     as_json: AsJson = False,
 ) -> None:
     """Seeds, met by both methods, until McNemar's exact test shows which one is better."""
-    from apo_bench.statistics import ERROR, paired_power, paired_trials, percent
-
     win, lose = _shares(win, lose, rates, agree)
     n = paired_trials(win, lose, power, comparisons)
     reached = paired_power(n, win, lose, ERROR / comparisons)
@@ -92,8 +101,6 @@ def power_margin(
     as_json: AsJson = False,
 ) -> None:
     """Seeds, met by both methods, until Tango's 95 % interval shows that one is not worse by a margin."""
-    from apo_bench.statistics import margin_power, margin_trials, percent
-
     win, lose = (0.0, 0.0) if all(x is None for x in (win, lose, rates, agree)) else _shares(win, lose, rates, agree)
     n = margin_trials(margin, win, lose, power)
     reached = margin_power(n, margin, win, lose)
@@ -115,8 +122,6 @@ def power_shows(
     as_json: AsJson = False,
 ) -> None:
     """What so many trials per cell can show at best."""
-    from apo_bench.statistics import ERROR, evidence, least_discordant
-
     s = evidence(trials, power, comparisons)
     if s.discordant is None or s.least_win is None:
         fewest = least_discordant(ERROR / comparisons)
@@ -146,8 +151,6 @@ def power_shows(
 
 
 def _shares(win: float | None, lose: float | None, rates: str | None, agree: float | None) -> tuple[float, float]:
-    from apo_bench.statistics import shares
-
     if rates is None and win is not None and lose is not None and agree is None:
         return win, lose
     if rates is None or win is not None or lose is not None:

@@ -8,7 +8,8 @@ import typer
 from apo_bench.cli.arguments import check_outputs, numbers, path_given, whole_numbers, writing
 from apo_bench.cli.help_groups import Grouped
 from apo_bench.cli.printing import print_lines
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
+from apo_bench.scenario.file import load_scenario
 
 recording = typer.Typer(name="recording", cls=Grouped, rich_markup_mode=None, help="Logs of pose trackers.")
 
@@ -36,10 +37,10 @@ def recording_import(
 
     outputs = [(out, "--out", (".json", ".csv")), (picture, "--picture", (".png",)), (paths, "--paths", (".csv",))]
     check_outputs(outputs, (log, camera, objects))
-    if scenario is None and (out.suffix.lower() == ".json" or ends or unseen or paths):
-        raise InputError(
-            "--out .json, --ends, --unseen and --paths need --scenario; give one, or --out FILE.csv alone."
-        )
+    require(
+        scenario is not None or (out.suffix.lower() != ".json" and not ends and not unseen and not paths),
+        "--out .json, --ends, --unseen and --paths need --scenario; give one, or --out FILE.csv alone.",
+    )
     stated = read_camera(camera)
     named = read_objects(objects)
     read = read_log(log, form, stated.conventions)
@@ -59,7 +60,6 @@ def _import(
     from apo_bench.recording.importing import import_recording
     from apo_bench.recording.show.drawing import draw_recording, drawing_of, unfit_drawing
     from apo_bench.recording.show.text import PATH_HEAD, imported_lines, path_rows
-    from apo_bench.scenario.file import load_scenario
 
     out, picture, paths = files
     loaded = load_scenario(scenario)
@@ -111,10 +111,11 @@ def _stated(ends: str | None, unseen: str | None, operations: int) -> Any:
     from apo_bench.recording.ordering import Stated
 
     hidden = whole_numbers(unseen, "--unseen") if unseen else ()
-    if not all(1 <= k <= operations for k in hidden):
-        raise InputError(f"--unseen {unseen} was given; operations from 1 to {operations} are allowed.")
-    if ends and hidden:
-        raise InputError("--ends and --unseen were given; give one of the two.")
+    require(
+        all(1 <= k <= operations for k in hidden),
+        f"--unseen {unseen} was given; operations from 1 to {operations} are allowed.",
+    )
+    require(not ends or not hidden, "--ends and --unseen were given; give one of the two.")
     return Stated(numbers(ends, "--ends") if ends else (), tuple(k - 1 for k in hidden))
 
 

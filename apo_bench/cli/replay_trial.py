@@ -11,7 +11,7 @@ from apo_bench.cli.printing import print_json
 from apo_bench.cli.setting_options import CacheFolder, CorrectorLimit, ScenarioArgument, takes, trial_options
 from apo_bench.cli.show import Port
 from apo_bench.cli.sweep import interrupted
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.io.processes import redirect_output
 from apo_bench.records import CORRECTOR_LIMIT_S
 
@@ -48,8 +48,7 @@ def run_replay(
         place = choose_display(port)
     elif port is not None:
         raise InputError(f"--port {port}, which is for --view, was given without it; leave it out.")
-    if view and trial_limit is not None:
-        raise InputError("--view was given together with --trial-limit; leave one of them out.")
+    require(not view or trial_limit is None, "--view was given together with --trial-limit; leave one of them out.")
     request = Request(
         scenario=scenario,
         options=options,

@@ -8,7 +8,7 @@ import typer
 from apo_bench.cli.arguments import path_given
 from apo_bench.cli.printing import print_json
 from apo_bench.cli.setting_options import AsJson
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 
 _MOST_PICTURES = 100
 
@@ -31,8 +31,10 @@ def report_command(
     from apo_bench.report.report import report
     from apo_bench.show.failure_pictures import failure_pictures
 
-    if not 0 <= pictures <= _MOST_PICTURES:
-        raise InputError(f"--pictures {pictures} was given; a whole number from 0 to {_MOST_PICTURES} is allowed.")
+    require(
+        0 <= pictures <= _MOST_PICTURES,
+        f"--pictures {pictures} was given; a whole number from 0 to {_MOST_PICTURES} is allowed.",
+    )
     written = report(folder, pictures, salt_file, trust_code=trust_code, draw=failure_pictures)
     print_cells(written.cells)
     print_report(written)

@@ -10,9 +10,10 @@ import typer
 from apo_bench.assembly import Observation
 from apo_bench.cli.arguments import check_writable, path_given
 from apo_bench.cli.setting_options import ScenarioArgument, StatedDeg, StatedMm, takes, trial_options
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.files.deviations import assumed_deviations
-from apo_bench.records import CORRECTOR
+from apo_bench.records import CORRECTOR, with_simulated
+from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 
 if TYPE_CHECKING:
@@ -39,7 +40,6 @@ def show_command(
     **options: Any,
 ) -> None:
     """Draw the believed state: parts where they were seen, and where the corrected motion parameters put them."""
-    from apo_bench.scenario.file import load_scenario
     from apo_bench.show.believed_picture import belief_lines, belief_panel, draw_beliefs
     from apo_bench.trial.request import looked_at
 
@@ -74,7 +74,6 @@ def view_command(
 ) -> None:
     """Look at a scenario, or at a finished trial, which is run again, and step through it; `show` draws files."""
     from apo_bench.cli.terminal import print_row
-    from apo_bench.scenario.file import load_scenario
     from apo_bench.show.viewing import choose_display, trial_again, view
     from apo_bench.simulation.scene.scene import build_scene
     from apo_bench.trial.story import scenario_story
@@ -82,8 +81,9 @@ def view_command(
     folder = Path(target)
     if not folder.is_dir():
         for value, option in ((trial, "--trial"), (salt_file, "--salt-file")):
-            if value is not None:
-                raise InputError(f"{option}, which is for the folder of a sweep, was given for {target}; leave it out.")
+            require(
+                value is None, f"{option}, which is for the folder of a sweep, was given for {target}; leave it out."
+            )
         scenario = load_scenario(target)
         place = choose_display(port)
         story = scenario_story(build_scene(scenario))
@@ -96,7 +96,6 @@ def view_command(
 
 def _corrected(scenario: Scenario, observed: Observation, method: str, step: int) -> BeliefPanel:
     from apo_bench.correction.own_code.own import correct_named
-    from apo_bench.records import with_simulated
     from apo_bench.show.believed_picture import belief_panel
     from apo_bench.trial.fitting import fitting_plan
     from apo_bench.trial.planning import plan_warning
@@ -122,6 +121,8 @@ def _check_seen(observed: Observation, step: int) -> None:
 
 
 def _step(operations: int, step: int | None) -> int:
-    if step is not None and not 1 <= step <= operations:
-        raise InputError(f"step {step} was given; the scenario has operations 1 to {operations}.")
+    require(
+        step is None or 1 <= step <= operations,
+        f"step {step} was given; the scenario has operations 1 to {operations}.",
+    )
     return operations if step is None else step

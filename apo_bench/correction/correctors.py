@@ -13,7 +13,7 @@ from apo_bench.correction.checks.correction_checks import RIGID, check_correctio
 from apo_bench.correction.checks.observation_checks import check_observations
 from apo_bench.correction.checks.status import opposing
 from apo_bench.correction.contact.contact import ContactCorrector
-from apo_bench.errors import InputError, failed, kind
+from apo_bench.errors import InputError, failed, kind, require
 from apo_bench.geometry import Array, NotReal, is_rigid, real
 from apo_bench.names import resolve
 from apo_bench.records import CORRECTOR, CORRECTORS
@@ -94,10 +94,10 @@ def _admitted(returned: Any, observation: Observation, chosen: Any, name: str) -
         return goals_as_given(
             observation, _bare(returned, len(observation.goals), name), "the corrector returned goals and no status"
         )
-    if returned.status not in _STATUSES:
-        raise InputError(
-            f"the corrector '{name}' returned the status {returned.status!r}; return one of {', '.join(_STATUSES)}."
-        )
+    require(
+        returned.status in _STATUSES,
+        f"the corrector '{name}' returned the status {returned.status!r}; return one of {', '.join(_STATUSES)}.",
+    )
     goals = _bare(returned.goals, len(observation.goals), name)
     returned = check_correction(returned, observation.assembly, name)
     if returned.ok and not _ours(chosen):

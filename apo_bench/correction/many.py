@@ -9,7 +9,7 @@ from apo_bench.assembly import Correction, Observation
 from apo_bench.correction.checks.observation_checks import check_observations
 from apo_bench.correction.contact.contact import ContactCorrector
 from apo_bench.correction.robust.robust import RobustCorrector, contact_robust
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 
 BATCH = 150
 """Observations that are solved together, at most."""
@@ -29,13 +29,15 @@ def correct_many(
     Raises:
         InputError: They are not, one makes no sense, or a covariance is not positive definite.
     """
-    if isinstance(observations, Observation) or not isinstance(observations, Sequence):
-        raise InputError("correct_many needs a list of observations; ask `correct` for one, or make a list of them.")
-    if not isinstance(corrector, ContactCorrector | RobustCorrector):
-        raise InputError(
-            f"correct_many was given {corrector!r}; give a ContactCorrector, such as ContactCorrector('drop'), or a "
-            "RobustCorrector."
-        )
+    require(
+        not isinstance(observations, Observation) and isinstance(observations, Sequence),
+        "correct_many needs a list of observations; ask `correct` for one, or make a list of them.",
+    )
+    require(
+        isinstance(corrector, ContactCorrector | RobustCorrector),
+        f"correct_many was given {corrector!r}; give a ContactCorrector, such as ContactCorrector('drop'), or a "
+        "RobustCorrector.",
+    )
     if not observations:
         return ()
     check_observations(observations)

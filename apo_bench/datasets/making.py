@@ -7,7 +7,7 @@ from apo_bench.datasets.episodes import about_replays, replay_rollouts, replays,
 from apo_bench.datasets.insertions import insertions
 from apo_bench.datasets.lerobot import write_lerobot
 from apo_bench.datasets.minari import write_minari
-from apo_bench.errors import InputError, require, unknown
+from apo_bench.errors import require, require_known
 from apo_bench.records import TrialSettings
 from apo_bench.trial.stages import scene_of
 
@@ -42,8 +42,7 @@ def make_dataset(
         InputError: The folder holds something, a trial cannot be run, or a package is missing.
         OSError: Something cannot be written.
     """
-    if form not in FORMATS:
-        raise InputError(unknown("format", form, FORMATS))
+    require_known("format", form, FORMATS)
     require(
         not out.exists() or (out.is_dir() and not any(out.iterdir())),
         f"'{out}' is there already and not an empty folder; name another.",

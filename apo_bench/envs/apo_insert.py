@@ -128,8 +128,10 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         pixels: bool = False,
         render_mode: str | None = None,
     ) -> None:
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise InputError(f"the render mode '{render_mode}' was given; use rgb_array or None.")
+        require(
+            render_mode in (None, *self.metadata["render_modes"]),
+            f"the render mode '{render_mode}' was given; use rgb_array or None.",
+        )
         if reward not in _REWARDS:
             raise InputError(unknown("reward", str(reward), _REWARDS))
         for name, size in (("shift_mm", shift_mm), ("turn_deg", turn_deg), ("fails_above_n", fails_above_n)):
@@ -213,8 +215,10 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         """
         if seed is not None:
             check("seed", int(seed))
-        if not isinstance(options or {}, Mapping) or set(options or {}) - {"trial"}:
-            raise InputError(f"the options {options!r} were given to reset(); a dict with trial is allowed.")
+        require(
+            isinstance(options or {}, Mapping) and not set(options or {}) - {"trial"},
+            f"the options {options!r} were given to reset(); a dict with trial is allowed.",
+        )
         super().reset(seed=seed)
         self._over = True
         self._begin(self._drawn((options or {}).get("trial")))

@@ -13,7 +13,7 @@ from apo_bench.envs.infos import VERDICTS, step_info, verdicts
 from apo_bench.envs.rendering import FPS, MODES, Rendering
 from apo_bench.envs.robot import RobotSettings, carried_out
 from apo_bench.envs.spaces import Action, Seen, action_space, as_seen_entries, moved, observation_space
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level, make_noise
@@ -142,10 +142,10 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         fidelity: str = TrialSettings.fidelity,
         render_mode: str | None = None,
     ) -> None:
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise InputError(
-                f"the render mode '{render_mode}' was given; use rgb_array, rgb_array_list, human or None."
-            )
+        require(
+            render_mode in (None, *self.metadata["render_modes"]),
+            f"the render mode '{render_mode}' was given; use rgb_array, rgb_array_list, human or None.",
+        )
         check("eye", eye)
         check("looks", looks)
         check("abstain", abstain)

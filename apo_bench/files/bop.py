@@ -65,8 +65,7 @@ def read_results(path: str | Path) -> PoseRows:
     numbers = array("d")
     for row, (line, text) in enumerate(_lines(path)):
         place = f"{path}, line {line}"
-        if row == MOST_ROWS:
-            raise InputError(f"{place}: a file of at most {MOST_ROWS} rows is needed; split it by scenes.")
+        require(row != MOST_ROWS, f"{place}: a file of at most {MOST_ROWS} rows is needed; split it by scenes.")
         numbers.extend((line, *_row(text, place)))
     require(numbers, f"{path}: no pose stands in the file; below its first line, one row per pose is needed.")
     # Line, scene, image, object, score, R row by row, t: whole numbers of so many digits are exact.
@@ -118,8 +117,10 @@ def _lines(path: str | Path) -> Iterator[tuple[int, str]]:
     try:
         with opened(path, "CSV file") as stream:
             for line, raw in enumerate(iter(lambda: stream.readline(_LONGEST_LINE + 1), b""), start=1):
-                if len(raw) > _LONGEST_LINE:
-                    raise InputError(f"{path}, line {line}: a line of at most {_LONGEST_LINE} characters is needed.")
+                require(
+                    len(raw) <= _LONGEST_LINE,
+                    f"{path}, line {line}: a line of at most {_LONGEST_LINE} characters is needed.",
+                )
                 text = raw.decode("utf-8-sig" if line == 1 else "utf-8").strip()
                 if line == 1:
                     _check_header(text, f"{path}, line 1")
@@ -143,8 +144,10 @@ def _check_header(text: str, place: str) -> None:
 def _row(text: str, place: str) -> tuple[float, ...]:
     """Scene, image, object, score and the twelve numbers of R and t."""
     cells = text.split(",")
-    if len(cells) != len(_COLUMNS):
-        raise InputError(f"{place}: {len(_COLUMNS)} cells are needed, one for each column, {len(cells)} were given.")
+    require(
+        len(cells) == len(_COLUMNS),
+        f"{place}: {len(_COLUMNS)} cells are needed, one for each column, {len(cells)} were given.",
+    )
     scene, image, part = (_id(cell.strip(), place, name) for cell, name in zip(cells, _COLUMNS[:3], strict=False))
     (score,) = _numbers(cells[3], 1, f"{place}, score")
     pose = _numbers(cells[4], 9, f"{place}, R") + _numbers(cells[5], 3, f"{place}, t")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import InputError, require_known
 from apo_bench.generated.assembled import Assembled
 from apo_bench.generated.families import FAMILIES
 from apo_bench.generated.laying import lay
@@ -41,8 +41,7 @@ def whole_name(name: str) -> str:
         weights = np.array([each.weight for each in FAMILIES.values()], dtype=np.float64)
         rng = np.random.default_rng([int(seed), _FAMILY_STREAM])
         family = str(rng.choice(list(FAMILIES), p=weights / weights.sum()))
-    if family not in FAMILIES:
-        raise InputError(unknown("family of generated assemblies", family, FAMILIES))
+    require_known("family of generated assemblies", family, FAMILIES)
     return f"{_PREFIX}{family}:{int(seed)}"
 
 

@@ -9,7 +9,7 @@ from typing import final
 import numpy as np
 
 from apo_bench.assembly import Assembly, Demonstration, Observation
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.observation.noise import Noise
 from apo_bench.observation.observing import observe
 from apo_bench.records import check
@@ -55,12 +55,11 @@ class Looks:
     def __call__(self, operations: Collection[int]) -> Observation:
         n = len(self._assembly)
         chosen = {*operations}
-        if self.left < 1:
-            raise InputError("one more look was asked for, and none is left; ask `look.left` before.")
-        if not chosen or not all(isinstance(k, int | np.integer) and 0 <= k < n for k in chosen):
-            raise InputError(
-                f"a look at the operations {[*chosen]} was asked for; give one or more whole numbers from 0 to {n - 1}."
-            )
+        require(self.left >= 1, "one more look was asked for, and none is left; ask `look.left` before.")
+        require(
+            chosen and all(isinstance(k, int | np.integer) and 0 <= k < n for k in chosen),
+            f"a look at the operations {[*chosen]} was asked for; give one or more whole numbers from 0 to {n - 1}.",
+        )
         look = observe(self._demonstration, self._later(), self._rng)
         self.left -= 1
         self.seen_again += len(chosen)

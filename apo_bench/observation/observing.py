@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly import Demonstration, Observation
-from apo_bench.errors import InputError, failed
+from apo_bench.errors import InputError, failed, require
 from apo_bench.geometry import Array, is_rigid
 from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.records import level_pair
@@ -46,8 +46,7 @@ def observe(
         raise
     except Exception as error:
         raise failed(f"the noise model '{name}'", error) from error
-    if complaint:
-        raise InputError(f"the noise model '{name}' {complaint}.")
+    require(not complaint, f"the noise model '{name}' {complaint}.")
     return replace(seen, gap_m=demonstration.gap_m, play_m=demonstration.play_m)
 
 

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.errors import InputError, require, unknown
+from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Box, Face, Solid
 from apo_bench.parts.agreement import check_faces, check_receding
 from apo_bench.parts.allowed import HEAVIEST_KG, LIGHTEST_KG, MOST_FACES
@@ -31,8 +31,7 @@ def part_path(given: str | Path) -> Path:
     """
     if isinstance(given, Path) or given.endswith(".xml") or "/" in given or "\\" in given:
         return Path(given)
-    if given not in part_names():
-        raise InputError(unknown("part", given, part_names()) + " Or give the path of an MJCF file, ending in .xml.")
+    require_known("part", given, part_names(), rest=" Or give the path of an MJCF file, ending in .xml.")
     return folder("assets") / "parts" / f"{given}.xml"
 
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.errors import InputError, one_line, unknown
+from apo_bench.errors import InputError, one_line, require, require_known
 from apo_bench.geometry import Array, pose
 from apo_bench.io.ordinary_files import opened
 from apo_bench.io.strict_csv import check_separator
@@ -72,12 +72,13 @@ def read_tum(path: Path, how: Conventions) -> LogRows:
     numbers = dict[str, list[float]]()
     for line, words in text_lines(path, separator=None):
         place = f"{path}, line {line}"
-        if len(words) != 8 and not words[0].startswith("#"):
-            raise InputError(f"{place}: timestamp tx ty tz qx qy qz qw are needed, {len(words)} words were given.")
+        require(
+            len(words) == 8 or words[0].startswith("#"),
+            f"{place}: timestamp tx ty tz qx qy qz qw are needed, {len(words)} words were given.",
+        )
         if not words[0].startswith("#"):
             numbers[place] = [finite_number(word, place) for word in words]
-    if not numbers:
-        raise InputError(f"{path}: no pose stands in the file; lines of timestamp tx ty tz qx qy qz qw are needed.")
+    require(numbers, f"{path}: no pose stands in the file; lines of timestamp tx ty tz qx qy qz qw are needed.")
     cells = np.array([*numbers.values()])
     check_length(cells[:, 4:], "a quaternion", [*numbers])
     return LogRows(
@@ -97,34 +98,29 @@ def read_numbers(path: Path, meaning: Callable[[str], LogColumn | None], renamed
     """
     lines = text_lines(path)
     first, names = next(lines, (0, []))
-    if not names:
-        raise InputError(f"{path}: the file is empty; its first line names the columns, such as t_s,id,x_mm,y_mm,z_mm.")
+    require(names, f"{path}: the file is empty; its first line names the columns, such as t_s,id,x_mm,y_mm,z_mm.")
     place = f"{path}, line {first}"
     check_separator(place, names)
     there = {name.strip().lower() for name in names}
     for theirs, ours in renamed.items():
-        if theirs not in there:
-            raise InputError(f"{path}: the camera file, log.columns, {ours}: {unknown('column', theirs, there)}")
-        if meaning(ours) is None:
-            raise InputError(
-                f"{path}: the camera file, log.columns: '{one_line(ours, 40)}' means nothing here; allowed are names "
-                "of columns such as id, t_s, x_mm, qw."
-            )
+        require_known("column", theirs, there, place=f"{path}: the camera file, log.columns, {ours}")
+        require(
+            meaning(ours) is not None,
+            f"{path}: the camera file, log.columns: '{one_line(ours, 40)}' means nothing here; allowed are names "
+            "of columns such as id, t_s, x_mm, qw.",
+        )
     known = [meaning(renamed.get(name.strip().lower(), name)) for name in names]
     columns = {i: each for i, each in enumerate(known) if each is not None}
     for name, count in Counter(each.meaning for each in columns.values()).items():
-        if count > 1:
-            raise InputError(f"{place}: two columns say '{name}'; keep one, or name the other one otherwise.")
+        require(count <= 1, f"{place}: two columns say '{name}'; keep one, or name the other one otherwise.")
     of_id = next((i for i, each in columns.items() if each.meaning == "id"), None)
     cells = {i: array("d") for i in columns if i != of_id}
     ids = list[str]()
     places = list[str]()
     for line, texts in lines:
         places.append(f"{path}, line {line}")
-        if len(texts) != len(names):
-            raise InputError(f"{places[-1]}: {len(names)} cells are needed, {len(texts)} were given.")
-        if len(places) > MOST_POSES:
-            raise InputError(f"{places[-1]}: a log of at most {MOST_POSES:,} rows is needed; cut it.")
+        require(len(texts) == len(names), f"{places[-1]}: {len(names)} cells are needed, {len(texts)} were given.")
+        require(len(places) <= MOST_POSES, f"{places[-1]}: a log of at most {MOST_POSES:,} rows is needed; cut it.")
         for i, column_cells in cells.items():
             column_cells.append(finite_number(texts[i], f"{places[-1]}, column {one_line(names[i], 40)}"))
         ids.append(path.stem if of_id is None else texts[of_id])
@@ -159,10 +155,14 @@ def text_lines(path: Path, separator: str | None = ",") -> Iterator[tuple[int, l
     with opened(path, "log") as stream:
         for line, raw in enumerate(iter(lambda: stream.readline(_LONGEST_LINE + 1), b""), start=1):
             size += len(raw)
-            if len(raw) > _LONGEST_LINE:
-                raise InputError(f"{path}, line {line}: a line of at most {_LONGEST_LINE} characters is needed.")
-            if size > LARGEST_LOG_BYTES:
-                raise InputError(f"{path}: the file is larger than {LARGEST_LOG_BYTES / 1e6:g} MB; cut the log.")
+            require(
+                len(raw) <= _LONGEST_LINE,
+                f"{path}, line {line}: a line of at most {_LONGEST_LINE} characters is needed.",
+            )
+            require(
+                size <= LARGEST_LOG_BYTES,
+                f"{path}: the file is larger than {LARGEST_LOG_BYTES / 1e6:g} MB; cut the log.",
+            )
             try:
                 text = raw.decode("utf-8-sig" if line == 1 else "utf-8")
             except UnicodeDecodeError as error:

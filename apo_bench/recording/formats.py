@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.errors import InputError, one_line, unknown
+from apo_bench.errors import InputError, one_line, require, require_known
 from apo_bench.files.bop import read_results
 from apo_bench.geometry import pose
 from apo_bench.io.ordinary_files import decoded, read_bytes
@@ -27,18 +27,13 @@ def read_log(path: str | Path, form: str, how: Conventions) -> Log:
     Raises:
         InputError: Anything that is not as described, with the line where it stands.
     """
-    if form not in FORMATS:
-        raise InputError(unknown("format", form, FORMATS))
+    require_known("format", form, FORMATS)
     path = Path(path)
     read, endings = FORMATS[form]
-    if path.is_dir() and not endings:
-        raise InputError(f"{path}: a folder was given; a log of the format {form} is one file.")
+    require(not path.is_dir() or endings, f"{path}: a folder was given; a log of the format {form} is one file.")
     # Of a folder each file is one object.
     files = sorted(file for ending in endings for file in path.glob(f"*{ending}")) if path.is_dir() else [path]
-    if not files:
-        raise InputError(
-            f"{path}: the folder holds no file that ends in {' or '.join(endings)}; give a folder of logs."
-        )
+    require(files, f"{path}: the folder holds no file that ends in {' or '.join(endings)}; give a folder of logs.")
     ids, t, T, places, notes = zip(*(read(file, how) for file in files), strict=True)
     poses, more = oriented(np.concatenate(T), how)
     rows = LogRows([*chain(*ids)], np.concatenate(t), poses, [*chain(*places)], [*notes[0], *more])
@@ -50,13 +45,14 @@ def _bop(path: Path, how: Conventions) -> LogRows:
     results = read_results(path)
     scenes = np.unique(results.where[:, 0])
     scene = scenes[0] if how.scene is None and len(scenes) == 1 else how.scene
-    if scene is None or scene not in scenes:
-        raise InputError(
-            f"{path}: a recording is one scene, and the file holds {', '.join(map(str, scenes[:6].tolist()))}; state "
-            "`scene` in the camera file."
-        )
-    if how.rate_hz is None:
-        raise InputError(f"{path}: images are numbered and have no time; state `rate_hz` in the camera file.")
+    require(
+        scene is not None and scene in scenes,
+        f"{path}: a recording is one scene, and the file holds {', '.join(map(str, scenes[:6].tolist()))}; state "
+        "`scene` in the camera file.",
+    )
+    require(
+        how.rate_hz is not None, f"{path}: images are numbered and have no time; state `rate_hz` in the camera file."
+    )
     # Rows of the scene by image and object, the best score first; of rows of one image and object the first is kept.
     at = np.flatnonzero(results.where[:, 0] == scene)
     at = at[np.lexsort((-results.score[at], results.where[at, 2], results.where[at, 1]))]
@@ -83,8 +79,7 @@ def _ros_json(path: Path, how: Conventions) -> LogRows:
     places = list[str]()
     for place, message in _messages(path):
         for stamped in _stamped(message):
-            if len(ids) == MOST_POSES:
-                raise InputError(f"{place}: a log of at most {MOST_POSES:,} poses is needed; cut it.")
+            require(len(ids) != MOST_POSES, f"{place}: a log of at most {MOST_POSES:,} poses is needed; cut it.")
             ids.append(str(stamped.get("child_frame_id") or message.get("topic") or path.stem).strip("/"))
             t.append(_stamp(stamped, place))
             packed.append(_pose(stamped, place))
@@ -96,8 +91,7 @@ def _ros_json(path: Path, how: Conventions) -> LogRows:
 
 def _messages(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
     text = decoded(read_bytes(path, "log", LARGEST_LOG_BYTES), str(path), "log")
-    if not text.strip():
-        raise InputError(f"{path}: the file is empty; a list of messages is needed, or one message per line.")
+    require(text.strip(), f"{path}: the file is empty; a list of messages is needed, or one message per line.")
     by_line = not text.lstrip().startswith("[")
     for line, part in enumerate(text.splitlines() if by_line else [text], start=1):
         if not part.strip():
@@ -108,8 +102,7 @@ def _messages(path: Path) -> Iterator[tuple[str, dict[str, Any]]]:
             raise InputError(f"{path}, line {line}: this is not JSON ({str(error)[:80]}).") from error
         for i, message in enumerate(document if isinstance(document, list) else [document], start=1):
             place = f"{path}, line {line}" if by_line else f"{path}, message {i}"
-            if not isinstance(message, dict):
-                raise InputError(f"{place}: a message with named fields is needed.")
+            require(isinstance(message, dict), f"{place}: a message with named fields is needed.")
             yield place, message
 
 
@@ -140,13 +133,11 @@ def _stamp(message: dict[str, Any], place: str) -> float:
 def _pose(message: dict[str, Any], place: str) -> list[float]:
     """(x, y, z, qw, qx, qy, qz), [m]."""
     inside = _inner(message, "pose", "transform")
-    if not inside:
-        raise InputError(f"{place}: a field `pose` or `transform` is needed.")
+    require(inside, f"{place}: a field `pose` or `transform` is needed.")
     inside = _inner(inside, "pose") or inside
     at = _inner(inside, "position", "translation")
     turn = _inner(inside, "orientation", "rotation")
-    if not at or not turn:
-        raise InputError(f"{place}: a position with an orientation is needed, or a translation with a rotation.")
+    require(at and turn, f"{place}: a position with an orientation is needed, or a translation with a rotation.")
     return [_finite(fields.get(k), f"{place}, {k}") for fields, keys in ((at, "xyz"), (turn, "wxyz")) for k in keys]
 
 

@@ -8,7 +8,7 @@ from typing import final
 import numpy as np
 
 from apo_bench.assembly import Assembly, Observation, Poses, SharedError
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Array
 from apo_bench.observation.models.isotropic import floored, with_shared
 from apo_bench.observation.models.outliers import UNSEEN_DEVIATION, last_seen
@@ -65,14 +65,13 @@ def import_recording(
     """
     assembly = scenario.assembly
     for part in tracks:
-        if part not in assembly.solids:
-            raise InputError(f"{file}: {unknown('part', part, assembly.solids)}")
+        require_known("part", part, assembly.solids, place=file)
     for k, operation in enumerate(assembly.operations):
-        if operation.main not in tracks:
-            raise InputError(
-                f"{file}: '{operation.main}', which operation {k + 1} moves, is not tracked; name its id in the "
-                "objects file."
-            )
+        require(
+            operation.main in tracks,
+            f"{file}: '{operation.main}', which operation {k + 1} moves, is not tracked; name its id in the "
+            "objects file.",
+        )
     stays = all_stays(tracks)
     for part, track in tracks.items():
         if not stays[part]:

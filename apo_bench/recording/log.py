@@ -8,7 +8,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.errors import InputError, one_line
+from apo_bench.errors import InputError, one_line, require
 from apo_bench.geometry import Array
 
 MOST_POSES = 1_000_000
@@ -61,8 +61,7 @@ def checked_log(file: str, rows: LogRows) -> Log:
     Raises:
         InputError: Nothing stands in it, a time stands twice or runs backwards, or a unit is another one.
     """
-    if not len(rows.t):
-        raise InputError(f"{file}: no pose stands in the file; give a log with one row per pose.")
+    require(len(rows.t), f"{file}: no pose stands in the file; give a log with one row per pose.")
     names, which = np.unique(np.array(rows.ids, dtype=object).astype(str), return_inverse=True)
     tracks = {}
     for i, name in enumerate(names.tolist()):
@@ -78,11 +77,11 @@ def checked_log(file: str, rows: LogRows) -> Log:
             "state the unit: columns such as x_mm or x_m, or `length` in the camera file."
         )
     steps = np.concatenate([np.diff(track.t) for track in tracks.values()])
-    if len(steps) and not _FAST_S <= np.median(steps) <= _SLOW_S:
-        raise InputError(
-            f"{file}: the median time between two frames of a track is {np.median(steps):.3g} s, so its times seem "
-            "to be in another unit; state it: a column such as t_ms or t_s, or `time` in the camera file."
-        )
+    require(
+        not len(steps) or _FAST_S <= np.median(steps) <= _SLOW_S,
+        f"{file}: the median time between two frames of a track is {np.median(steps):.3g} s, so its times seem "
+        "to be in another unit; state it: a column such as t_ms or t_s, or `time` in the camera file.",
+    )
     return Log(file, MappingProxyType(tracks), tuple(rows.notes))
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.residuals import Residuals
@@ -34,8 +34,7 @@ def still_residuals(log: Log) -> Residuals:
             errors += [seen, np.full((missing, 6), np.nan)]
             distance += [1e3 * float(np.linalg.norm(rest.T[:3, 3]))] * len(seen)
             parts += [part] * (len(seen) + missing)
-    if not errors:
-        raise InputError(f"{log.file}: nothing rests in the log; give one in which parts stand still.")
+    require(errors, f"{log.file}: nothing rests in the log; give one in which parts stand still.")
     n = len(parts)
     shift, turn = np.split(np.concatenate(errors), 2, axis=1)
     turn_deg = np.degrees(turn)

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array
 from apo_bench.recording.arranging import CameraPose, solved_camera, staying
 from apo_bench.recording.averaging import per_axis
@@ -51,8 +51,7 @@ def unplanned_recording(tracks: Mapping[str, PoseTrack], camera: CameraFile, fil
     X = _camera_pose(stays, camera)
     pairs = [pair for known in stays.values() for pair in pairwise(known)]
     moves = sorted((_Move(before.ends, after) for before, after in pairs), key=lambda move: move.stay.begins)
-    if not moves:
-        raise InputError(f"{file}: no part comes to rest at another place than before, so there is no operation.")
+    require(moves, f"{file}: no part comes to rest at another place than before, so there is no operation.")
     groups = consecutive(moves, lambda group, move: any(_together(move, other) for other in group))
     return UnplannedRecording(X, stays, tuple(map(_put, groups)))
 
@@ -61,11 +60,11 @@ def _camera_pose(stays: Stays, camera: CameraFile) -> CameraPose:
     if camera.T_world_camera is not None:
         return CameraPose(camera.T_world_camera)
     places = {part: T for part, T in camera.known.items() if T is not None and stays.get(part)}
-    if not places:
-        raise InputError(
-            "without --scenario the camera file has to state the pose of the camera, or poses of known parts that "
-            'rest; "start" is a place of a scenario.'
-        )
+    require(
+        places,
+        "without --scenario the camera file has to state the pose of the camera, or poses of known parts that "
+        'rest; "start" is a place of a scenario.',
+    )
     return solved_camera(stays, camera, places)
 
 

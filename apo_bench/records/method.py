@@ -2,7 +2,7 @@
 
 from typing import Any, NamedTuple
 
-from apo_bench.errors import InputError, require_text, unknown
+from apo_bench.errors import InputError, require, require_text, unknown
 from apo_bench.names import resolve
 from apo_bench.records.short_names import LOOKING, METHODS, SIMULATED, UNCORRECTED
 
@@ -42,11 +42,11 @@ def checked_method(method: str) -> str:
     """
     require_text("method", method)
     plan, searches, by_touch = parsed(method)
-    if searches and parsed(plan).searches:
-        raise InputError(
-            f"the method '{method}' was given; one of +search and +feel, which searches too, is said once, as in "
-            "contact+feel."
-        )
+    require(
+        not searches or not parsed(plan).searches,
+        f"the method '{method}' was given; one of +search and +feel, which searches too, is said once, as in "
+        "contact+feel.",
+    )
     if ":" not in plan and plan not in METHODS:
         raise InputError(
             unknown("method", plan or method, (*METHODS, _SEARCH))

@@ -9,7 +9,7 @@
 
 import math
 
-from apo_bench.errors import InputError, require_text, unknown
+from apo_bench.errors import InputError, require, require_text, unknown
 from apo_bench.records.short_names import WRONG_RELATIONS
 
 GIVEN = "given"
@@ -34,11 +34,10 @@ def relations_name(text: str) -> str:
         size_mm = float(size or SHIFT_MM)
     except ValueError:
         size_mm = math.nan
-    if not 0.0 < size_mm <= _LARGEST_SHIFT_MM:
-        raise InputError(
-            f"the relations '{text}' were given; a size above 0 and up to {_LARGEST_SHIFT_MM:g} mm is allowed: "
-            "shifted:3."
-        )
+    require(
+        0.0 < size_mm <= _LARGEST_SHIFT_MM,
+        f"the relations '{text}' were given; a size above 0 and up to {_LARGEST_SHIFT_MM:g} mm is allowed: shifted:3.",
+    )
     return f"shifted:{size_mm:g}"
 
 
@@ -46,8 +45,10 @@ def checked_relations(text: str) -> str:
     """The relations as rows spell them; raise an `InputError` unless there are such."""
     require_text("relations", text)
     name = relations_name(text)
-    if name.partition(":")[0] in _KINDS and name not in _KINDS and not name.startswith("shifted:"):
-        raise InputError(f"the relations '{text}' were given; only shifted has a size, as in shifted:3.")
+    require(
+        name.partition(":")[0] not in _KINDS or name in _KINDS or name.startswith("shifted:"),
+        f"the relations '{text}' were given; only shifted has a size, as in shifted:3.",
+    )
     if ":" not in name and name not in _KINDS:
         raise InputError(unknown("kind of relations", text, _KINDS) + " Or give your own as 'package.module:name'.")
     return name

@@ -16,7 +16,7 @@ Several are joined by `+`. A robot that feels is told how wrong it is (its state
 import math
 from typing import NamedTuple
 
-from apo_bench.errors import InputError, require_text, unknown
+from apo_bench.errors import InputError, require, require_text, unknown
 
 NO_ROBOT_ERROR = "none"
 DRAWN = "drawn"
@@ -51,8 +51,7 @@ def robot_sigmas(name: str, called: str = "robot error") -> Sigmas:
         kind, _, sizes = entry.partition(":")
         if kind not in _UNITS:
             raise InputError(unknown(f"kind of {called}", kind, (NO_ROBOT_ERROR, *_UNITS)))
-        if kind in sigmas:
-            raise InputError(f"the {called} '{name}' was given, which has {kind} twice; say it once.")
+        require(kind not in sigmas, f"the {called} '{name}' was given, which has {kind} twice; say it once.")
         sigmas[kind] = _numbers(f"{called} '{name}'", kind, sizes)
     hand_eye, joints, tool, in_hand = (sigmas.get(kind, (0.0, 0.0)) for kind in _UNITS)
     return Sigmas(hand_eye, joints[0], tool[0], in_hand)

@@ -14,7 +14,7 @@ import math
 from types import MappingProxyType
 from typing import NamedTuple
 
-from apo_bench.errors import InputError, require_text, unknown
+from apo_bench.errors import InputError, require, require_text, unknown
 
 
 class WrenchNoise(NamedTuple):
@@ -54,12 +54,12 @@ def wrench_noise(name: str) -> WrenchNoise:
         (torque,) = rest or [force / _N_PER_NM]
     except ValueError:
         force = torque = math.nan
-    if not (0.0 <= force <= _LARGEST.force_n and 0.0 <= torque <= _LARGEST.torque_nm):
-        raise InputError(
-            f"the wrench sensor '{name}' was given; standard deviations from 0 to {_LARGEST.force_n:g} N and from 0 to "
-            f"{_LARGEST.torque_nm:g} Nm are allowed (with more N a touch is a collision before it is felt): 0.1/0.005, "
-            f"or a name: {', '.join(_PRESETS)}."
-        )
+    require(
+        0.0 <= force <= _LARGEST.force_n and 0.0 <= torque <= _LARGEST.torque_nm,
+        f"the wrench sensor '{name}' was given; standard deviations from 0 to {_LARGEST.force_n:g} N and from 0 to "
+        f"{_LARGEST.torque_nm:g} Nm are allowed (with more N a touch is a collision before it is felt): 0.1/0.005, "
+        f"or a name: {', '.join(_PRESETS)}.",
+    )
     return WrenchNoise(force, torque)
 
 

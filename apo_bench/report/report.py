@@ -5,7 +5,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.io.ordinary_files import check_folders, check_target, to_write
 from apo_bench.io.tables import write_columns
 from apo_bench.records import Row, check_same_salt, one_salt, read_salt
@@ -93,16 +93,14 @@ def report(
     """
     folder = Path(folder)
     rows = report_rows(folder)
-    if not rows:
-        raise InputError(f"'{folder}' holds no finished trial yet; run the sweep before its report.")
+    require(rows, f"'{folder}' holds no finished trial yet; run the sweep before its report.")
     salt = None if salt_file is None else read_salt(salt_file)
     if salt is not None:
         check_same_salt(f"'{folder}'", salt.hash, one_salt(rows))
     numbers = summary(rows)
-    if not numbers.cells:
-        raise InputError(
-            f"'{folder}' holds replays of measured demonstrations alone, which belong to no cell of a sweep."
-        )
+    require(
+        numbers.cells, f"'{folder}' holds replays of measured demonstrations alone, which belong to no cell of a sweep."
+    )
     try:
         check_target(folder / PAGE)
         check_folders(folder / name for name in (TABLES, FIGURES))

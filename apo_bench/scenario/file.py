@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.assembly import Assembly, Gap
-from apo_bench.errors import InputError, require, unknown
+from apo_bench.errors import require, require_known
 from apo_bench.generated import generated_file, is_generated, whole_name
 from apo_bench.insertion.line import Preference
 from apo_bench.io.documents import JsonNode, read_toml
@@ -95,10 +95,7 @@ def scenario_path(given: str | Path) -> Path:
         return generated_file(given)
     if isinstance(given, Path) or given.endswith(".toml") or "/" in given or "\\" in given:
         return Path(given)
-    if given not in scenario_names():
-        raise InputError(
-            unknown("scenario", given, scenario_names()) + " Or give the path of a .toml file, or generated:SEED."
-        )
+    require_known("scenario", given, scenario_names(), rest=" Or give the path of a .toml file, or generated:SEED.")
     return folder("scenarios") / f"{given}.toml"
 
 

@@ -15,6 +15,7 @@ from apo_bench.io.words import listed_words, with_article
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.axes import axis_marks
 from apo_bench.show.explain_text import size
+from apo_bench.simulation.scene.marks import Marks, ShiftArrows, TurnRing, pixels
 
 _WIDTH = 900
 _HEIGHT = 540
@@ -50,7 +51,6 @@ def draw_explanation(scenario: Scenario, observation: Observation, explanation: 
     """
     from matplotlib.patheffects import withStroke
 
-    from apo_bench.simulation.scene.marks import Marks, pixels
     from apo_bench.simulation.scene.render import camera_view, picture
     from apo_bench.simulation.scene.scene import build_scene
 
@@ -89,8 +89,6 @@ def draw_explanation(scenario: Scenario, observation: Observation, explanation: 
 
 def _mark(part: _DrawnPart, direction: Direction, toward: Array) -> Any:
     """Arrows outside the part; a ring about the point that a turn is about, or the middle where any point will do."""
-    from apo_bench.simulation.scene.marks import ShiftArrows, TurnRing
-
     R = part.pose[:3, :3]
     middle = part.solid.bounds.mean(axis=0)
     r, g, b = (_SHADE * c for c in part.color)

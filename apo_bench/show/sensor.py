@@ -12,7 +12,7 @@ from apo_bench.assembly import Assembly
 from apo_bench.depth_camera.distance import strike_distances
 from apo_bench.depth_camera.follow import Event
 from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
 from apo_bench.io.figures import default_looks, save_figure
 from apo_bench.records import RANGE, check
@@ -82,8 +82,7 @@ def checked_view(view: int) -> int:
         InputError: The range finder has no such view.
     """
     views = len(RangeFinder().views)
-    if not 1 <= view <= views:
-        raise InputError(f"--view {view} was given; the range finder has views 1 to {views}.")
+    require(1 <= view <= views, f"--view {view} was given; the range finder has views 1 to {views}.")
     return view - 1
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import require, require_known
 from apo_bench.io.grouping import grouped
 from apo_bench.records import CORRECTOR, CORRECTOR_LIMIT_S, Limits, Row, level_pair, salt_of_sweep, trial_key
 from apo_bench.records.run.run_file import run_record
@@ -133,23 +133,26 @@ def _left(
             cell = replace(trial, method=CORRECTOR, seed=0)
             if row_hash is not None and cell not in hashes:
                 hashes[cell] = spec_hash(trial, lock.content[trial.scenario])
-            if row_hash is not None and row_hash != hashes[cell]:
-                raise InputError(
-                    f"'{store.folder}' holds a row of {loaded[trial.scenario].name}, method {trial.method}, seed "
-                    f"{trial.seed}, that was made with other code or settings; choose another folder."
-                )
+            require(
+                row_hash is None or row_hash == hashes[cell],
+                f"'{store.folder}' holds a row of {loaded[trial.scenario].name}, method {trial.method}, seed "
+                f"{trial.seed}, that was made with other code or settings; choose another folder.",
+            )
         left.append(Unit(tuple(trial for trial, row_hash in row_hashes.items() if row_hash is None)))
     return [unit for unit in left if unit.trials]
 
 
 def _check_executor(workers: int | None, limit_s: float, backend: str, address: str | None) -> None:
-    if workers is not None and not 1 <= workers <= _LARGEST_WORKERS:
-        raise InputError(f"{workers} workers were given; a whole number from 1 to {_LARGEST_WORKERS} is allowed.")
+    require(
+        workers is None or 1 <= workers <= _LARGEST_WORKERS,
+        f"{workers} workers were given; a whole number from 1 to {_LARGEST_WORKERS} is allowed.",
+    )
     check_limit(limit_s)
-    if backend not in _BACKENDS:
-        raise InputError(unknown("backend", backend, _BACKENDS))
-    if address is not None and backend != "ray":
-        raise InputError(f"the address '{address}' was given, but the backend {backend} has none; say --backend ray.")
+    require_known("backend", backend, _BACKENDS)
+    require(
+        address is None or backend == "ray",
+        f"the address '{address}' was given, but the backend {backend} has none; say --backend ray.",
+    )
     if backend == "ray":
         from apo_bench.sweeps.ray.backend import check_ray
 

@@ -17,7 +17,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.records import LEVEL, SETTINGS, in_python
 from apo_bench.sweeps.grid import AXES, LARGEST_TRIALS, SHARED, SweepSettings
@@ -66,8 +66,10 @@ def read_sweep(
 
 
 def _tables(node: JsonNode) -> Sequence[JsonNode]:
-    if not isinstance(node.value, list) or not all(isinstance(entry, dict) for entry in node.value):
-        raise InputError(f"{node.file}, also: further grids are tables; write [[also]] above the keys of each.")
+    require(
+        isinstance(node.value, list) and all(isinstance(entry, dict) for entry in node.value),
+        f"{node.file}, also: further grids are tables; write [[also]] above the keys of each.",
+    )
     return _few(node.items("also"), node)
 
 
@@ -102,10 +104,10 @@ def _entries(node: JsonNode, key: str, of: str) -> Sequence[JsonNode]:
 
 
 def _few(entries: Sequence[JsonNode], node: JsonNode) -> Sequence[JsonNode]:
-    if len(entries) > _MOST_ENTRIES:
-        raise InputError(
-            f"{node.file}, {node.key}: at most {_MOST_ENTRIES} entries are allowed, {len(entries)} were given."
-        )
+    require(
+        len(entries) <= _MOST_ENTRIES,
+        f"{node.file}, {node.key}: at most {_MOST_ENTRIES} entries are allowed, {len(entries)} were given.",
+    )
     return entries
 
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from apo_bench import __version__
 from apo_bench.assembly import Demonstration, Layout
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.io.documents import parse_json
 from apo_bench.io.ordinary_files import read_text, write_whole
 from apo_bench.records import RANGE, TrialSettings
@@ -58,8 +58,10 @@ class KeptDemonstrations:
             raise InputError(
                 f"the cache '{folder}' cannot be made ({why}); name a folder that can be written."
             ) from error
-        if not os.access(self.folder, os.R_OK | os.W_OK | os.X_OK):
-            raise InputError(f"the cache '{folder}' cannot be written; name a folder that can be.")
+        require(
+            os.access(self.folder, os.R_OK | os.W_OK | os.X_OK),
+            f"the cache '{folder}' cannot be written; name a folder that can be.",
+        )
 
     def simulated(self, settings: TrialSettings, scene: Scene) -> SimulatedDemonstration:
         """The demonstration of a trial: read, or simulated and kept.
@@ -152,8 +154,7 @@ def _read(path: Path, key: str, scene: Scene) -> SimulatedDemonstration:
         ("key", key, "this is another demonstration, renamed"),
         ("digest", _hash(json.dumps(content)), "the file is damaged"),
     ):
-        if root[name].text() != wanted:
-            raise InputError(f"{path}: {why}.")
+        require(root[name].text() == wanted, f"{path}: {why}.")
     start, final = ({part: np.array(T) for part, T in content[name].items()} for name in ("start", "final"))
     layout = Layout(np.array(content["truth"]), start)
     human = Demonstration(

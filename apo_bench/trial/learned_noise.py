@@ -13,7 +13,7 @@ from apo_bench.assembly import Observation
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.learning.evidence import UNITS, readings
 from apo_bench.correction.learning.likelihood import LearnedNoise, ObservedErrors, learn_noise
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
 from apo_bench.observation.fitting.components import COMPONENTS, component_factors, view_ways
 from apo_bench.observation.models.camera import Camera
@@ -59,11 +59,11 @@ def learn(observations: Sequence[Observation], camera: Camera, source: str, *, c
     """
     corrections = [(observation, correct(observation, "contact-robust")) for observation in observations]
     usable = [(observation, correction) for observation, correction in corrections if correction.ok]
-    if len(usable) < FEWEST_OBSERVATIONS:
-        raise InputError(
-            f"{len(observations)} observations were given, of which {len(usable)} can be corrected; at least "
-            f"{FEWEST_OBSERVATIONS} are needed to learn a camera's noise."
-        )
+    require(
+        len(usable) >= FEWEST_OBSERVATIONS,
+        f"{len(observations)} observations were given, of which {len(usable)} can be corrected; at least "
+        f"{FEWEST_OBSERVATIONS} are needed to learn a camera's noise.",
+    )
     P = view_frame(camera, [correction.goals for _, correction in usable])
     # errors that the correction took away, log(T_corrected^-1 T_seen); of each the size in mm and in degrees, (n, 2)
     errors = [pose.log(pose.inverse(c.goals) @ observation.goals) / UNITS for observation, c in usable]

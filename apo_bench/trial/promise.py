@@ -18,6 +18,7 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.special import ndtr, ndtri
 
 from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Poses, placements
 from apo_bench.errors import InputError
@@ -203,8 +204,6 @@ def _widths(space: FreeSpace) -> Array:
 
 def _spread(rng: np.random.Generator, count: int, shape: tuple[int, ...]) -> Array:
     """Standard normal numbers, (count, *shape), of each place one in every part of equal probability (McKay, 1979)."""
-    from scipy.special import ndtri
-
     parts = rng.permuted(np.tile(np.arange(count), (math.prod(shape), 1)), axis=1).T
     return np.asarray(ndtri((parts + rng.uniform(size=parts.shape)) / count).reshape(count, *shape))
 
@@ -247,8 +246,6 @@ def _within(measure: Measure, less_mm: Sequence[float]) -> float:
     Args:
         less_mm: By how much less than the judge what goes in allows, of each operation.
     """
-    from scipy.special import ndtr
-
     if measure.kind in _WEIGHED:
         return _FALLS if measure.exceeded else 1.0
     allowed = measure.allowed - (less_mm[measure.operation] if measure.kind in ("fit", "tip") else 0.0)
@@ -257,8 +254,6 @@ def _within(measure: Measure, less_mm: Sequence[float]) -> float:
 
 def _cover_share(plan: Plan, truths: Array, where: Scene | Scenario) -> float:
     """How surely faces overlap as the judge asks, were the plan carried out to the letter and the truth among these."""
-    from scipy.special import ndtr
-
     scenario = where if isinstance(where, Scenario) else where.scenario
     final = placements(plan.assembly, plan.start, plan.goals)[-1]
     overlaps = least_overlaps(plan.assembly, final, truths)

@@ -10,7 +10,7 @@ from typing import Any, final
 
 from apo_bench.assembly import Observation
 from apo_bench.correction.own_code.own import OwnCorrectors
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.io.ordinary_files import read_text
 from apo_bench.records import (
     CORRECTOR_LIMIT_S,
@@ -83,11 +83,11 @@ def requested_settings(request: Request, clearance_mm: float) -> TrialSettings:
     if request.observation:
         _refuse_contradictions(request, options)
     for name in ("noise", "level_deg"):
-        if options.get("eye") == RANGE and name in options:
-            raise InputError(
-                f"{_option(name)} was given together with --eye range, which draws no pose noise; "
-                "--level is the noise of its rays in mm."
-            )
+        require(
+            options.get("eye") != RANGE or name not in options,
+            f"{_option(name)} was given together with --eye range, which draws no pose noise; "
+            "--level is the noise of its rays in mm.",
+        )
     usual: dict[str, Any] = {"scenario": request.scenario, "clearance_mm": clearance_mm}
     if "level" in options:
         usual |= dict.fromkeys(("level_mm", "level_deg"), options.pop("level"))

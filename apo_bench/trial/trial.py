@@ -5,7 +5,7 @@ from typing import Any, cast
 from apo_bench.assembly import Observation, Plan
 from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.correction.own_code.own import CorrectorLost
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level, Noise, make_noise
@@ -138,11 +138,11 @@ def run_measured(
     Raises:
         InputError: The method is `oracle`, which would need the truth.
     """
-    if knows_truth(settings.method):
-        raise InputError(
-            f"the method '{settings.method}' was given for a measured observation, whose truth is not known; use none "
-            "or paper."
-        )
+    require(
+        not knows_truth(settings.method),
+        f"the method '{settings.method}' was given for a measured observation, whose truth is not known; use none "
+        "or paper.",
+    )
     content = content_hash(scene.scenario, settings.scenario, scene.arm.files)
     first = head(settings, scene.scenario, spec_hash(settings, content, text)) | MEASURED | {"demonstration": "ok"}
     reference = nominal_where_seen(scene.scenario.goals, observation)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly import SCHEDULE_REMEDY, Assembly, Consistency, Correction, Step, Try, schedule_fault
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import FARTHEST_M, Array, is_rigid
 from apo_bench.io.plain_text import UNSHOWN
 
@@ -107,10 +107,10 @@ def _check_schedule(correction: Correction, name: str) -> None:
         raise InputError(f"the corrector '{name}' returned a schedule that {wrong}; {SCHEDULE_REMEDY}.")
     if correction.targets is None:
         return
-    if not correction.schedule:
-        raise InputError(
-            f"the corrector '{name}' returned targets and no schedule; return one step per target, or no targets."
-        )
+    require(
+        correction.schedule,
+        f"the corrector '{name}' returned targets and no schedule; return one step per target, or no targets.",
+    )
     for j in np.flatnonzero(~is_rigid(correction.targets)):
         raise InputError(
             f"the corrector '{name}' returned a target for step {j + 1} of its schedule that is not a rigid pose; "

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly import Observation
-from apo_bench.errors import InputError, kind
+from apo_bench.errors import InputError, kind, require
 from apo_bench.geometry import FARTHEST_M, Array, is_rigid
 
 _ASYMMETRY = 1e-9
@@ -25,19 +25,19 @@ def check_observations(observations: Sequence[Any]) -> None:
             is not symmetric, or a length makes no sense.
     """
     for i, observation in enumerate(observations):
-        if not isinstance(observation, Observation):
-            raise InputError(
-                f"an Observation is needed, {kind(observation)} was given; make one, or read it from a file."
-            )
+        require(
+            isinstance(observation, Observation),
+            f"an Observation is needed, {kind(observation)} was given; make one, or read it from a file.",
+        )
         _check_lengths(observations, i)
     if not observations:
         return
     first = observations[0]
     for part in first.assembly.solids:
-        if part not in first.start:
-            raise InputError(
-                f"{_name(observations, 0)} has no start of the part '{part}'; state where every part starts."
-            )
+        require(
+            part in first.start,
+            f"{_name(observations, 0)} has no start of the part '{part}'; state where every part starts.",
+        )
     parts = list(first.assembly.solids)
 
     def name(j: int) -> str:

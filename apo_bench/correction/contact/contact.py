@@ -18,7 +18,7 @@ from apo_bench.correction.contact.solved import Solved, solve
 from apo_bench.correction.contact.starts import best_start, turned_words
 from apo_bench.correction.contact.suspects import contact_suspects, suspects
 from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 
 Doubt = Literal["apply", "warn", "refuse", "drop"]
 DROPS = 3
@@ -43,10 +43,14 @@ class ContactCorrector:
     rounding."""
 
     def __post_init__(self) -> None:
-        if self.doubt not in ("apply", "warn", "refuse", "drop"):
-            raise InputError(f"doubt={self.doubt!r} was given; apply, warn, refuse or drop is allowed.")
-        if not isinstance(self.level, float | int) or not 0.0 < self.level < 1.0:
-            raise InputError(f"a test level of {self.level!r} was given; a number between 0 and 1 is allowed.")
+        require(
+            self.doubt in ("apply", "warn", "refuse", "drop"),
+            f"doubt={self.doubt!r} was given; apply, warn, refuse or drop is allowed.",
+        )
+        require(
+            isinstance(self.level, float | int) and 0.0 < self.level < 1.0,
+            f"a test level of {self.level!r} was given; a number between 0 and 1 is allowed.",
+        )
 
     def __call__(self, observation: Observation) -> Correction:
         """Correct an observation.

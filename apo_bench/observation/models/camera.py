@@ -9,7 +9,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, frozen, is_rigid, pose
 
 WORKSPACE_MIDDLE_M = frozen([0.12, 0.0, 0.03], 3)
@@ -47,8 +47,10 @@ class Camera:
             T = frozen(self.T_world_camera, 4, 4)
         except (TypeError, ValueError) as error:
             raise InputError(f"the pose of a camera was given as something else: {error}.") from error
-        if not is_rigid(T[None])[0]:
-            raise InputError("the pose of a camera was given that is not rigid; give a rotation and a place in metres.")
+        require(
+            is_rigid(T[None])[0],
+            "the pose of a camera was given that is not rigid; give a rotation and a place in metres.",
+        )
         object.__setattr__(self, "T_world_camera", T)
 
     def rays(self, goals: Array) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly, Demonstration, Observation, measured_rates, placements
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array, approximate_symmetries, pose
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.isotropic import observe_displaced
@@ -65,8 +65,7 @@ class CameraFailures(ABC):
 
     def __post_init__(self) -> None:
         for name, share in (("failures", self.rate), ("repeated failures", self.repeat)):
-            if not 0.0 <= share <= 1.0:
-                raise InputError(f"a share of {name} of {share:g} was given; give a number from 0 to 1.")
+            require(0.0 <= share <= 1.0, f"a share of {name} of {share:g} was given; give a number from 0 to 1.")
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         return self._observed(assembly, demonstration, rng, self.failures(assembly, demonstration, rng))

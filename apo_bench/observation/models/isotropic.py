@@ -11,7 +11,7 @@ from typing import ClassVar, final
 import numpy as np
 
 from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError, Tails
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array, frozen, pose
 from apo_bench.observation.models.level import Facts, Level
 
@@ -105,11 +105,11 @@ class HeavyTailed:
     )
 
     def __post_init__(self) -> None:
-        if not 2.0 < self.freedom < inf:
-            raise InputError(
-                f"a Student t with {self.freedom:g} degrees of freedom was given; give a finite number above 2, below "
-                "which it has no covariance."
-            )
+        require(
+            2.0 < self.freedom < inf,
+            f"a Student t with {self.freedom:g} degrees of freedom was given; give a finite number above 2, below "
+            "which it has no covariance.",
+        )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         sigma = self.level.sigma()

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly, Demonstration, Observation, Poses, measured_rates
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array, frozen
 from apo_bench.observation.models.isotropic import observe_displaced
 from apo_bench.observation.models.level import Facts, Level
@@ -59,10 +59,10 @@ class Outliers:
 
     def __post_init__(self) -> None:
         for name, share in (("outliers", self.outliers), ("misses", self.misses)):
-            if not 0.0 <= share <= 1.0:
-                raise InputError(f"a share of {name} of {share:g} was given; give a number from 0 to 1.")
-        if not 1.0 <= self.times < inf:
-            raise InputError(f"outliers {self.times:g} times as large were given; give a finite number from 1.")
+            require(0.0 <= share <= 1.0, f"a share of {name} of {share:g} was given; give a number from 0 to 1.")
+        require(
+            1.0 <= self.times < inf, f"outliers {self.times:g} times as large were given; give a finite number from 1."
+        )
 
     @property
     def inflation(self) -> float:

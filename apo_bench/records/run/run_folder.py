@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO, Any, Self, final
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.io.ordinary_files import check_target, each_line, is_there, put_back, to_write
 from apo_bench.records.row import Row
 from apo_bench.records.run.run_file import check_same, write_run
@@ -137,10 +137,10 @@ def read_rows(folder: str | Path) -> list[Row]:
 def each_row(folder: str | Path) -> Iterator[Row]:
     """The rows of a folder one after the other, so that a reader need not hold them all."""
     path = Path(folder) / "trials.jsonl"
-    if not path.exists():
-        raise InputError(
-            f"the folder '{folder}' holds no sweep (no {path.name}); give the one that `apo-bench sweep --out` wrote."
-        )
+    require(
+        path.exists(),
+        f"the folder '{folder}' holds no sweep (no {path.name}); give the one that `apo-bench sweep --out` wrote.",
+    )
     for number, line in each_line(path, "table of trials"):
         yield row_of(line, f"{path}, line {number}")
 

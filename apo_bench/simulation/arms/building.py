@@ -9,7 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, pose
 from apo_bench.resources import folder
 from apo_bench.simulation.arms.apart import build_apart
@@ -89,8 +89,10 @@ def build_arm(description: ArmDescription) -> Arm:
     drives = drives_of(whole, joints)
     home = _usual_home(model, joints) if description.home is None else description.home
     rig = _measuring_model(spec, mjcf)
-    if len(home) != len(joints):
-        raise InputError(f"{description.file}: 'home_deg' has {len(home)} numbers; the arm has {len(joints)} joints.")
+    require(
+        len(home) == len(joints),
+        f"{description.file}: 'home_deg' has {len(home)} numbers; the arm has {len(joints)} joints.",
+    )
     gripper = _with_names_as_mounted(rig, description.gripper)
     where = gripper.mjcf or mjcf
     flange = rig.body(last).id

@@ -7,7 +7,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array, frozen, pose
 from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.scenario.keys import read_pose
@@ -94,8 +94,9 @@ class ArmDescription:
         """
         if numbers is None:
             return None
-        if len(numbers) not in (1, count):
-            raise InputError(f"{self.file}: '{key}' has {len(numbers)} numbers; the arm has {count} joints.")
+        require(
+            len(numbers) in (1, count), f"{self.file}: '{key}' has {len(numbers)} numbers; the arm has {count} joints."
+        )
         return np.array(np.broadcast_to(numbers, count))
 
 

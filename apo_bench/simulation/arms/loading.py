@@ -6,7 +6,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from apo_bench.errors import InputError, one_line
+from apo_bench.errors import InputError, one_line, require
 from apo_bench.simulation.arms.allowed import MOST_MESH_BYTES
 from apo_bench.simulation.arms.tree import checked_size, read_model_tree
 
@@ -67,23 +67,23 @@ def files_of(path: Path) -> tuple[Path, ...]:
 def _check_world(spec: Any, path: Path, kind: str) -> None:
     """One thing, of hinges and slides, that nothing ties to the world."""
     for joint in spec.joints:
-        if joint.type not in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
-            raise InputError(
-                f"{path}: the joint '{joint.name}' of the {kind} neither turns nor slides; arms have hinges, and "
-                "grippers hinges and slides."
-            )
-    moving = [body.name for body in spec.worldbody.bodies if body.find_all("joint")]
-    if len(moving) > 1:
-        raise InputError(
-            f"{path}: the {kind} has {len(moving)} bodies that move on their own ({', '.join(moving[:4])}); give one."
+        require(
+            joint.type in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE),
+            f"{path}: the joint '{joint.name}' of the {kind} neither turns nor slides; arms have hinges, and "
+            "grippers hinges and slides.",
         )
+    moving = [body.name for body in spec.worldbody.bodies if body.find_all("joint")]
+    require(
+        len(moving) <= 1,
+        f"{path}: the {kind} has {len(moving)} bodies that move on their own ({', '.join(moving[:4])}); give one.",
+    )
     for equality in spec.equalities:
         holds = equality.type in (mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_CONNECT)
         bodies = {equality.name1, equality.name2} if equality.objtype == mujoco.mjtObj.mjOBJ_BODY else set()
-        if holds and bodies & {"", "world"}:
-            raise InputError(
-                f"{path}: the equality '{equality.name}' ties something to the world; remove it, the arm moves."
-            )
+        require(
+            not holds or not bodies & {"", "world"},
+            f"{path}: the equality '{equality.name}' ties something to the world; remove it, the arm moves.",
+        )
 
 
 def check_surroundings(model: Any, path: Path) -> None:
@@ -117,15 +117,15 @@ def _keep_meshes(spec: Any, path: Path, kind: str) -> None:
             spec.delete(mesh)
         elif mesh.file:
             file = Path(mesh.file)
-            if not file.is_file():
-                raise InputError(
-                    f"{path}: the mesh file {one_line(str(file), _LONGEST)} of the {kind} is missing; bring it there."
-                )
+            require(
+                file.is_file(),
+                f"{path}: the mesh file {one_line(str(file), _LONGEST)} of the {kind} is missing; bring it there.",
+            )
             size += checked_size(file, kind)
-    if size > MOST_MESH_BYTES:
-        raise InputError(
-            f"{path}: the meshes that touch something have {size / 1e6:.0f} MB; {MOST_MESH_BYTES / 1e6:g} are the most."
-        )
+    require(
+        size <= MOST_MESH_BYTES,
+        f"{path}: the meshes that touch something have {size / 1e6:.0f} MB; {MOST_MESH_BYTES / 1e6:g} are the most.",
+    )
 
 
 def _reason(error: Exception) -> str:

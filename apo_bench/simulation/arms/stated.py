@@ -4,7 +4,7 @@ from typing import Any
 
 import mujoco
 
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import pose
 from apo_bench.simulation.arms.arm import Arm, ArmLimits
 from apo_bench.simulation.arms.description import ArmDescription, SlideGripper
@@ -26,24 +26,21 @@ def stated_arm(description: ArmDescription, slides: SlideGripper, model: Any, jo
     file = description.file
     if description.home is None or len(description.home) != len(joints):
         raise InputError(f"{file}: 'home_deg' needs {len(joints)} numbers, one for each joint of the arm.")
-    if description.torque_nm is not None:
-        raise InputError(f"{file}: 'torque_nm' is for an arm whose gripper is measured; leave it out.")
+    require(
+        description.torque_nm is None, f"{file}: 'torque_nm' is for an arm whose gripper is measured; leave it out."
+    )
     (grip, *more) = description.gripper.actuators or ("",)
-    if more:
-        raise InputError(f"{file}, gripper: one of 'actuators' drives all 'slides'; {1 + len(more)} were given.")
+    require(not more, f"{file}, gripper: one of 'actuators' drives all 'slides'; {1 + len(more)} were given.")
     sites = [model.site(i).name for i in range(model.nsite)]
-    if slides.tip not in sites:
-        raise InputError(f"{file}, gripper: {unknown('site', slides.tip, sites)}")
+    require_known("site", slides.tip, sites, place=file)
     sliding = [
         model.joint(j).name for j in range(model.njnt) if int(model.jnt_type[j]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
     ]
     for name in slides.joints:
-        if name not in sliding:
-            raise InputError(f"{file}, gripper: {unknown('slide', name, sliding)}")
+        require_known("slide", name, sliding, place=file)
     actuators = [model.actuator(i).name for i in range(model.nu)]
     for name in (*joints, grip):
-        if name not in actuators:
-            raise InputError(f"{file}: {unknown('actuator', name, actuators)}")
+        require_known("actuator", name, actuators, place=file)
     return Arm(
         mjcf=file,
         base=tuple(description.base[:3, 3].tolist()),

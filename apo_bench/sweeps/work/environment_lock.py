@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import final
 
 from apo_bench.correction.own_code.own import check_correctors
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.relations import make_relations
 from apo_bench.records import CORRECTOR_LIMIT_S, RECOGNISED, parsed, with_simulated
@@ -88,29 +88,30 @@ class EnvironmentLock:
         self.names.check(self.corrector_limit_s)
         here = self.names.hashes()
         for name, content in self.hashes.items():
-            if here.get(name) != content:
-                raise InputError(f"the file behind the {name} is another one there; use the same everywhere.")
+            require(
+                here.get(name) == content, f"the file behind the {name} is another one there; use the same everywhere."
+            )
         arm = find_arm(self.names.arm)
         for source in self.names.scenarios:
             self.check_content(source, content_hash(load_scenario(source), source, arm.files))
 
     def check_content(self, source: str, content: str) -> None:
         """Raise an `InputError` unless a scenario, and the code that runs it, are the same here."""
-        if content != self.content[source]:
-            raise InputError(
-                f"a worker on '{platform.node()}' has other code or other files for '{source}' than the process that "
-                "started the sweep; install the same everywhere, or start the same command again if a file was changed."
-            )
+        require(
+            content == self.content[source],
+            f"a worker on '{platform.node()}' has other code or other files for '{source}' than the process that "
+            "started the sweep; install the same everywhere, or start the same command again if a file was changed.",
+        )
 
     def check_versions(self) -> None:
         """Raise an `InputError` unless the packages are the same here."""
         here = versions()
         for package, version in self.versions.items():
-            if here.get(package) != version:
-                raise InputError(
-                    f"a worker on '{platform.node()}' has {package} {here.get(package)}, the process that started the "
-                    f"sweep {version}; install the same everywhere."
-                )
+            require(
+                here.get(package) == version,
+                f"a worker on '{platform.node()}' has {package} {here.get(package)}, the process that started the "
+                f"sweep {version}; install the same everywhere.",
+            )
 
 
 def environment_lock(
