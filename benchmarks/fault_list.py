@@ -99,14 +99,14 @@ FAULTS = (
     Fault("sweeps/progress.py", "(total - ended) / ended", "total / ended", "the time left does not fall"),
     Fault("assembly/topology.py", "Term(k), *inverted(before)", "Term(k), *before", "a carried part goes twice"),
     Fault(
-        "observation/models/anisotropic.py",
+        "observation/models/camera.py",
         "_stretch(sight, IN_IMAGE, OUT_OF_IMAGE)",
         "_stretch(sight, OUT_OF_IMAGE, IN_IMAGE)",
         "turns are worst about the line of sight",
     ),
     Fault("statistics/paired.py", "np.std(x, ddof=1)", "np.std(x)", "the spread of a sample is that of all"),
     Fault(
-        "simulation/execution/spiral.py",
+        "simulation/execution/search.py",
         "or side > push + self.guard.newton:",
         "or side < 0.0:",
         "a spiral goes on although walls hold the part",
@@ -166,8 +166,8 @@ FAULTS = (
         "return {part: T if part not in",
         "the wrong parts follow the site",
     ),
-    Fault("scenario/human_error.py", "R.T @ _guided(", "R @ _guided(", "an error in the wrong frame"),
-    Fault("scenario/human_error.py", "turn @ (before.get(", "(before.get(", "what is carried is not turned"),
+    Fault("scenario/scenario.py", "R.T @ _guided(", "R @ _guided(", "an error in the wrong frame"),
+    Fault("scenario/scenario.py", "turn @ (before.get(", "(before.get(", "what is carried is not turned"),
     Fault(
         "scenario/order.py",
         "for k, operation in enumerate(assembly.operations):",

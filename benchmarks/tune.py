@@ -32,7 +32,7 @@ from apo_bench.observation.noise import Level, make_noise
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.scene.settling import settle
-from apo_bench.trial.pose_error import goal_errors
+from apo_bench.trial.outcome_columns import goal_errors
 from apo_bench.trial.stages import (
     SimulatedDemonstration,
     observe_demonstration,

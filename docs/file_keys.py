@@ -24,8 +24,7 @@ from apo_bench.cli.setting_options import shown_default
 from apo_bench.drafting.writing import THRESHOLDS
 from apo_bench.io.documents import JsonNode
 from apo_bench.observation.models.fitted import ConstantError, ViewNoise
-from apo_bench.observation.noise_file import noise_text, read_noise
-from apo_bench.observation.presets import presets
+from apo_bench.observation.noise_file import noise_text, presets, read_noise
 from apo_bench.parts.allowed import ELEMENT_RULES
 from apo_bench.parts.stated import PART_SCHEMA, read_stated_part
 from apo_bench.records import SETTINGS, SettingInfo

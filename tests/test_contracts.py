@@ -57,12 +57,12 @@ BREACHES = {
         ("apo_bench.correction.correctors", "apo_bench.correction.own_code.forms"),
     ],
     "contact": [
-        ("apo_bench.correction.contact.problem", "apo_bench.correction.contact.chi_square"),
-        ("apo_bench.correction.contact.heavy_tails", "apo_bench.correction.contact.inferred"),
+        ("apo_bench.correction.contact.problem", "apo_bench.correction.contact.solved"),
+        ("apo_bench.correction.contact.inferred", "apo_bench.correction.contact.problem"),
         ("apo_bench.correction.contact.suspects", "apo_bench.correction.contact.starts"),
     ],
     "touches": [
-        ("apo_bench.correction.touches.robot_model", "apo_bench.correction.touches.robust_estimate"),
+        ("apo_bench.correction.touches.robust_estimate", "apo_bench.correction.touches.belief"),
         ("apo_bench.correction.touches.robust_estimate", "apo_bench.correction.touches.belief"),
     ],
     "workshop": [
@@ -71,14 +71,14 @@ BREACHES = {
         ("apo_bench.scenario.file", "apo_bench.cad.importing"),
     ],
     "report": [
-        ("apo_bench.report.page.document", "apo_bench.report.comparison.text"),
+        ("apo_bench.report.page.report_page", "apo_bench.report.comparison.text"),
         ("apo_bench.report.page.report_page", "apo_bench.report.answer"),
-        ("apo_bench.report.tables.cells", "apo_bench.report.run.facts"),
-        ("apo_bench.report.figures.levels", "apo_bench.report.page.document"),
+        ("apo_bench.report.tables.cells", "apo_bench.report.run.trials"),
+        ("apo_bench.report.figures.levels", "apo_bench.report.page.report_page"),
     ],
     "statistics": [
         ("apo_bench.statistics.rates", "apo_bench.statistics.levels.curves"),
-        ("apo_bench.statistics.settings", "apo_bench.statistics.levels.summary"),
+        ("apo_bench.statistics.settings", "apo_bench.statistics.levels.half_level"),
         ("apo_bench.statistics.paired", "apo_bench.statistics.power"),
     ],
     "sweeps": [
@@ -89,7 +89,7 @@ BREACHES = {
     ],
     "work": [
         ("apo_bench.sweeps.work.environment_lock", "apo_bench.sweeps.work.dispatch"),
-        ("apo_bench.sweeps.work.messages", "apo_bench.sweeps.work.worker"),
+        ("apo_bench.sweeps.work.environment_lock", "apo_bench.sweeps.work.worker"),
     ],
     "judge": [
         ("apo_bench.judging.verdict", "apo_bench.observation.noise"),

@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.kinds import WALLS, contact_kind, geometric_play
+from apo_bench.assembly.facing_round import WALLS, contact_kind, geometric_play
 from apo_bench.geometry import Array, Face, RoundFace, Solid, copyable, freeze, frozen, pose, remembered
 
 

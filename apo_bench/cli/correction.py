@@ -6,9 +6,8 @@ from typing import Annotated, Any, cast
 import typer
 
 from apo_bench.assembly import Correction, Observation, Plan
-from apo_bench.cli.arguments import NO_RESULT, check_outputs, writing
 from apo_bench.cli.printing import print_json, print_lines, print_tables
-from apo_bench.cli.setting_options import AsJson, ScenarioArgument
+from apo_bench.cli.setting_options import NO_RESULT, AsJson, ScenarioArgument, check_outputs, writing
 from apo_bench.errors import require
 from apo_bench.files.observation import as_planned, read_observation_file
 from apo_bench.io.processes import redirect_output
@@ -157,7 +156,7 @@ def correct_command(
 
 def _explained(observation: Observation, correction: Correction) -> Any:
     """What the contacts determine at corrected goals; None of corrections that leave contacts open, or of too many."""
-    from apo_bench.correction.baselines.measured import gap_of
+    from apo_bench.correction.checks.status import gap_of
     from apo_bench.correction.explanation import explain
     from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR
 

@@ -5,10 +5,8 @@ from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.arguments import NO_RESULT, check_outputs, writing
-from apo_bench.cli.help_groups import Grouped
-from apo_bench.cli.printing import print_json
-from apo_bench.cli.setting_options import AsJson
+from apo_bench.cli.printing import Grouped, print_json
+from apo_bench.cli.setting_options import NO_RESULT, AsJson, check_outputs, writing
 from apo_bench.errors import require
 from apo_bench.records import check
 

@@ -10,11 +10,19 @@ import numpy as np
 import typer
 
 from apo_bench.assembly import Plan, observed_residuals, relation_graph
-from apo_bench.cli.arguments import check_outputs, writing
 from apo_bench.cli.printing import print_json
-from apo_bench.cli.setting_options import AsJson, ScenarioArgument, StatedDeg, StatedMm, takes, trial_options
+from apo_bench.cli.setting_options import (
+    AsJson,
+    ScenarioArgument,
+    StatedDeg,
+    StatedMm,
+    check_outputs,
+    takes,
+    trial_options,
+    writing,
+)
 from apo_bench.errors import require
-from apo_bench.files.deviations import assumed_deviations
+from apo_bench.files.csv_form import assumed_deviations
 from apo_bench.files.observation import read_observation, read_observation_file
 from apo_bench.files.robot_frames import RobotFrames, read_robot_frames
 from apo_bench.geometry import Array, pose

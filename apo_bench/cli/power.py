@@ -5,10 +5,8 @@ from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.arguments import numbers
-from apo_bench.cli.help_groups import Grouped
-from apo_bench.cli.printing import print_json
-from apo_bench.cli.setting_options import AsJson
+from apo_bench.cli.printing import Grouped, print_json
+from apo_bench.cli.setting_options import AsJson, numbers
 from apo_bench.errors import InputError
 from apo_bench.statistics import (
     ERROR,

@@ -6,9 +6,8 @@ from typing import Annotated
 
 import typer
 
-from apo_bench.cli.arguments import NO_RESULT, check_writable, path_given
-from apo_bench.cli.help_groups import Grouped
-from apo_bench.cli.setting_options import ScenarioArgument
+from apo_bench.cli.printing import Grouped
+from apo_bench.cli.setting_options import NO_RESULT, ScenarioArgument, check_writable, path_given
 from apo_bench.errors import InputError, require
 from apo_bench.records import check
 from apo_bench.scenario.file import load_scenario, scenario_names

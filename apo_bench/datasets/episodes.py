@@ -8,8 +8,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly import Plan
-from apo_bench.datasets.card import write_card
-from apo_bench.datasets.rollout import FPS, About, Field, Rollout
+from apo_bench.datasets.card import FPS, About, Field, Rollout, write_card
 from apo_bench.geometry import Array, pose
 from apo_bench.io.tables import write_columns
 from apo_bench.records import Row, TrialSettings

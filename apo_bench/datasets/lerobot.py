@@ -15,8 +15,7 @@ import numpy as np
 import pyarrow as pa
 from pyarrow import parquet
 
-from apo_bench.datasets.card import write_card
-from apo_bench.datasets.rollout import FPS, About, Field, Rollout
+from apo_bench.datasets.card import FPS, About, Field, Rollout, write_card
 from apo_bench.geometry import Array
 from apo_bench.io.ordinary_files import to_write
 from apo_bench.io.tables import write_columns

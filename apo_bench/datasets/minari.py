@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench import __version__
-from apo_bench.datasets.card import write_card
-from apo_bench.datasets.rollout import About, Field, Rollout
+from apo_bench.datasets.card import About, Field, Rollout, write_card
 from apo_bench.errors import InputError
 from apo_bench.io.ordinary_files import to_write
 

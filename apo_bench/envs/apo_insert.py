@@ -11,9 +11,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Outcome, Poses, Snapshot
-from apo_bench.envs.insert_spaces import PIXELS, as_seen, insert_space
-from apo_bench.envs.robot import RobotSettings
-from apo_bench.envs.starts import Begun, Trials, judged
+from apo_bench.envs.spaces import PIXELS, as_seen, insert_space
+from apo_bench.envs.starts import Begun, RobotSettings, Trials, judged
 from apo_bench.errors import InputError, require, unknown
 from apo_bench.geometry import Array
 from apo_bench.names import resolve

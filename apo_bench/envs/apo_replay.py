@@ -11,8 +11,8 @@ from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan,
 from apo_bench.envs.episode import Episode, Scenes, Settings, watch_human, with_options
 from apo_bench.envs.infos import VERDICTS, step_info, verdicts
 from apo_bench.envs.rendering import FPS, MODES, Rendering
-from apo_bench.envs.robot import RobotSettings, carried_out
 from apo_bench.envs.spaces import Action, Seen, action_space, as_seen_entries, moved, observation_space
+from apo_bench.envs.starts import RobotSettings, carried_out
 from apo_bench.errors import require
 from apo_bench.geometry import Array
 from apo_bench.observation.looking import Looks

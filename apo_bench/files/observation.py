@@ -9,8 +9,7 @@ import numpy as np
 from apo_bench.assembly import Observation
 from apo_bench.errors import require
 from apo_bench.files import json_reading
-from apo_bench.files.csv_form import read_table
-from apo_bench.files.deviations import DEVIATION_DEG, DEVIATION_MM, check_deviations
+from apo_bench.files.csv_form import DEVIATION_DEG, DEVIATION_MM, check_deviations, read_table
 from apo_bench.geometry import FARTHEST_M
 from apo_bench.scenario import Scenario, layout_at
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.geometry import Array
 from apo_bench.io.documents import read_toml
-from apo_bench.scenario.keys import read_any_pose
+from apo_bench.scenario.contacts import read_any_pose
 
 _SCHEMA = "apo-bench/robot/1"
 

@@ -1,18 +1,49 @@
-"""How a part comes into its contacts: the macros, and the straight line on which it arrives."""
+"""How a part comes into its contacts: the macros, and the straight line on which it arrives.
+
+The straight line on which a part comes to its goal.
+"""
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import chain as chained
 from itertools import product
-from typing import final
+from typing import NamedTuple, final
 
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Poses, TouchedContact, corners, mouth, touched_contacts
-from apo_bench.geometry import Array, Posed, exit_distance, extent, freeze, is_way_free
-from apo_bench.insertion.line import Attach, Preference
+from apo_bench.geometry import Array, Posed, copyable, exit_distance, extent, freeze, is_way_free
 from apo_bench.insertion.macros import UP, Chain, Macro, Way, chain, departure
 from apo_bench.insertion.states import ANGLE_RAD, ContactState, Screw, classify, null_space, screw_state, snap_normals
+
+
+@final
+@copyable
+@dataclass(frozen=True, eq=False)
+class Attach:
+    """The straight line on which a part comes to its goal."""
+
+    direction: Array
+    """Unit vector of the motion, (3,), in the frame of the main part at its goal."""
+    travel_m: float
+    """How far before the goal the line begins."""
+
+    def __post_init__(self) -> None:
+        freeze(self, direction=(3,))
+
+    @property
+    def stated(self) -> "Preference":
+        """The whole line as a preference."""
+        return Preference(self.direction, self.travel_m)
+
+
+class Preference(NamedTuple):
+    """What of a line of attach is stated; the rest is left to the plan."""
+
+    direction: Array | None = None
+    """The direction of the line, (3,), as in `Attach`; None where it is not stated."""
+    travel_m: float | None = None
+
 
 _ROOM_M = 0.02
 """A part begins its way in so far outside of what it goes into."""

@@ -10,8 +10,7 @@ from typing import final
 
 from apo_bench.assembly import Assembly, Contact, Poses, placements
 from apo_bench.geometry import Array
-from apo_bench.insertion.arrival import ANY, Arrival, arrive
-from apo_bench.insertion.line import Preference
+from apo_bench.insertion.arrival import ANY, Arrival, Preference, arrive
 from apo_bench.insertion.states import ANGLE_RAD
 
 

@@ -14,9 +14,8 @@ from apo_bench.assembly import Assembly, Demonstration, Observation
 from apo_bench.errors import InputError, failed, require, unknown
 from apo_bench.geometry import Array
 from apo_bench.names import resolve
-from apo_bench.observation.models.isotropic import floored
-from apo_bench.observation.models.level import Level
-from apo_bench.observation.presets import noise_path, presets
+from apo_bench.observation.models.isotropic import Level, floored
+from apo_bench.observation.noise_file import noise_path, presets
 from apo_bench.records import FAILURES
 
 __all__ = ["FAILURES", "NOISES", "Level", "Noise", "make_noise"]
@@ -27,9 +26,9 @@ Noise = Callable[[Assembly, Demonstration, np.random.Generator], Observation]
 NOISES = MappingProxyType(
     {
         "isotropic": "apo_bench.observation.models.isotropic:Isotropic",
-        "anisotropic": "apo_bench.observation.models.anisotropic:Anisotropic",
+        "anisotropic": "apo_bench.observation.models.camera:Anisotropic",
         "per-part": "apo_bench.observation.models.isotropic:PerPart",
-        "camera": "apo_bench.observation.models.anisotropic:Sighted",
+        "camera": "apo_bench.observation.models.camera:Sighted",
         "heavy-tailed": "apo_bench.observation.models.isotropic:HeavyTailed",
         "outliers": "apo_bench.observation.models.outliers:Outliers",
         "bias": "apo_bench.observation.models.shared:Bias",

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Literal, final
 
 from apo_bench.assembly import Plan
-from apo_bench.insertion.line import Attach
+from apo_bench.insertion.arrival import Attach
 from apo_bench.prediction.arm import ArmMove
 from apo_bench.prediction.measures import MeasureCode, measures
 from apo_bench.records import Thresholds

@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Operation, Poses
 from apo_bench.geometry import Array, Solid, ball_around, intrusion_depths, physical_pieces, pose, remembered
-from apo_bench.insertion.line import Attach
+from apo_bench.insertion.arrival import Attach
 
 _SPACING_M = 0.02
 """The way in is looked at this densely, and at `_MOST` places at most."""

@@ -31,7 +31,7 @@ from apo_bench.assembly import (
     placements,
 )
 from apo_bench.geometry import Array
-from apo_bench.insertion.line import Attach
+from apo_bench.insertion.arrival import Attach
 from apo_bench.prediction.arm import ArmMove
 from apo_bench.prediction.interference import depths_from_above, depths_on_way, physical_solids
 from apo_bench.prediction.resting import between, enters, is_support, residual, resting_poses

@@ -14,7 +14,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Facing, Observation, PartFace, Poses, joint_covariance
-from apo_bench.assembly.facing import facing
+from apo_bench.assembly.touching import facing
 from apo_bench.geometry import Array, pose
 from apo_bench.recognition.estimate import GoalEstimate
 from apo_bench.recognition.thresholds import PairThresholds, Rules, pair_thresholds, reality, slack

@@ -13,7 +13,7 @@ from apo_bench.errors import InputError, one_line, unknown
 from apo_bench.geometry import Array
 from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.recording.log import Log, PoseTrack
-from apo_bench.scenario.keys import read_any_pose, refuse
+from apo_bench.scenario.contacts import read_any_pose, refuse
 
 _CAMERA = "apo-bench/camera/1"
 _OBJECTS = "apo-bench/objects/1"

@@ -4,18 +4,7 @@ Other rooms import from here; the folder of a sweep is in `run`.
 """
 
 from apo_bench.records.limits import CORRECTOR_LIMIT_S, USUAL_LIMITS, Limits
-from apo_bench.records.method import (
-    as_seen,
-    feels,
-    is_own,
-    knows_relations,
-    knows_truth,
-    may_look,
-    parsed,
-    with_simulated,
-)
 from apo_bench.records.outcomes import CODES, STAGES, sentence, touching_sentence
-from apo_bench.records.relations import GIVEN, RECOGNISED, SHIFT_MM, WRONG, relations_name
 from apo_bench.records.robot_error import (
     NO_ROBOT_ERROR,
     checked_robot_error,
@@ -59,11 +48,24 @@ from apo_bench.records.short_names import (
     CORRECTORS,
     FAILURES,
     FOREIGN_ARMS,
+    GIVEN,
     METHODS,
+    RECOGNISED,
     RESIDUALS,
+    SHIFT_MM,
     SIMULATED,
     UNCORRECTED,
+    WRONG,
     WRONG_RELATIONS,
+    as_seen,
+    feels,
+    is_own,
+    knows_relations,
+    knows_truth,
+    may_look,
+    parsed,
+    relations_name,
+    with_simulated,
 )
 from apo_bench.records.thresholds import MEANINGS, Criteria, Meaning, Thresholds
 from apo_bench.records.wrench_sensor import USUAL_WRENCH, WrenchNoise, checked_wrench, wrench_noise

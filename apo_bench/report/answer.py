@@ -20,8 +20,7 @@ from apo_bench.statistics import (
     pooled_rate,
     rank,
 )
-from apo_bench.statistics.levels.half_level import HalfLevel
-from apo_bench.statistics.levels.summary import Summary
+from apo_bench.statistics.levels.half_level import HalfLevel, Summary
 from apo_bench.statistics.rates import PLACE_FIELDS
 
 ALIKE_WITHIN = 0.05

@@ -9,14 +9,13 @@ from apo_bench.errors import InputError, require
 from apo_bench.io.ordinary_files import check_folders, check_target, to_write
 from apo_bench.io.tables import write_columns
 from apo_bench.records import Row, check_same_salt, one_salt, read_salt
-from apo_bench.records.run.report_rows import COLUMNS as KEPT
-from apo_bench.records.run.report_rows import report_rows
 from apo_bench.records.run.run_file import read_run
+from apo_bench.records.run.run_folder import COLUMNS as KEPT
+from apo_bench.records.run.run_folder import report_rows
 from apo_bench.report.answer import answer
-from apo_bench.report.figures.every import figures
+from apo_bench.report.figures.other_axes import figures
 from apo_bench.report.page.report_page import report_page
-from apo_bench.report.run.facts import scenario_files
-from apo_bench.report.run.trials import Draw, draw_failures
+from apo_bench.report.run.trials import Draw, draw_failures, scenario_files
 from apo_bench.report.tables.cells import cell_table, felt_table, gap_table, pair_table
 from apo_bench.report.tables.forecasts import calibration_table, confusion_table, recognition_table
 from apo_bench.report.tables.methods import area_table, effort_table, half_table, time_table, work_table
@@ -34,7 +33,7 @@ from apo_bench.statistics import (
     trial_times,
     work,
 )
-from apo_bench.statistics.levels.summary import Summary, summary
+from apo_bench.statistics.levels.half_level import Summary, summary
 from apo_bench.statistics.settings import settings
 
 MOST_PANELS = 16

@@ -13,14 +13,14 @@ import numpy as np
 from apo_bench.assembly import Assembly, Gap
 from apo_bench.errors import require, require_known
 from apo_bench.generated import generated_file, is_generated, whole_name
-from apo_bench.insertion.line import Preference
+from apo_bench.insertion.arrival import Preference
 from apo_bench.io.documents import JsonNode, read_toml
 from apo_bench.io.plain_text import UNSHOWN
 from apo_bench.records import MEANINGS, Meaning, Thresholds
 from apo_bench.resources import folder
 from apo_bench.scenario.checks import check_scenario
+from apo_bench.scenario.contacts import LARGEST_LENGTH_MM, read_span, read_unit_axis, refuse_unless
 from apo_bench.scenario.entries import OperationEntry, read_operations, read_parts
-from apo_bench.scenario.keys import LARGEST_LENGTH_MM, read_span, read_unit_axis, refuse_unless
 from apo_bench.scenario.layout import with_attach_lines
 from apo_bench.scenario.scenario import Carelessness, Scenario, Shift, Site, Turn
 

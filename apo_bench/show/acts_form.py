@@ -15,7 +15,7 @@ from apo_bench.files.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
 from apo_bench.records import WrenchNoise, wrench_noise
 from apo_bench.show.robot_form import pose_form, tip_form
-from apo_bench.simulation.execution import search, spiral
+from apo_bench.simulation.execution import search
 from apo_bench.simulation.execution.beside import STAND_OFF_M
 from apo_bench.simulation.execution.feel import laying, touching
 from apo_bench.simulation.execution.feel.feeling import ACTS, FOOT_SIGMA_M, SQUARED, TOUCH_SIGMA_M, touch_guard
@@ -72,8 +72,8 @@ def acts_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> dic
             "sigma_mm": _mm(FOOT_SIGMA_M),
         },
         "search": {
-            "radius_mm": _mm(spiral.RADIUS_M),
-            "pitch_mm": _mm(spiral.PITCH_M),
+            "radius_mm": _mm(search.RADIUS_M),
+            "pitch_mm": _mm(search.PITCH_M),
             "then_turned_deg": list(search.YAWS_DEG),
             "radius_turned_mm": _mm(search.YAWED_RADIUS_M),
             "at_most_times": search.SEARCHES,

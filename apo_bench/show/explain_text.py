@@ -8,8 +8,7 @@ import numpy as np
 from apo_bench.assembly import Hypothesis, spelled
 from apo_bench.correction.directions import SHIFT_NAMES, TURN_NAMES, Direction
 from apo_bench.correction.explanation import Explanation, FreeDirection, OperationExplanation, PartExplanation
-from apo_bench.correction.relation_equations import RelationHold
-from apo_bench.correction.shared_estimate import SharedEstimate
+from apo_bench.correction.relation_equations import RelationHold, SharedEstimate
 from apo_bench.files.json_forms import covariance_form, pose_form
 from apo_bench.geometry import Array, RoundFace
 from apo_bench.io.grouping import grouped

@@ -27,7 +27,7 @@ from apo_bench.records import (
     refuse_noise,
 )
 from apo_bench.scenario import Scenario, load_scenario
-from apo_bench.sweeps.work.messages import Unit
+from apo_bench.sweeps.work.environment_lock import Unit
 
 LARGEST_TRIALS = 1_000_000
 _MOST_TRIALS = 1_000_000

@@ -18,8 +18,7 @@ from apo_bench.sweeps.grid import SweepSettings, check_grids, described, load_al
 from apo_bench.sweeps.local.pool import run_locally
 from apo_bench.sweeps.progress import progress
 from apo_bench.sweeps.work.dispatch import Executor, check_limit
-from apo_bench.sweeps.work.environment_lock import EnvironmentLock, Names, environment_lock
-from apo_bench.sweeps.work.messages import Check, Unit, listening
+from apo_bench.sweeps.work.environment_lock import Check, EnvironmentLock, Names, Unit, environment_lock, listening
 from apo_bench.sweeps.work.worker import Timing, row_within_limit
 from apo_bench.trial.fingerprint import code_files, content_pieces, spec_hash
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations

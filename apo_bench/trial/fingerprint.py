@@ -22,7 +22,7 @@ from apo_bench import __version__
 from apo_bench.files.json_forms import OBSERVATION_SCHEMA, PLAN_SCHEMA
 from apo_bench.io.ordinary_files import read_bytes
 from apo_bench.names import admit
-from apo_bench.observation.presets import noise_path
+from apo_bench.observation.noise_file import noise_path
 from apo_bench.records import ROW, TrialSettings
 from apo_bench.records.run.own_code import DATA_PREFIXES, is_own_code
 from apo_bench.resources import folder

@@ -31,7 +31,7 @@ from apo_bench.simulation.scene.graphics import renderer
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations, demonstration_of
-from apo_bench.trial.row import lost
+from apo_bench.trial.outcome_columns import lost
 from apo_bench.trial.stages import (
     SimulatedDemonstration,
     demonstration_failure,

@@ -25,8 +25,7 @@ from apo_bench.observation.models.isotropic import COVARIANCE_FLOOR
 from apo_bench.observation.models.outliers import UNSEEN_DEVIATION
 from apo_bench.observation.models.residuals import Residuals, match_residuals
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.observation.noise_file import noise_text, read_noise
-from apo_bench.observation.presets import presets
+from apo_bench.observation.noise_file import noise_text, presets, read_noise
 from apo_bench.trial.fingerprint import noise_content, spec_hash
 from apo_bench.trial.planning import apply_method
 from tests import bop_made as made_of

@@ -27,7 +27,7 @@ from apo_bench.show.learned_text import learned_lines
 from apo_bench.show.noise_card import Drawn, noise_card
 from apo_bench.show.recognised_text import confidence_line, difference_lines, evidence_table, recognition_form
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.trial.repeats import Repeats
+from apo_bench.trial.learned_noise import Repeats
 from tests import bop_made, scenes
 
 ON_TABLE = Contact(PartFace("castle1", "bottom"), PartFace("table", "top"))

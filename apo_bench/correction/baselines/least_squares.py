@@ -11,7 +11,7 @@ import numpy as np
 
 from apo_bench.assembly import Correction, Observation
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.baselines.measured import as_it_ends
+from apo_bench.correction.checks.status import as_it_ends
 from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.geometry import Array
 

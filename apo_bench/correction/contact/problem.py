@@ -20,8 +20,7 @@ from apo_bench.correction.solvers.compact import CompactEquations, compact_equat
 from apo_bench.correction.solvers.gauss_newton import NearestGoals, batch_goals
 from apo_bench.correction.solvers.inequalities import Inequalities, bounded
 from apo_bench.correction.solvers.kernels import Kernels, kernels
-from apo_bench.correction.solvers.laid_contacts import LaidContacts, laid_contacts
-from apo_bench.correction.solvers.play import fit_covariance
+from apo_bench.correction.solvers.play import LaidContacts, fit_covariance, laid_contacts
 from apo_bench.correction.solvers.whitened import correction_to, noise_factor, scales
 from apo_bench.geometry import Array, remembered
 

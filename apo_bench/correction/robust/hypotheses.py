@@ -19,9 +19,9 @@ from apo_bench.assembly import Consistency, Correction, Observation, OutlierMode
 from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.checks.consistency import CONTRADICTION_M, fit_deviation, p_value
 from apo_bench.correction.contact.contact import ContactCorrector, contact_apply
-from apo_bench.correction.contact.heavy_tails import drawn_chi_squares, drawn_p_value
 from apo_bench.correction.contact.inferred import inferred_goals
 from apo_bench.correction.contact.problem import problem_of, seen_system
+from apo_bench.correction.contact.solved import drawn_chi_squares, drawn_p_value
 from apo_bench.correction.robust.beliefs import (
     DISPLACED,
     INLIER,

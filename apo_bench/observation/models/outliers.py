@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Assembly, Demonstration, Observation, Poses, measured_rates
 from apo_bench.errors import require
 from apo_bench.geometry import Array, frozen
-from apo_bench.observation.models.isotropic import observe_displaced
-from apo_bench.observation.models.level import Facts, Level
+from apo_bench.observation.models.isotropic import Facts, Level, observe_displaced
 
 OUTLIERS = 0.1
 MISSES = 0.02

@@ -10,8 +10,7 @@ from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.fitted import view_error, view_frame
-from apo_bench.observation.models.isotropic import OWN, OWN_FACT, observe_displaced, observe_shared
-from apo_bench.observation.models.level import Facts, Level
+from apo_bench.observation.models.isotropic import OWN, OWN_FACT, Facts, Level, observe_displaced, observe_shared
 
 CORRELATION = 0.9
 """Between the errors of an operation and the next."""

@@ -17,8 +17,7 @@ from apo_bench.geometry import (
     symmetries,
     turn_about,
 )
-from apo_bench.observation.models.isotropic import observe_displaced
-from apo_bench.observation.models.level import Facts, Level
+from apo_bench.observation.models.isotropic import Facts, Level, observe_displaced
 
 WORSE = 3.0
 _MANY = 3.0

@@ -13,12 +13,11 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Solid, pose
 from apo_bench.io.figures import default_looks, save_figure
 from apo_bench.recording.arranging import camera_pose
-from apo_bench.recording.importing import ImportedRecording, planned_starts
+from apo_bench.recording.importing import ImportedRecording, UnplannedRecording, planned_starts
 from apo_bench.recording.log import Log, PoseTrack
 from apo_bench.recording.operations import approaches
 from apo_bench.recording.setup_files import CameraFile
 from apo_bench.recording.stays import Stays, all_stays
-from apo_bench.recording.without_scenario import UnplannedRecording
 from apo_bench.scenario.scenario import Scenario
 
 _AXES = ("#c0392b", "#2e8b57", "#2456a6")

@@ -10,12 +10,11 @@ from apo_bench.geometry import Array, frozen, pose
 from apo_bench.io.words import columns, direction
 from apo_bench.recording.arranging import CameraPose
 from apo_bench.recording.averaging import per_axis
-from apo_bench.recording.importing import ImportedRecording
+from apo_bench.recording.importing import ImportedRecording, UnplannedRecording
 from apo_bench.recording.log import Log
 from apo_bench.recording.operations import approaches
 from apo_bench.recording.rests import RestSpan
 from apo_bench.recording.setup_files import ObjectsFile
-from apo_bench.recording.without_scenario import UnplannedRecording
 
 _HEADS: tuple[str, ...] = (
     "",

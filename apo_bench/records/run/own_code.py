@@ -7,8 +7,7 @@ the folder is trusted.
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from apo_bench.records.relations import WRONG
-from apo_bench.records.short_names import FAILURES, FOREIGN_ARMS, RESIDUALS
+from apo_bench.records.short_names import FAILURES, FOREIGN_ARMS, RESIDUALS, WRONG
 
 DATA_PREFIXES: Mapping[str, tuple[str, ...]] = {
     "method": (),

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from apo_bench.records.limits import CORRECTOR_LIMIT_S, USUAL_LIMITS, Limits
-from apo_bench.records.method import is_own
 from apo_bench.records.settings import LEVEL, RANGE, SETTINGS
+from apo_bench.records.short_names import is_own
 
 _SALT_FILE = "FILE"
 """Stands for the file of the salt of a trial: where it is, is nobody's business who reads a page."""

@@ -9,7 +9,7 @@ from apo_bench.assembly import Plan
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
 from apo_bench.scenario import Scenario, draw_layout
-from apo_bench.simulation.arm_checks.tip_error import SPEEDS, STAND_S, WAY_M, TipError, error_on, rise
+from apo_bench.simulation.arm_checks.plan_check import SPEEDS, STAND_S, WAY_M, TipError, error_on, rise
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.home import tip_down
 from apo_bench.simulation.arms.kinematics import Kinematics

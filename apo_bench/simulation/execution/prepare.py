@@ -20,8 +20,7 @@ from apo_bench.insertion.surroundings import (
 )
 from apo_bench.scenario.layout import nominal_operations
 from apo_bench.simulation.arms.arm import Arm
-from apo_bench.simulation.execution.beside import beside_places
-from apo_bench.simulation.execution.flush import flush_pose
+from apo_bench.simulation.execution.beside import beside_places, flush_pose
 from apo_bench.simulation.execution.grips import centring_grips, squaring_grips, transfer_grips
 from apo_bench.simulation.execution.transfer import (
     PUT_DOWN,

@@ -7,8 +7,7 @@ import numpy as np
 
 from apo_bench.assembly import Operation, Poses
 from apo_bench.geometry import Array, pose
-from apo_bench.insertion.arrival import Arrival
-from apo_bench.insertion.line import Attach
+from apo_bench.insertion.arrival import Arrival, Attach
 from apo_bench.insertion.macros import MacroName
 from apo_bench.insertion.surroundings import WALL_MARGIN_M
 from apo_bench.simulation.robot.paths import shifted, with_height

@@ -16,8 +16,7 @@ from apo_bench.resources import folder
 from apo_bench.scenario import Scenario, layout_at
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.physics import Physics, set_contact, set_options
-from apo_bench.simulation.scene.geoms import dress
-from apo_bench.simulation.scene.meeting import OF_PARTS, Bits, meetings
+from apo_bench.simulation.scene.geoms import OF_PARTS, Bits, dress, meetings
 from apo_bench.simulation.scene.walls import simulated_pieces
 from apo_bench.simulation.scene.world import WRIST_SENSORS
 

@@ -17,8 +17,7 @@ from apo_bench.errors import InputError, require
 from apo_bench.sweeps.local.pool import GOING_S, GRACE_S
 from apo_bench.sweeps.local.process import Process
 from apo_bench.sweeps.ray.driver import ClusterPlan, drive, runtime_files
-from apo_bench.sweeps.work.environment_lock import EnvironmentLock
-from apo_bench.sweeps.work.messages import Check, Unit, never
+from apo_bench.sweeps.work.environment_lock import Check, EnvironmentLock, Unit, never
 from apo_bench.sweeps.work.worker import Emit
 
 _TURN_S = 0.2

@@ -9,10 +9,9 @@ from typing import Any, Protocol, final
 
 from apo_bench.errors import require
 from apo_bench.records import TrialSettings, is_own
-from apo_bench.sweeps.work.environment_lock import EnvironmentLock
-from apo_bench.sweeps.work.messages import Check, Message, Unit, checked
+from apo_bench.sweeps.work.environment_lock import Check, EnvironmentLock, Message, Unit, checked
 from apo_bench.sweeps.work.worker import Emit, timing
-from apo_bench.trial.row import lost
+from apo_bench.trial.outcome_columns import lost
 
 STARTING_S = 300.0
 """What a worker gets to be ready, and to compile a scene."""

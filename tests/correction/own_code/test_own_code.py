@@ -402,7 +402,7 @@ def worker(folder: Path) -> Iterator[Worker]:
 
 
 def rows(worker: Worker, *methods: str) -> dict[str, dict[str, Any]]:
-    from apo_bench.sweeps.work.messages import Unit
+    from apo_bench.sweeps.work.environment_lock import Unit
 
     asked = [TrialSettings("block_on_block", careless=0.0, method=method, seed=424243) for method in methods]
     made = [dict(said[0]) for kind, *said in worker.run(Unit(tuple(asked))) if kind == "row"]

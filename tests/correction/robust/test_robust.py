@@ -29,7 +29,7 @@ from apo_bench.geometry import overlap_area, pose
 from apo_bench.geometry.covering import overlap
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.relations import culprit, make_relations, with_relations
-from apo_bench.trial.pose_error import goal_errors
+from apo_bench.trial.outcome_columns import goal_errors
 from tests.shipped import BOXES
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from apo_bench.assembly import Felt, Plan, Touch
 from apo_bench.geometry import Array, pose
 from apo_bench.records import USUAL_WRENCH
-from apo_bench.simulation.execution.flush import Flush
+from apo_bench.simulation.execution.beside import Flush
 from apo_bench.simulation.execution.transfer import Grip
 from apo_bench.simulation.robot.by_wrist import wrist_of, zero
 from apo_bench.simulation.robot.robot import Robot

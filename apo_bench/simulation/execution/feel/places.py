@@ -12,8 +12,7 @@ from shapely import Point
 from apo_bench.assembly import Plan
 from apo_bench.geometry import Array, Box, Face, face_area, own_shape, plane_frame, pose
 from apo_bench.insertion.macros import UP
-from apo_bench.simulation.execution.beside import STAND_OFF_M, upright_walls
-from apo_bench.simulation.execution.flush import LEVEL
+from apo_bench.simulation.execution.beside import LEVEL, STAND_OFF_M, upright_walls
 from apo_bench.simulation.execution.grasping import gripper_depth, obstacles
 from apo_bench.simulation.frames import frame
 from apo_bench.simulation.robot.gripper import gripper_boxes
