@@ -20,7 +20,7 @@ from apo_bench.correction.own_code.own import OwnCorrectors
 from apo_bench.errors import require, unknown
 from apo_bench.records import CORRECTOR, TrialSettings
 from apo_bench.scoring.track import read_track
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene import Scene
 from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.trial.fingerprint import content_hash
 from apo_bench.trial.stages import scene_key, scene_of, simulate_demonstration

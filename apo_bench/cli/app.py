@@ -28,8 +28,7 @@ from apo_bench.cli import (
 from apo_bench.cli.printing import Grouped, GroupedOptions
 from apo_bench.cli.setting_options import NO_RESULT
 from apo_bench.errors import InputError
-from apo_bench.io import processes
-from apo_bench.io.plain_text import brief, clean
+from apo_bench.io import brief, clean, processes
 from apo_bench.names import own_modules_in
 
 app = typer.Typer(

@@ -10,7 +10,7 @@ from apo_bench.cli.printing import print_json, print_lines, print_tables
 from apo_bench.cli.setting_options import NO_RESULT, AsJson, ScenarioArgument, check_outputs, writing
 from apo_bench.errors import require
 from apo_bench.files.observation import as_planned, read_observation_file
-from apo_bench.io.processes import redirect_output
+from apo_bench.io import redirect_output
 from apo_bench.records import CORRECTOR, with_simulated
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario

@@ -25,7 +25,7 @@ from apo_bench.cli.setting_options import (
 )
 from apo_bench.errors import InputError, require, require_known
 from apo_bench.files.csv_form import assumed_deviations
-from apo_bench.io.processes import redirect_output
+from apo_bench.io import redirect_output
 from apo_bench.records import RECOGNISED
 from apo_bench.scenario.file import load_scenario
 

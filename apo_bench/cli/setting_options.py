@@ -16,7 +16,7 @@ from typing import Annotated, Any, TypeVar
 import typer
 
 from apo_bench.errors import InputError, require
-from apo_bench.io.ordinary_files import check_target
+from apo_bench.io import check_target
 from apo_bench.records import FOREIGN_ARMS, LEVEL, METHODS, RECOGNISED, SETTINGS, WRONG_RELATIONS, SettingInfo
 from apo_bench.records.run.replay_command import milli, number
 from apo_bench.resources import folder

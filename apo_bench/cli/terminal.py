@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 
 from apo_bench.cli.printing import console
-from apo_bench.io.plain_text import clean
+from apo_bench.io import clean
 from apo_bench.records import RANGE, SETTINGS, FreedSet, MovedInHand, Predicted, Row, feels, look_up
 from apo_bench.report.tables.cells import cell_table
 from apo_bench.report.tables.forecasts import prediction_summary

@@ -37,9 +37,7 @@ from apo_bench.correction.relation_equations import (
     estimate_shared,
     relation_holds,
 )
-from apo_bench.correction.solvers.compact import linearised_by
-from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR, Freedom, freedom_of
-from apo_bench.correction.solvers.whitened import twists_of
+from apo_bench.correction.solvers import LARGEST_POSTERIOR, Freedom, freedom_of, linearised_by, twists_of
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose, right_jacobian
 

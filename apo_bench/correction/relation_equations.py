@@ -15,9 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import ODL, Assembly, Observation, SharedError, inverted, joint_covariance, simplified
-from apo_bench.correction.solvers.compact import CompactEquations, linearised_by
-from apo_bench.correction.solvers.posterior import RANK_CUT_OFF, freedom_of
-from apo_bench.correction.solvers.whitened import noise_factor, twists_of
+from apo_bench.correction.solvers import (
+    RANK_CUT_OFF,
+    CompactEquations,
+    freedom_of,
+    linearised_by,
+    noise_factor,
+    twists_of,
+)
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 

@@ -15,7 +15,7 @@ from pyarrow import parquet
 
 from apo_bench import __version__
 from apo_bench.geometry import Array
-from apo_bench.io.ordinary_files import to_write
+from apo_bench.io import to_write
 
 FPS = 20
 """Frames, and actions, a second of simulated time."""

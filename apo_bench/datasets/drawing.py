@@ -18,14 +18,22 @@ from apo_bench.assembly import Assembly, Demonstration, Layout, Observation, Ope
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
 from apo_bench.observation.looking import observe
-from apo_bench.observation.models.camera import Anisotropic, Sighted
-from apo_bench.observation.models.empirical import Empirical
-from apo_bench.observation.models.failures import AlongRay, Flipped, Stale
-from apo_bench.observation.models.fitted import Fitted
-from apo_bench.observation.models.isotropic import HeavyTailed, Isotropic, PerPart
-from apo_bench.observation.models.outliers import Outliers
-from apo_bench.observation.models.shared import Bias
-from apo_bench.observation.models.symmetric import AnyTurn, Symmetric
+from apo_bench.observation.models import (
+    AlongRay,
+    Anisotropic,
+    AnyTurn,
+    Bias,
+    Empirical,
+    Fitted,
+    Flipped,
+    HeavyTailed,
+    Isotropic,
+    Outliers,
+    PerPart,
+    Sighted,
+    Stale,
+    Symmetric,
+)
 from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.records import USUAL, TrialSettings, check, level_pair
 from apo_bench.scenario import Scenario, careless_covariance, load_scenario, spread_error

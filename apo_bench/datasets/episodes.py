@@ -10,11 +10,10 @@ import numpy as np
 from apo_bench.assembly import Plan
 from apo_bench.datasets.card import FPS, About, Field, Rollout, write_card
 from apo_bench.geometry import Array, pose
-from apo_bench.io.tables import write_columns
+from apo_bench.io import write_columns
 from apo_bench.records import Row, TrialSettings
 from apo_bench.simulation.hooks import Doing, Hooks
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import WRIST_SENSORS, part_pose, wrist_felt
+from apo_bench.simulation.scene import WRIST_SENSORS, Scene, part_pose, wrist_felt
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
 from apo_bench.trial.trial import noise_of, run_trial
 

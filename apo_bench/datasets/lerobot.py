@@ -17,8 +17,7 @@ from pyarrow import parquet
 
 from apo_bench.datasets.card import FPS, About, Field, Rollout, write_card
 from apo_bench.geometry import Array
-from apo_bench.io.ordinary_files import to_write
-from apo_bench.io.tables import write_columns
+from apo_bench.io import to_write, write_columns
 
 _PLACE = "chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _CHUNK = 1000

@@ -14,7 +14,7 @@ import numpy as np
 from apo_bench import __version__
 from apo_bench.datasets.card import About, Field, Rollout, write_card
 from apo_bench.errors import InputError
-from apo_bench.io.ordinary_files import to_write
+from apo_bench.io import to_write
 
 _OWN = {
     "rewards": "reward of each action",

@@ -20,8 +20,8 @@ from apo_bench.observation.noise import Level, make_noise
 from apo_bench.records import CORRECTOR, CORRECTORS, SIMULATED, USUAL, TrialSettings, check, level_pair, sentence
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
-from apo_bench.simulation.robot.robot import Halt
-from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.simulation.robot import Halt
+from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.simulation.task.tip_control import PERIOD_S, TipControl
 
 Seen = dict[str, Any]

@@ -30,7 +30,7 @@ from apo_bench.records import (
 )
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
-from apo_bench.simulation.scene.scene import build_scene
+from apo_bench.simulation.scene import build_scene
 from apo_bench.trial.fitting import fitting_plan
 from apo_bench.trial.promise import abstained, promised_success
 from apo_bench.trial.stages import (

@@ -11,7 +11,7 @@ from apo_bench.errors import InputError, unknown
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level
 from apo_bench.records import check, level_pair
-from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 
 MOST_SCENES = 8

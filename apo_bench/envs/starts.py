@@ -22,8 +22,8 @@ from apo_bench.records import (
     robot_sigmas,
     told_error,
 )
-from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.robot import RobotError
+from apo_bench.simulation.scene import Scene
 from apo_bench.simulation.task.start import Start, go_on, prepare
 from apo_bench.simulation.task.tip_control import TipControl
 from apo_bench.trial.planning import apply_method

@@ -12,7 +12,7 @@ import numpy as np
 from apo_bench.assembly import Observation, Reached, Snapshot, lowered_observation, placements
 from apo_bench.correction.baselines.track import nested, next_operation, reached_back
 from apo_bench.correction.correctors import correct
-from apo_bench.correction.solvers.newton import LENGTH_M
+from apo_bench.correction.solvers import LENGTH_M
 from apo_bench.geometry import Array, pose
 
 

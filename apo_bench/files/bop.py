@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
-from apo_bench.io.ordinary_files import opened
-from apo_bench.io.strict_csv import check_separator
+from apo_bench.io import check_separator, opened
 
 _COLUMNS = ("scene_id", "im_id", "obj_id", "score", "R", "t", "time")
 _WANTED = "needed are, in this order, " + ",".join(_COLUMNS)

@@ -8,8 +8,7 @@ import numpy as np
 
 from apo_bench.errors import InputError, require
 from apo_bench.files.bop import LARGEST_ID, LARGEST_MM, PoseRows, check_rows, read_results
-from apo_bench.io.documents import JsonNode, parse_json
-from apo_bench.io.ordinary_files import read_text
+from apo_bench.io import JsonNode, parse_json, read_text
 
 LARGEST_TRUTH_BYTES = 8_000_000
 

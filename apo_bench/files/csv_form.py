@@ -22,7 +22,7 @@ import numpy as np
 from apo_bench.assembly import Assembly, Observation
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import FARTHEST_M, Array, pose
-from apo_bench.io.strict_csv import Columns, CsvRow, read_csv
+from apo_bench.io import Columns, CsvRow, read_csv
 from apo_bench.scenario import Scenario, layout_at
 
 DEVIATION_MM = 1.0

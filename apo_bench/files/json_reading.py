@@ -26,7 +26,7 @@ from apo_bench.errors import InputError, require_known
 from apo_bench.files.csv_form import ALLOWED_DEVIATIONS, SHIFT_M, TURN_RAD, is_sensible, is_within
 from apo_bench.files.json_forms import OBSERVATION_SCHEMA, OUTLIER_KEYS, PLAN_SCHEMA, TO_MM_DEG
 from apo_bench.geometry import Array, pose
-from apo_bench.io.documents import JsonNode, read_json
+from apo_bench.io import JsonNode, read_json
 from apo_bench.scenario import Scenario, layout_at
 
 _LEAST_FREEDOM = 0.4

@@ -7,7 +7,7 @@ from typing import Literal, cast, final
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.io.documents import read_toml
+from apo_bench.io import read_toml
 from apo_bench.scenario.contacts import read_any_pose
 
 _SCHEMA = "apo-bench/robot/1"

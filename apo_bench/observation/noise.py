@@ -14,7 +14,7 @@ from apo_bench.assembly import Assembly, Demonstration, Observation
 from apo_bench.errors import InputError, failed, require, unknown
 from apo_bench.geometry import Array
 from apo_bench.names import resolve
-from apo_bench.observation.models.isotropic import Level, floored
+from apo_bench.observation.models import Level, floored
 from apo_bench.observation.noise_file import noise_path, presets
 from apo_bench.records import FAILURES
 

@@ -10,19 +10,21 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.geometry import Array, pose
-from apo_bench.io.documents import JsonNode, read_toml
-from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.empirical import Empirical, empirical_noise
-from apo_bench.observation.models.fitted import (
+from apo_bench.io import JsonNode, read_toml
+from apo_bench.observation.models import (
     LEAST_FREEDOM,
     SMALLEST_SCALE,
+    Camera,
     ConstantError,
+    Empirical,
     Fitted,
+    Level,
     MeasuredNoise,
+    Split,
+    Tail,
     ViewNoise,
+    empirical_noise,
 )
-from apo_bench.observation.models.isotropic import Level
-from apo_bench.observation.models.tails import Split, Tail
 from apo_bench.records import RESIDUALS
 from apo_bench.resources import folder
 from apo_bench.scenario.contacts import read_pose

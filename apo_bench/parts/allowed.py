@@ -12,7 +12,7 @@ from xml.etree.ElementTree import Element, TreeBuilder
 from xml.parsers import expat
 
 from apo_bench.errors import InputError
-from apo_bench.io.ordinary_files import read_text
+from apo_bench.io import read_text
 
 FACE_OR_PART_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]*")
 """What parts, boxes and faces may be called: names that stay unambiguous in `part.face` and in a scene."""

@@ -12,8 +12,7 @@ import numpy as np
 
 from apo_bench.errors import InputError, one_line, require, require_known
 from apo_bench.geometry import Array, pose
-from apo_bench.io.ordinary_files import opened
-from apo_bench.io.strict_csv import check_separator
+from apo_bench.io import check_separator, opened
 from apo_bench.recording.columns import LogColumn, check_length, column, poses, row_times
 from apo_bench.recording.log import LARGEST_LOG_BYTES, MOST_POSES, LogRows
 from apo_bench.recording.setup_files import Conventions

@@ -12,7 +12,7 @@ import numpy as np
 from apo_bench.errors import InputError, one_line, require, require_known
 from apo_bench.files.bop import read_results
 from apo_bench.geometry import pose
-from apo_bench.io.ordinary_files import decoded, read_bytes
+from apo_bench.io import decoded, read_bytes
 from apo_bench.recording.columns import check_length, oriented
 from apo_bench.recording.csv_log import ROS_NOTES, read_csv_log, read_ros_csv, read_tum
 from apo_bench.recording.log import LARGEST_LOG_BYTES, MOST_POSES, Log, LogRows, checked_log

@@ -14,8 +14,7 @@ import numpy as np
 from apo_bench.assembly import Assembly, Observation, Poses, SharedError
 from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Array
-from apo_bench.observation.models.isotropic import floored, with_shared
-from apo_bench.observation.models.outliers import UNSEEN_DEVIATION, last_seen
+from apo_bench.observation.models import UNSEEN_DEVIATION, floored, last_seen, with_shared
 from apo_bench.recording.arranging import CameraPose, arrangement_of, solved_camera, staying
 from apo_bench.recording.averaging import per_axis
 from apo_bench.recording.doubts import check_arrangement, check_direction, unclear

@@ -11,7 +11,7 @@ import numpy as np
 
 from apo_bench.errors import InputError, one_line, unknown
 from apo_bench.geometry import Array
-from apo_bench.io.documents import JsonNode, read_toml
+from apo_bench.io import JsonNode, read_toml
 from apo_bench.recording.log import Log, PoseTrack
 from apo_bench.scenario.contacts import read_any_pose, refuse
 

@@ -4,8 +4,7 @@ import numpy as np
 
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
-from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.residuals import Residuals
+from apo_bench.observation.models import Camera, Residuals
 from apo_bench.recording.log import Log, PoseTrack
 from apo_bench.recording.rests import RestSpan, rests_of
 

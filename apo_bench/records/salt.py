@@ -14,7 +14,7 @@ from typing import Any, final
 import numpy as np
 
 from apo_bench.errors import InputError, require
-from apo_bench.io.ordinary_files import read_bytes, write_whole
+from apo_bench.io import read_bytes, write_whole
 
 FEWEST_BYTES = 16
 _MOST_BYTES = 512

@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from apo_bench.errors import InputError, require
-from apo_bench.io.ordinary_files import check_folders, check_target, to_write
-from apo_bench.io.tables import write_columns
+from apo_bench.io import check_folders, check_target, to_write, write_columns
 from apo_bench.records import Row, check_same_salt, one_salt, read_salt
 from apo_bench.records.run.run_file import read_run
 from apo_bench.records.run.run_folder import COLUMNS as KEPT

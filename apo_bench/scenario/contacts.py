@@ -18,7 +18,7 @@ import numpy as np
 from apo_bench.assembly import CONTACT_KINDS, Contact, Gap, GapKind, PartFace, contact_kind, geometric_play
 from apo_bench.errors import InputError, unknown
 from apo_bench.geometry import Array, Face, RoundFace, Solid, pose
-from apo_bench.io.documents import JsonNode
+from apo_bench.io import JsonNode
 
 LARGEST_LENGTH_MM = 2000.0
 """No length in a scenario is larger: the room of an arm on a table."""

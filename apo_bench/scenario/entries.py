@@ -11,7 +11,7 @@ from apo_bench.assembly import Operation
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Solid, pose
 from apo_bench.insertion.arrival import Preference
-from apo_bench.io.documents import JsonNode
+from apo_bench.io import JsonNode
 from apo_bench.parts import load_part, part_path
 from apo_bench.parts.allowed import FACE_OR_PART_NAME
 from apo_bench.parts.receding import with_fit

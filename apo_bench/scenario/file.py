@@ -14,8 +14,7 @@ from apo_bench.assembly import Assembly, Gap
 from apo_bench.errors import require, require_known
 from apo_bench.generated import generated_file, is_generated, whole_name
 from apo_bench.insertion.arrival import Preference
-from apo_bench.io.documents import JsonNode, read_toml
-from apo_bench.io.plain_text import UNSHOWN
+from apo_bench.io import UNSHOWN, JsonNode, read_toml
 from apo_bench.records import MEANINGS, Meaning, Thresholds
 from apo_bench.resources import folder
 from apo_bench.scenario.checks import check_scenario

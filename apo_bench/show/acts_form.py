@@ -15,8 +15,7 @@ from apo_bench.files.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
 from apo_bench.records import WrenchNoise, wrench_noise
 from apo_bench.show.robot_form import pose_form, tip_form
-from apo_bench.simulation.execution import search
-from apo_bench.simulation.execution.beside import STAND_OFF_M
+from apo_bench.simulation.execution import OPEN_TO_PICK_M, STAND_OFF_M, Grip, Move, Transfer, moves, search
 from apo_bench.simulation.execution.feel import laying, touching
 from apo_bench.simulation.execution.feel.feeling import ACTS, FOOT_SIGMA_M, SQUARED, TOUCH_SIGMA_M, touch_guard
 from apo_bench.simulation.execution.feel.places import (
@@ -26,11 +25,8 @@ from apo_bench.simulation.execution.feel.places import (
     opposite_places,
     wall_places,
 )
-from apo_bench.simulation.execution.fingers import OPEN_TO_PICK_M
-from apo_bench.simulation.execution.prepare import Move, moves
-from apo_bench.simulation.execution.transfer import Grip, Transfer
-from apo_bench.simulation.robot.wrist import felt_noise, low_pass_part
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.robot import felt_noise, low_pass_part
+from apo_bench.simulation.scene import Scene
 
 
 def acts_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> dict[str, Any]:

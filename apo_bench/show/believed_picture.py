@@ -9,12 +9,11 @@ import numpy as np
 
 from apo_bench.assembly import Observation, Operation, Poses, arc_residuals, placements, relation_graph
 from apo_bench.geometry import Array, world_bounds
-from apo_bench.io.figures import default_looks, save_figure
-from apo_bench.io.words import listed_words
+from apo_bench.io import default_looks, listed_words, save_figure
 from apo_bench.judging.contacts import face_overlap
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.axes import axis_marks
-from apo_bench.simulation.scene.render import camera_view, picture
+from apo_bench.simulation.scene import camera_view, picture
 
 _WIDTH = 620
 _HEIGHT = 480

@@ -15,7 +15,7 @@ from apo_bench.show.stepping import COLOR_NAMES, COLORS, FACES, Cursor
 from apo_bench.simulation.film.film import FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG, framing
 from apo_bench.simulation.film.meshes import BodyMesh, body_meshes, body_poses, part_meshes
 from apo_bench.simulation.film.still import GHOST_OPACITY, HAND_COLOR, HAND_M, Ghost, label_place, show_moment
-from apo_bench.simulation.scene.world import initial_state
+from apo_bench.simulation.scene import initial_state
 from apo_bench.trial.story import Story
 
 HOST = "127.0.0.1"

@@ -9,13 +9,11 @@ from apo_bench.assembly import Observation
 from apo_bench.correction.directions import Direction
 from apo_bench.correction.explanation import Explanation, OperationExplanation
 from apo_bench.geometry import Array, Solid, extent, world_bounds
-from apo_bench.io.figures import default_looks, save_figure
-from apo_bench.io.grouping import grouped
-from apo_bench.io.words import listed_words, with_article
+from apo_bench.io import default_looks, grouped, listed_words, save_figure, with_article
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.axes import axis_marks
 from apo_bench.show.explain_text import size
-from apo_bench.simulation.scene.marks import Marks, ShiftArrows, TurnRing, pixels
+from apo_bench.simulation.scene import Marks, ShiftArrows, TurnRing, pixels
 
 _WIDTH = 900
 _HEIGHT = 540

@@ -11,8 +11,7 @@ from apo_bench.correction.explanation import Explanation, FreeDirection, Operati
 from apo_bench.correction.relation_equations import RelationHold, SharedEstimate
 from apo_bench.files.json_forms import covariance_form, pose_form
 from apo_bench.geometry import Array, RoundFace
-from apo_bench.io.grouping import grouped
-from apo_bench.io.words import listed_words, with_article
+from apo_bench.io import grouped, listed_words, with_article
 
 _EXPLANATION = "apo-bench/explanation/1"
 _TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)

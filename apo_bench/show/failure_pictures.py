@@ -16,7 +16,7 @@ import numpy as np
 from apo_bench.assembly import Contact, Poses, outline_points
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import pose, world_bounds
-from apo_bench.io.ordinary_files import each_line
+from apo_bench.io import each_line
 from apo_bench.records import Row, Salt, TrialSettings, row_key, settings_of
 from apo_bench.records.run.own_code import left_out, own_code
 from apo_bench.records.run.replay_command import Files

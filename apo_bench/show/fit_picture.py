@@ -7,9 +7,8 @@ from typing import Any
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.io.figures import default_looks
-from apo_bench.observation.models.fitted import MeasuredNoise
-from apo_bench.observation.models.residuals import Residuals
+from apo_bench.io import default_looks
+from apo_bench.observation.models import MeasuredNoise, Residuals
 
 _SEEN = "#9fb8d1"
 _FITTED = "#a6341b"

@@ -6,11 +6,9 @@ from typing import Any
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.io.words import columns
+from apo_bench.io import columns
 from apo_bench.observation.fitting.fit import PERCENTILES, Figures, outliers_by_score
-from apo_bench.observation.models.fitted import MeasuredNoise
-from apo_bench.observation.models.residuals import INLIER_MM, TURNED_DEG, Residuals
-from apo_bench.observation.models.tails import Split
+from apo_bench.observation.models import INLIER_MM, TURNED_DEG, MeasuredNoise, Residuals, Split
 
 _SCHEMA = "apo-bench/noise-fit/2"
 _RARE = 0.01

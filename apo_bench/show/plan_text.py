@@ -15,7 +15,7 @@ from apo_bench.geometry import Array, pose
 from apo_bench.insertion.arrival import Arrival, turning_state
 from apo_bench.insertion.macros import Macro
 from apo_bench.insertion.operations import OperationMacros
-from apo_bench.io.words import columns, direction
+from apo_bench.io import columns, direction
 from apo_bench.scenario import Grasp, Scenario, nominal_operations, nominal_start
 
 _MACROS = "apo-bench/macros/1"

@@ -14,10 +14,10 @@ from apo_bench.depth_camera.follow import Event
 from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
-from apo_bench.io.figures import default_looks, save_figure
+from apo_bench.io import default_looks, save_figure
 from apo_bench.records import RANGE, check
 from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.scene import build_scene
+from apo_bench.simulation.scene import build_scene
 from apo_bench.simulation.sensor.watch import DemonstrationImages
 from apo_bench.trial.stages import (
     OBSERVATION,

@@ -14,8 +14,7 @@ from typing import Any, final
 
 import numpy as np
 
-from apo_bench.io.grouping import grouped
-from apo_bench.io.ordinary_files import each_line
+from apo_bench.io import each_line, grouped
 from apo_bench.records import Row, look_up, robot_sigmas, told_error
 from apo_bench.records.run.validation import timing_of
 from apo_bench.statistics.rates import Place, by_method, order, place_of

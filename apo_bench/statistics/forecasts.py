@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, final
 
 import numpy as np
 
-from apo_bench.io.grouping import grouped
+from apo_bench.io import grouped
 from apo_bench.records import RECOGNISED, Row, knows_relations, knows_truth, look_up
 from apo_bench.statistics.rates import NOT_EXECUTED, Place, Rate, by_method, order, place_of, rank, rank_relations
 

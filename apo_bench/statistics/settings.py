@@ -6,7 +6,7 @@ How rates, differences and levels are said.
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple, TypeVar
 
-from apo_bench.io.grouping import grouped
+from apo_bench.io import grouped
 from apo_bench.records import NO_ROBOT_ERROR, RANGE, USUAL, TrialSettings, feels, knows_relations, knows_truth, may_look
 from apo_bench.statistics.rates import PLACE_FIELDS, Cell, Interval, Place, Rate, rank_relations
 

@@ -8,8 +8,7 @@ from numbers import Real
 from typing import Any, final
 
 from apo_bench.errors import require
-from apo_bench.io.grouping import grouped
-from apo_bench.io.plain_text import UNSHOWN
+from apo_bench.io import UNSHOWN, grouped
 from apo_bench.records import (
     LEVEL,
     RANGE,

@@ -6,7 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from apo_bench.errors import require, require_known
-from apo_bench.io.grouping import grouped
+from apo_bench.io import grouped
 from apo_bench.records import CORRECTOR, CORRECTOR_LIMIT_S, Limits, Row, level_pair, salt_of_sweep, trial_key
 from apo_bench.records.run.run_file import run_record
 from apo_bench.records.run.run_folder import RunFolder

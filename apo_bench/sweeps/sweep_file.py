@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.errors import InputError, require
-from apo_bench.io.documents import JsonNode, read_toml
+from apo_bench.io import JsonNode, read_toml
 from apo_bench.records import LEVEL, SETTINGS, in_python
 from apo_bench.sweeps.grid import AXES, LARGEST_TRIALS, SHARED, SweepSettings
 

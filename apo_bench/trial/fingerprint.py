@@ -20,7 +20,7 @@ import numpy as np
 
 from apo_bench import __version__
 from apo_bench.files.json_forms import OBSERVATION_SCHEMA, PLAN_SCHEMA
-from apo_bench.io.ordinary_files import read_bytes
+from apo_bench.io import read_bytes
 from apo_bench.names import admit
 from apo_bench.observation.noise_file import noise_path
 from apo_bench.records import ROW, TrialSettings

@@ -17,8 +17,8 @@ from apo_bench.geometry import Array, pose
 from apo_bench.prediction.failure import predict
 from apo_bench.prediction.measures import Measure, measures
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.simulation.execution.prepare import in_reach
-from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.simulation.execution import in_reach
+from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.trial.free_directions import free_space, nearest_fitting
 
 ROOMS_MM = (2.0, 0.5)

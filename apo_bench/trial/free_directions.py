@@ -17,11 +17,17 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Equations, Observation
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.robust.hypotheses import UNKNOWN
-from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
-from apo_bench.correction.solvers.gauss_newton import nearest_goals
-from apo_bench.correction.solvers.inequalities import Inequalities, demanded, violations
-from apo_bench.correction.solvers.posterior import freedom_of
-from apo_bench.correction.solvers.whitened import noise_factor, twists_of
+from apo_bench.correction.solvers import (
+    CompactEquations,
+    Inequalities,
+    compact_equations,
+    demanded,
+    freedom_of,
+    nearest_goals,
+    noise_factor,
+    twists_of,
+    violations,
+)
 from apo_bench.geometry import Array, pose
 
 _TRIED = 32

@@ -21,10 +21,9 @@ import numpy as np
 from apo_bench import __version__
 from apo_bench.assembly import Demonstration, Layout
 from apo_bench.errors import InputError, require
-from apo_bench.io.documents import parse_json
-from apo_bench.io.ordinary_files import read_text, write_whole
+from apo_bench.io import parse_json, read_text, write_whole
 from apo_bench.records import RANGE, TrialSettings
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene import Scene
 from apo_bench.trial.fingerprint import code_files, content_pieces
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 

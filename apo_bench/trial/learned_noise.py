@@ -20,12 +20,19 @@ from apo_bench.correction.learning.evidence import UNITS, readings
 from apo_bench.correction.learning.likelihood import EstimatedNumber, LearnedNoise, ObservedErrors, learn_noise
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
-from apo_bench.io.grouping import grouped
+from apo_bench.io import grouped
 from apo_bench.observation.fitting.components import COMPONENTS, component_factors, view_ways
-from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.fitted import ConstantError, MeasuredNoise, ViewNoise, view_frame
-from apo_bench.observation.models.residuals import INLIER_MM, TURNED_DEG
-from apo_bench.observation.models.tails import Split, Tail
+from apo_bench.observation.models import (
+    INLIER_MM,
+    TURNED_DEG,
+    Camera,
+    ConstantError,
+    MeasuredNoise,
+    Split,
+    Tail,
+    ViewNoise,
+    view_frame,
+)
 
 _AS_FAR = 10.0
 """[mm] and [deg]: goals of one scene, each corrected by itself, are no farther apart per axis."""

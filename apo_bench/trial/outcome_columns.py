@@ -19,9 +19,9 @@ import numpy as np
 from apo_bench.assembly import Assembly, Correction, Felt, InHand, Observation, Outcome, Plan, Poses, Reached, Snapshot
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.region import contains_truth
-from apo_bench.correction.solvers.newton import LENGTH_M
+from apo_bench.correction.solvers import LENGTH_M
 from apo_bench.geometry import Array, pose, turned_alike
-from apo_bench.io.plain_text import clean
+from apo_bench.io import clean
 from apo_bench.observation.relations import culprit
 from apo_bench.records import (
     ENV_ID,

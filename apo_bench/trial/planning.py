@@ -20,7 +20,7 @@ from apo_bench.prediction.failure import predict
 from apo_bench.records import with_simulated
 from apo_bench.scenario import Scenario, layout_at
 from apo_bench.simulation.arm_checks.plan_check import arm_moves
-from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.trial.fitting import FittingPlan, fitting_plan
 from apo_bench.trial.stages import observation_failure
 

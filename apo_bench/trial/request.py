@@ -11,7 +11,7 @@ from typing import Any, final
 from apo_bench.assembly import Observation
 from apo_bench.correction.own_code.own import OwnCorrectors
 from apo_bench.errors import InputError, require
-from apo_bench.io.ordinary_files import read_text
+from apo_bench.io import read_text
 from apo_bench.records import (
     CORRECTOR_LIMIT_S,
     LEVEL,
@@ -27,8 +27,8 @@ from apo_bench.scenario import Scenario, in_the_air, load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.film.film import write_film
 from apo_bench.simulation.film.still import FilmTrack
-from apo_bench.simulation.scene.graphics import renderer
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.graphics import renderer
+from apo_bench.simulation.scene import Scene
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations, demonstration_of
 from apo_bench.trial.outcome_columns import lost

@@ -13,11 +13,10 @@ import numpy as np
 from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, pose
 from apo_bench.prediction.resting import resting_poses
+from apo_bench.simulation.execution import Grip, after_transfer, key_angles, moves
 from apo_bench.simulation.execution.feel.feeling import ACTS, TOUCH_SIGMA_M
-from apo_bench.simulation.execution.prepare import key_angles, moves
-from apo_bench.simulation.execution.transfer import Grip, after_transfer
-from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.robot import RobotError
+from apo_bench.simulation.scene import Scene
 
 _CENTRED = np.array([0.0, 1.0, 1.0, 1.0, 0.0, 0.0])
 """Of a twist in the frame of the tip, whose first axis the pads close along: what is left once they have closed."""

@@ -21,12 +21,11 @@ from apo_bench.prediction.failure import ARM_CODES, predict
 from apo_bench.records import NO_ROBOT_ERROR, RANGE, SETTINGS, Predicted, Salt, TrialSettings, robot_sigmas, sentence
 from apo_bench.scenario import Scenario, draw_layout, load_scenario
 from apo_bench.simulation.arm_checks.plan_check import arm_moves
-from apo_bench.simulation.execution.controller import replay
+from apo_bench.simulation.execution import ReplayCache, replay
 from apo_bench.simulation.execution.feel.feeling import Feels
-from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.human.demonstration import demonstrate
-from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.simulation.robot import RobotError
+from apo_bench.simulation.scene import Scene, build_scene
 
 if TYPE_CHECKING:
     from apo_bench.depth_camera.follow import RangeSensor

@@ -11,7 +11,7 @@ from apo_bench.geometry import Array
 from apo_bench.records import RANGE, Row, TrialSettings
 from apo_bench.scenario.layout import layout_at
 from apo_bench.simulation.film.still import Chapter, FilmTrack, scenario_chapter
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene import Scene
 from apo_bench.trial.stages import SimulatedDemonstration, watch_again
 
 AS_SEEN = "as seen"

@@ -27,9 +27,9 @@ from apo_bench.records import (
     told_error,
 )
 from apo_bench.records.run.validation import unwritable
+from apo_bench.simulation.execution import ReplayCache
 from apo_bench.simulation.execution.feel.feeling import ACTS, Feels
-from apo_bench.simulation.execution.replay_cache import ReplayCache
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene import Scene
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.outcome_columns import (
     confidence_columns,

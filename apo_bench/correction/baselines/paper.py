@@ -13,7 +13,7 @@ from apo_bench.assembly import Correction, Observation, largest
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.baselines.track import candidates, solve_own_contacts, track_operations
 from apo_bench.correction.checks.status import refused_correction, solver_status, status_sentence
-from apo_bench.correction.solvers.newton import solve_newton
+from apo_bench.correction.solvers import solve_newton
 
 
 def paper(observation: Observation) -> Correction:

@@ -40,7 +40,7 @@ from apo_bench.assembly import (
 )
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.checks.status import refused_correction, solver_status, status_sentence
-from apo_bench.correction.solvers.newton import Solution, solve_newton
+from apo_bench.correction.solvers import Solution, solve_newton
 from apo_bench.geometry import Array
 
 

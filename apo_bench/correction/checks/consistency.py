@@ -12,8 +12,7 @@ from scipy.special import chdtrc
 
 from apo_bench.assembly import Assembly
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.solvers.gauss_newton import SMALLEST
-from apo_bench.correction.solvers.play import plays
+from apo_bench.correction.solvers import SMALLEST, plays
 from apo_bench.geometry import Array, frozen, remembered
 
 TEST_LEVEL = 0.01

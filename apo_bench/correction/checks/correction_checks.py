@@ -22,7 +22,7 @@ from apo_bench.assembly import (
 )
 from apo_bench.errors import InputError, kind, require
 from apo_bench.geometry import FARTHEST_M, Array, is_rigid
-from apo_bench.io.plain_text import UNSHOWN
+from apo_bench.io import UNSHOWN
 
 RIGID = "return a rotation matrix, a position [m] and the last row (0, 0, 0, 1)"
 _SAME = 1e-9

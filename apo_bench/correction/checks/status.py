@@ -10,8 +10,7 @@ import numpy as np
 
 from apo_bench.assembly import Correction, Observation, largest, largest_gap, looking_away, lowered_observation
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.solvers.inequalities import demanded, violations
-from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, Solution, least_step
+from apo_bench.correction.solvers import LENGTH_M, SINGULAR_CUT_OFF, Solution, demanded, least_step, violations
 from apo_bench.geometry import Array
 from apo_bench.records import outcomes
 

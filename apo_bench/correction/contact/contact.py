@@ -17,7 +17,7 @@ from apo_bench.correction.contact.problem import Problem, problem_of
 from apo_bench.correction.contact.solved import Solved, solve
 from apo_bench.correction.contact.starts import best_start, turned_words
 from apo_bench.correction.contact.suspects import contact_suspects, suspects
-from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE
+from apo_bench.correction.solvers import LARGEST_DENSE
 from apo_bench.errors import require
 
 Doubt = Literal["apply", "warn", "refuse", "drop"]

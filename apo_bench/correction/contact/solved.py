@@ -23,10 +23,15 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Consistency, Observation, joint_covariance, largest
 from apo_bench.correction.checks.consistency import CONTRADICTION_M, ROUNDING, p_value, softened_chi_square
 from apo_bench.correction.contact.problem import Problem
-from apo_bench.correction.solvers.gauss_newton import NearestGoals
-from apo_bench.correction.solvers.inequalities import active_rank, nearest_between
-from apo_bench.correction.solvers.posterior import jacobian_rank, marginals, projections
-from apo_bench.correction.solvers.whitened import coordinates_of
+from apo_bench.correction.solvers import (
+    NearestGoals,
+    active_rank,
+    coordinates_of,
+    jacobian_rank,
+    marginals,
+    nearest_between,
+    projections,
+)
 from apo_bench.geometry import Array
 
 DRAWS = 2000

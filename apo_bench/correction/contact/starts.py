@@ -15,11 +15,15 @@ from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.contact.inferred import inferred_goals
 from apo_bench.correction.contact.problem import Problem, problem_of
 from apo_bench.correction.contact.solved import FAR_DEG, Solved, solve
-from apo_bench.correction.solvers.curved import descended
-from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE, nearest_goals
-from apo_bench.correction.solvers.play import laid_contacts
-from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR
-from apo_bench.correction.solvers.whitened import correction_to, scales
+from apo_bench.correction.solvers import (
+    LARGEST_DENSE,
+    LARGEST_POSTERIOR,
+    correction_to,
+    descended,
+    laid_contacts,
+    nearest_goals,
+    scales,
+)
 from apo_bench.geometry import Array, symmetries
 
 _SHORTER = 1.0 - 1e-6

@@ -15,9 +15,7 @@ import numpy as np
 from apo_bench.assembly import Observation, lowered_observation
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.solvers.compact import compact_equations
-from apo_bench.correction.solvers.play import fit_covariance
-from apo_bench.correction.solvers.posterior import RANK_CUT_OFF
+from apo_bench.correction.solvers import RANK_CUT_OFF, compact_equations, fit_covariance
 from apo_bench.geometry import Array, frozen, pose
 
 UNITS = frozen(np.repeat([1e-3, np.radians(1.0)], 3))

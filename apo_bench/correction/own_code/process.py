@@ -14,7 +14,7 @@ from typing import final
 from apo_bench.correction.own_code.message import Arrays, CorrectorMessage, MessageForm, receive, send
 from apo_bench.correction.own_code.server import NOTICE
 from apo_bench.errors import require
-from apo_bench.io.processes import descendants, end_descendants
+from apo_bench.io import descendants, end_descendants
 from apo_bench.names import folder_of_own_modules
 
 _NOTICE_S = 2.0

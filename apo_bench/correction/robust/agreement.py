@@ -20,9 +20,7 @@ from apo_bench.correction.robust.hypotheses import (
     softened,
     unbelieved,
 )
-from apo_bench.correction.solvers.compact import linearised_by
-from apo_bench.correction.solvers.posterior import jacobian_rank
-from apo_bench.correction.solvers.whitened import noise_factor
+from apo_bench.correction.solvers import jacobian_rank, linearised_by, noise_factor
 
 _LEVER_M = 0.1
 """What is turned by an angle is off by its square times about this, beyond what is linear, [m]."""

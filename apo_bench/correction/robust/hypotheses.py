@@ -41,9 +41,7 @@ from apo_bench.correction.robust.noise_scale import (
     scaled_test,
 )
 from apo_bench.correction.robust.views import Merged, Sightings, exchanged_with, merged
-from apo_bench.correction.solvers.compact import linearised_by
-from apo_bench.correction.solvers.posterior import jacobian_rank
-from apo_bench.correction.solvers.whitened import noise_factor
+from apo_bench.correction.solvers import jacobian_rank, linearised_by, noise_factor
 from apo_bench.geometry import Array, frozen, pose, right_jacobian
 
 as_begun = ContactCorrector("apply", elsewhere=False)

@@ -5,8 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.geometry import Array, pose
-from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.fitted import LEVEL_UNITS
+from apo_bench.observation.models import LEVEL_UNITS, Camera
 
 
 class NoiseComponent(NamedTuple):

@@ -7,9 +7,18 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
-from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST_SCALE, MeasuredNoise
-from apo_bench.observation.models.residuals import INLIER_MM, TURNED_DEG, Residuals
-from apo_bench.observation.models.tails import Split, log_density_across, log_density_along, of_numbers
+from apo_bench.observation.models import (
+    INLIER_MM,
+    LEAST_FREEDOM,
+    SMALLEST_SCALE,
+    TURNED_DEG,
+    MeasuredNoise,
+    Residuals,
+    Split,
+    log_density_across,
+    log_density_along,
+    of_numbers,
+)
 
 _FEWEST = 30
 """Four numbers are not fitted to fewer errors."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Solid, pose
-from apo_bench.io.figures import default_looks, save_figure
+from apo_bench.io import default_looks, save_figure
 from apo_bench.recording.arranging import camera_pose
 from apo_bench.recording.importing import ImportedRecording, UnplannedRecording, planned_starts
 from apo_bench.recording.log import Log, PoseTrack

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from apo_bench.geometry import Array, frozen, pose
-from apo_bench.io.words import columns, direction
+from apo_bench.io import columns, direction
 from apo_bench.recording.arranging import CameraPose
 from apo_bench.recording.averaging import per_axis
 from apo_bench.recording.importing import ImportedRecording, UnplannedRecording

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from apo_bench.errors import InputError, require
-from apo_bench.io.ordinary_files import read_bytes, to_write
+from apo_bench.io import read_bytes, to_write
 from apo_bench.records.limits import USUAL_LIMITS, Limits
 from apo_bench.records.run.validation import run_of
 from apo_bench.records.salt import Salt

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple, final
 
 from apo_bench.errors import InputError, require
-from apo_bench.io.grouping import grouped
+from apo_bench.io import grouped
 from apo_bench.records import SETTINGS, Key, Row, one_salt, row_key, with_salt
 from apo_bench.records.run.run_file import read_run
 from apo_bench.records.run.run_folder import NUMBERS, report_rows

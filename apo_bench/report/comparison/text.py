@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.errors import InputError
-from apo_bench.io.ordinary_files import check_folders, to_write
+from apo_bench.io import check_folders, to_write
 from apo_bench.records import KEY, Row, row_key
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_folder import NUMBERS

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from apo_bench.io.grouping import grouped
+from apo_bench.io import grouped
 from apo_bench.records import STAGES, knows_truth
 from apo_bench.report.figures.sheet import WIDTH, Entry, Figure, Panel, Tips
 from apo_bench.report.figures.styles import INK, SOFT, STAGE_COLORS, SUCCESS

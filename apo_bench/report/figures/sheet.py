@@ -17,8 +17,7 @@ from typing import Any, NamedTuple, final
 
 from markupsafe import Markup
 
-from apo_bench.io.figures import default_looks
-from apo_bench.io.ordinary_files import to_write
+from apo_bench.io import default_looks, to_write
 from apo_bench.report.figures.styles import INK, themed
 
 WIDTH = 360

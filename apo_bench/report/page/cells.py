@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from markupsafe import Markup
 
-from apo_bench.io.grouping import grouped
+from apo_bench.io import grouped
 from apo_bench.records import USUAL_LIMITS, Limits, Row, knows_truth
 from apo_bench.records.run.replay_command import Files, without_seed
 from apo_bench.records.run.run_folder import NUMBERS

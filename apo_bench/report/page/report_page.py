@@ -14,7 +14,7 @@ from typing import Any
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from markupsafe import Markup, escape
 
-from apo_bench.io.grouping import grouped
+from apo_bench.io import grouped
 from apo_bench.records import RANGE, Limits, Row, knows_truth, look_up, one_salt
 from apo_bench.records.run.replay_command import Files, replay_command
 from apo_bench.report.figures.sheet import DrawnFigure

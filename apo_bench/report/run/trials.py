@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from apo_bench.io.grouping import grouped
+from apo_bench.io import grouped
 from apo_bench.records import USUAL_LIMITS, Limits, Row, Salt
 from apo_bench.records.run.own_code import left_out, own_code
 from apo_bench.records.run.replay_command import Files

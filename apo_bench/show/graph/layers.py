@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Arc, Graph, Node
-from apo_bench.io.grouping import grouped
+from apo_bench.io import grouped
 
 
 class Passing(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.assembly import Graph, Node
 from apo_bench.geometry import Array
-from apo_bench.io.grouping import grouped
+from apo_bench.io import grouped
 from apo_bench.show.graph.layers import ArcChain, LayerItem, Layers, Passing, abscissas, arrange_layers, width
 
 _NODE_HEIGHT = 0.5

@@ -14,10 +14,9 @@ from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.home import tip_down
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.arms.strength import LEAST_FORCE_N
-from apo_bench.simulation.execution.prepare import key_angles, moves
-from apo_bench.simulation.robot.paths import shifted, smooth, steady, turn_from
-from apo_bench.simulation.robot.robot import Halt, Robot
-from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.simulation.execution import key_angles, moves
+from apo_bench.simulation.robot import Halt, Robot, shifted, smooth, steady, turn_from
+from apo_bench.simulation.scene import Scene, build_scene
 
 _GRID = [(x, y) for x in np.arange(-0.3, 0.41, 0.1) for y in np.arange(-0.4, 0.41, 0.1)]
 _TABLE_M = 0.03

@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench.errors import InputError
 from apo_bench.simulation.arms.home import with_home
 from apo_bench.simulation.arms.kinematics import Kinematics
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene import Scene
 
 _BASES_M = tuple(product((0.0, 0.1, 0.2), (-0.45, -0.4, -0.35, -0.3, -0.25, -0.2, -0.15, -0.1)))
 """Height and place behind the middle of the table."""

@@ -14,13 +14,19 @@ from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, Solid, intrusion_depths, pose, remembered
 from apo_bench.prediction.arm import ArmMove
 from apo_bench.simulation.arms.kinematics import Kinematics
-from apo_bench.simulation.execution.fingers import OPEN_TO_PICK_M, OPEN_TO_RELEASE_M
-from apo_bench.simulation.execution.prepare import Move, holds_firmly, key_angles, moves
-from apo_bench.simulation.execution.transfer import Grip, Transfer, after_transfer
-from apo_bench.simulation.robot.gripper import gripper_boxes
-from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth, steady
-from apo_bench.simulation.robot.robot import Halt, Robot
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.execution import (
+    OPEN_TO_PICK_M,
+    OPEN_TO_RELEASE_M,
+    Grip,
+    Move,
+    Transfer,
+    after_transfer,
+    holds_firmly,
+    key_angles,
+    moves,
+)
+from apo_bench.simulation.robot import Halt, Robot, Trajectory, gripper_boxes, shifted, smooth, steady
+from apo_bench.simulation.scene import Scene
 
 SPEEDS = (0.01, 0.06, 0.5)
 """[m/s], at which the robot touches, inserts, and carries."""

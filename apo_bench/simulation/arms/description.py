@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.errors import require
 from apo_bench.geometry import Array, frozen, pose
-from apo_bench.io.documents import JsonNode, read_toml
+from apo_bench.io import JsonNode, read_toml
 from apo_bench.scenario.contacts import read_pose
 
 _SCHEMA = "apo-bench/arm/1"

@@ -10,7 +10,7 @@ from xml.etree.ElementTree import Element, TreeBuilder, tostring
 from xml.parsers import expat
 
 from apo_bench.errors import InputError, one_line, require
-from apo_bench.io.ordinary_files import opened, read_bytes
+from apo_bench.io import opened, read_bytes
 from apo_bench.simulation.arms.allowed import (
     ARM_REMEDIES,
     ATTRIBUTES,

@@ -22,9 +22,8 @@ from apo_bench.insertion.macros import UP
 from apo_bench.simulation.execution.grasping import gripper_depth, obstacles, upwards
 from apo_bench.simulation.execution.transfer import Transfer, first_contact_pose
 from apo_bench.simulation.frames import frame
-from apo_bench.simulation.robot.obstacles import Obstacle
-from apo_bench.simulation.robot.paths import shifted, turn_from, with_height
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.robot import Obstacle, shifted, turn_from, with_height
+from apo_bench.simulation.scene import Scene
 
 LEVEL = float(np.cos(np.radians(10.0)))
 """A face that looks up by less than ten degrees off is one to lie on."""

@@ -2,10 +2,7 @@
 
 from apo_bench.geometry import Array
 from apo_bench.simulation.execution.transfer import Grip, Transfer, hover, is_tilted
-from apo_bench.simulation.robot.in_hand import weld
-from apo_bench.simulation.robot.paths import shifted, smooth, with_height
-from apo_bench.simulation.robot.reach import led_there, way_there
-from apo_bench.simulation.robot.robot import Halt, Robot
+from apo_bench.simulation.robot import Halt, Robot, led_there, shifted, smooth, way_there, weld, with_height
 
 _FREE = 2.0
 _NEAR = 0.8

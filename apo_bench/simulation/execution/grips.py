@@ -19,8 +19,8 @@ from apo_bench.simulation.execution.grasping import (
     tip_frame,
 )
 from apo_bench.simulation.execution.transfer import ApproachLine, Grip, Motion
-from apo_bench.simulation.robot.paths import turn_from
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.robot import turn_from
+from apo_bench.simulation.scene import Scene
 
 _WRIST_ENDS = 2.5
 """A hand that looks down is turned by no more than this from its rest where there is another way, [rad]."""

@@ -34,9 +34,8 @@ from apo_bench.simulation.execution.transfer import (
     key_poses,
     motions,
 )
-from apo_bench.simulation.robot.paths import Trajectory
-from apo_bench.simulation.robot.reach import at_end, led_there, way_there
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.robot import Trajectory, at_end, led_there, way_there
+from apo_bench.simulation.scene import Scene
 
 _GRAVITY = 9.81
 _PLACE_WEIGHTS = 6.0

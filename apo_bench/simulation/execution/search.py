@@ -15,10 +15,7 @@ import numpy as np
 from apo_bench.geometry import Array, pose
 from apo_bench.simulation.execution.transfer import Grip, Transfer
 from apo_bench.simulation.frames import frame
-from apo_bench.simulation.robot.by_wrist import servo
-from apo_bench.simulation.robot.forces import Guard, LowPass
-from apo_bench.simulation.robot.paths import Trajectory, shifted, smooth
-from apo_bench.simulation.robot.robot import Robot
+from apo_bench.simulation.robot import Guard, LowPass, Robot, Trajectory, servo, shifted, smooth
 
 RADIUS_M = 0.002
 PITCH_M = 0.00035

@@ -14,12 +14,11 @@ from PIL import Image, ImageDraw, ImageFont
 
 from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import Array, world_bounds
-from apo_bench.io.figures import load_matplotlib
+from apo_bench.io import load_matplotlib
 from apo_bench.simulation.film.still import Chapter, FilmMoment
+from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.hooks import BY_HAND, TOUCHING
-from apo_bench.simulation.scene.graphics import renderer
-from apo_bench.simulation.scene.render import camera_view, place_for_picture, save_film
-from apo_bench.simulation.scene.world import initial_state
+from apo_bench.simulation.scene import camera_view, initial_state, place_for_picture, save_film
 
 _Picture = NDArray[np.uint8]
 ABOVE_PX = 32

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.scene.world import World
+from apo_bench.simulation.scene import World
 
 _AROUND = 32
 _BALLS = 2

@@ -10,9 +10,7 @@ import numpy as np
 from apo_bench.assembly import PartFace, Plan, Poses, placements
 from apo_bench.geometry import Array, Face, frozen, pose
 from apo_bench.simulation.hooks import Doing, Hooks
-from apo_bench.simulation.scene.render import arm_home, place_for_picture
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import World, initial_state, place
+from apo_bench.simulation.scene import Scene, World, arm_home, initial_state, place, place_for_picture
 
 NO_HANDS = frozen(np.zeros((0, 3)), None, 3)
 Color = tuple[float, float, float]

@@ -13,9 +13,7 @@ from apo_bench.scenario import Carelessness, careless_covariance, spread_error
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.human.perform import STAND_STILL_S, act, perform
-from apo_bench.simulation.scene.apart import left_out
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import has_failed, sleeping, snapshot
+from apo_bench.simulation.scene import Scene, has_failed, left_out, sleeping, snapshot
 
 
 def demonstrate(

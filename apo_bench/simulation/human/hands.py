@@ -12,12 +12,8 @@ from apo_bench.assembly import Poses, Step
 from apo_bench.geometry import Array, Ints, all_boxes, pose
 from apo_bench.simulation.frames import quaternion
 from apo_bench.simulation.hooks import BY_HAND, Doing, Hooks, hooks_of
-from apo_bench.simulation.robot.in_hand import TINY_S, take_along
-from apo_bench.simulation.robot.obstacles import Moving, near_spans
-from apo_bench.simulation.robot.paths import Trajectory
-from apo_bench.simulation.scene.composing import HANDS
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import initial_state, part_pose, sleeping
+from apo_bench.simulation.robot import TINY_S, Moving, Trajectory, near_spans, take_along
+from apo_bench.simulation.scene import HANDS, Scene, initial_state, part_pose, sleeping
 
 _TRAIL_S = 0.019
 """What a hand holds trails behind it by so long: its weld, of a time constant of 0.01 s, damps all motion."""

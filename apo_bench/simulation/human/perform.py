@@ -15,7 +15,7 @@ from apo_bench.insertion.macros import UP
 from apo_bench.insertion.surroundings import OVER_M, ends_of, slide_directions
 from apo_bench.scenario import Scenario, nominal_operations
 from apo_bench.simulation.human.hands import Hands
-from apo_bench.simulation.robot.paths import Trajectory, minimum_jerk, shifted, smooth, with_height
+from apo_bench.simulation.robot import Trajectory, minimum_jerk, shifted, smooth, with_height
 
 _SIDE_M = 0.002
 """A part comes down this far beside one that it will lie against, and leaves it by as much before it is lifted."""

@@ -15,7 +15,7 @@ from apo_bench.simulation.robot.paths import Trajectory, shifted
 from apo_bench.simulation.robot.reach import turned_by
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, WristSensor, hand_load
-from apo_bench.simulation.scene.world import wrist_felt
+from apo_bench.simulation.scene import wrist_felt
 
 ZERO_S = 0.5
 """So long a wrist is zeroed: the mean of 500 readings has 0.045 times the noise of one."""

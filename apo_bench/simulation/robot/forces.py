@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.simulation.scene.world import World
+from apo_bench.simulation.scene import World
 
 WRIST_S = 0.02
 """Time constant of the sensor at the wrist (8 Hz). Where hard parts touch, the force of a single step nearly doubles

@@ -25,8 +25,7 @@ from apo_bench.simulation.robot.paths import Trajectory, smooth
 from apo_bench.simulation.robot.reach import along, at_end, led, way_there, within_speed
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.robot.wrist import WristSensor
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import has_failed, initial_state, part_pose, timestep, unfelt
+from apo_bench.simulation.scene import Scene, has_failed, initial_state, part_pose, timestep, unfelt
 
 _REST_RAD_S = 2e-3
 _REST_M_S = 3e-3

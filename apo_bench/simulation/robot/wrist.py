@@ -21,8 +21,7 @@ from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.frames import body_frame, frame
 from apo_bench.simulation.robot.forces import Guard
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import WRIST_SENSORS
+from apo_bench.simulation.scene import WRIST_SENSORS, Scene
 
 READING_S = 0.001
 """Time from one reading to the next. Each is the mean since the one before, with new noise, whatever the step."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Poses
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
-from apo_bench.simulation.scene.graphics import need_window, renderer
+from apo_bench.simulation.graphics import need_window, renderer
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import World, initial_state, place
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from apo_bench.depth_camera.range_finder import VIEWED_POINT_M, PinholeView, RangeFinder, RangeImage, look_at
 from apo_bench.geometry import Array
-from apo_bench.simulation.scene.world import World
+from apo_bench.simulation.scene import World
 
 _AWAY_M = -5.0
 """Hands are put this deep below the floor before anything is looked at."""

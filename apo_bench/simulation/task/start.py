@@ -14,21 +14,25 @@ from apo_bench.assembly import Outcome, Plan, Poses, Snapshot
 from apo_bench.geometry import Array, pose
 from apo_bench.insertion.surroundings import WALL_MARGIN_M
 from apo_bench.records import sentence
-from apo_bench.simulation.execution.carry_out import before_attach, take
-from apo_bench.simulation.execution.controller import moves_of, run_schedule
+from apo_bench.simulation.execution import (
+    Grip,
+    Move,
+    Progress,
+    ReplayCache,
+    SavedState,
+    Transfer,
+    before_attach,
+    moves_of,
+    run_schedule,
+    saved_state,
+    take,
+    take_up,
+)
 from apo_bench.simulation.execution.feel.feeling import Feeling, Feels
 from apo_bench.simulation.execution.feel.laying import lay
-from apo_bench.simulation.execution.prepare import Move
-from apo_bench.simulation.execution.replay_cache import Progress, ReplayCache, SavedState, saved_state, take_up
-from apo_bench.simulation.execution.transfer import Grip, Transfer
 from apo_bench.simulation.hooks import Hooks
-from apo_bench.simulation.robot.by_wrist import wrist_of, zero
-from apo_bench.simulation.robot.robot import Halt, Robot
-from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.robot.wrist import WristSensor, part_loads
-from apo_bench.simulation.scene.apart import left_out
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import sleeping
+from apo_bench.simulation.robot import Halt, Robot, RobotError, WristSensor, part_loads, wrist_of, zero
+from apo_bench.simulation.scene import Scene, left_out, sleeping
 
 
 @final

@@ -13,17 +13,19 @@ import numpy as np
 
 from apo_bench.assembly import Poses, Snapshot
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.execution.carry_out import after_attach, end_of_attach, pace
-from apo_bench.simulation.execution.controller import until_rest
-from apo_bench.simulation.execution.fingers import check_hold, depart, release
-from apo_bench.simulation.execution.replay_cache import take_up
+from apo_bench.simulation.execution import (
+    after_attach,
+    check_hold,
+    depart,
+    end_of_attach,
+    pace,
+    release,
+    take_up,
+    until_rest,
+)
 from apo_bench.simulation.hooks import Hooks
-from apo_bench.simulation.robot.forces import LowPass
-from apo_bench.simulation.robot.paths import shifted
-from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.scene.apart import left_out
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import part_pose, sleeping, snapshot, wrist_felt
+from apo_bench.simulation.robot import LowPass, Robot, shifted
+from apo_bench.simulation.scene import Scene, left_out, part_pose, sleeping, snapshot, wrist_felt
 from apo_bench.simulation.task.start import Start
 
 PERIOD_S = 0.05

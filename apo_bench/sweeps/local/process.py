@@ -17,7 +17,7 @@ from contextlib import contextmanager, suppress
 from multiprocessing import connection, resource_tracker
 from typing import Any, final
 
-from apo_bench.io.processes import SAFE_PATH, end_descendants, environment
+from apo_bench.io import SAFE_PATH, end_descendants, environment
 from apo_bench.names import folder_of_own_modules, own_modules_in
 from apo_bench.sweeps.work.environment_lock import SIGNALS, Check, Message, checked, last_message
 

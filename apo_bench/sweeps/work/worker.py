@@ -11,8 +11,8 @@ from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.correction.own_code.own import OwnCorrectors
 from apo_bench.errors import InputError
 from apo_bench.records import KEY, Row, TrialSettings, parsed, row_key, sentence
-from apo_bench.simulation.execution.replay_cache import ReplayCache
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.execution import ReplayCache
+from apo_bench.simulation.scene import Scene
 from apo_bench.sweeps.work.environment_lock import EnvironmentLock, Message, Unit
 from apo_bench.trial.fingerprint import content_hash
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations, demonstration_of

@@ -16,11 +16,8 @@ from apo_bench.geometry import Array, pose
 from apo_bench.records import USUAL_WRENCH
 from apo_bench.simulation.execution.beside import Flush
 from apo_bench.simulation.execution.transfer import Grip
-from apo_bench.simulation.robot.by_wrist import wrist_of, zero
-from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.robot.wrist import WristSensor
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.robot import Robot, RobotError, WristSensor, wrist_of, zero
+from apo_bench.simulation.scene import Scene
 
 ACTS = ("square", "touch", "lay", "search")
 """Parts are squared before they are taken, what is fixed is touched, what is inserted is laid flat first (and touches a

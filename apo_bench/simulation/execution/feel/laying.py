@@ -15,11 +15,20 @@ from apo_bench.simulation.execution.beside import STAND_OFF_M, Beside, Flush, be
 from apo_bench.simulation.execution.feel.feeling import Feeling
 from apo_bench.simulation.execution.feel.touching import BEYOND_M, SPEED
 from apo_bench.simulation.execution.transfer import Grip, Transfer
-from apo_bench.simulation.robot.by_wrist import comply, press, reading
-from apo_bench.simulation.robot.paths import shifted, smooth, steady, with_height
-from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, READING_S, part_loads
-from apo_bench.simulation.scene.world import sleeping
+from apo_bench.simulation.robot import (
+    BANDWIDTH_HZ,
+    READING_S,
+    Robot,
+    comply,
+    part_loads,
+    press,
+    reading,
+    shifted,
+    smooth,
+    steady,
+    with_height,
+)
+from apo_bench.simulation.scene import sleeping
 
 _CARRY = 0.4
 """Peak speeds, [m/s]."""

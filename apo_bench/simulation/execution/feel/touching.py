@@ -17,10 +17,8 @@ from apo_bench.simulation.execution.feel.places import (
     wall_places,
 )
 from apo_bench.simulation.hooks import TOUCHING
-from apo_bench.simulation.robot.by_wrist import press, reading
-from apo_bench.simulation.robot.paths import shifted, smooth, steady, turn_from, with_height
-from apo_bench.simulation.robot.robot import Halt, Robot
-from apo_bench.simulation.scene.world import sleeping
+from apo_bench.simulation.robot import Halt, Robot, press, reading, shifted, smooth, steady, turn_from, with_height
+from apo_bench.simulation.scene import sleeping
 
 SPEED = 0.0025
 """Steady speed of a touch, [m/s]: a stiff hand four times as fast strikes harder than an arm may."""
