@@ -56,9 +56,7 @@ FAULTS = (
         "chdtri(known.rank, ",
         "directions that are fixed for those that are free",
     ),
-    Fault(
-        "correction/checks/consistency.py", "unit_m / sqrt(3.0)", "unit_m / sqrt(12.0)", "half the play instead of all"
-    ),
+    Fault("correction/checks/status.py", "unit_m / sqrt(3.0)", "unit_m / sqrt(12.0)", "half the play instead of all"),
     Fault(
         "correction/relation_equations.py",
         "self.operations[i] if j > k})",
@@ -78,9 +76,9 @@ FAULTS = (
         "0.0",
         "faces that are inside each other have no gap",
     ),
-    Fault("judging/rules.py", "relation.lost <= k for", "relation.lost < k for", "no fixture is put away any more"),
-    Fault("judging/rules.py", "reached.area / true.area", "true.area / reached.area", "shares turned over"),
-    Fault("judging/rules.py", "put.pop(part, None)", "put.get(part)", "a part that is moved on is pushed"),
+    Fault("judging/verdict.py", "relation.lost <= k for", "relation.lost < k for", "no fixture is put away any more"),
+    Fault("judging/verdict.py", "reached.area / true.area", "true.area / reached.area", "shares turned over"),
+    Fault("judging/verdict.py", "put.pop(part, None)", "put.get(part)", "a part that is moved on is pushed"),
     Fault("judging/judgement.py", "np.degrees(snapshot.spin_rad_s)", "snapshot.spin_rad_s", "rad/s taken for deg/s"),
     Fault("judging/verdict.py", "or not self.demonstrated.holds)", "or self.demonstrated.holds)", "the wrong reason"),
     Fault(
@@ -117,7 +115,7 @@ FAULTS = (
     Fault(
         "parts/stated.py", "v = v - (v @ axis) * axis", "v = v + (v @ axis) * axis", "a part along the axis is doubled"
     ),
-    Fault("parts/check.py", "* float(face.normal @ face.outline[0])", "", "the divergence theorem without positions"),
+    Fault("parts/load.py", "* float(face.normal @ face.outline[0])", "", "the divergence theorem without positions"),
     Fault(
         "parts/load.py",
         "abs(mark.point[surface.axis] - surface.height)",

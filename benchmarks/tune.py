@@ -24,8 +24,7 @@ from statistics import mean
 from typing import Any, NamedTuple
 
 from apo_bench.assembly import Plan
-from apo_bench.correction.baselines.least_squares import least_squares
-from apo_bench.correction.baselines.penalty import penalty
+from apo_bench.correction.baselines.penalty import least_squares, penalty
 from apo_bench.correction.baselines.snap import snap
 from apo_bench.correction.correctors import correct
 from apo_bench.observation.noise import Level, make_noise

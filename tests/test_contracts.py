@@ -26,7 +26,7 @@ BREACHES = {
         ("apo_bench.sweeps.sweep", "apo_bench.report.report"),
     ],
     "simulation": [
-        ("apo_bench.simulation.arms.home", "apo_bench.simulation.scene.world"),
+        ("apo_bench.simulation.arms.kinematics", "apo_bench.simulation.scene.world"),
         ("apo_bench.simulation.scene.scene", "apo_bench.simulation.robot.gripper"),
         ("apo_bench.simulation.robot.robot_error", "apo_bench.simulation.execution.transfer"),
         ("apo_bench.simulation.human.hands", "apo_bench.simulation.execution.fingers"),
@@ -49,7 +49,7 @@ BREACHES = {
     ],
     "correction": [
         ("apo_bench.correction.solvers.gauss_newton", "apo_bench.correction.contact.contact"),
-        ("apo_bench.correction.solvers.posterior", "apo_bench.correction.checks.consistency"),
+        ("apo_bench.correction.solvers.posterior", "apo_bench.correction.checks.status"),
         ("apo_bench.correction.checks.status", "apo_bench.correction.contact.solved"),
         ("apo_bench.correction.baselines.paper", "apo_bench.correction.contact.problem"),
         ("apo_bench.correction.contact.starts", "apo_bench.correction.robust.views"),
@@ -59,7 +59,7 @@ BREACHES = {
     "contact": [
         ("apo_bench.correction.contact.problem", "apo_bench.correction.contact.solved"),
         ("apo_bench.correction.contact.inferred", "apo_bench.correction.contact.problem"),
-        ("apo_bench.correction.contact.suspects", "apo_bench.correction.contact.starts"),
+        ("apo_bench.correction.contact.starts", "apo_bench.correction.contact.contact"),
     ],
     "touches": [
         ("apo_bench.correction.touches.robust_estimate", "apo_bench.correction.touches.belief"),
@@ -94,7 +94,7 @@ BREACHES = {
     "judge": [
         ("apo_bench.judging.verdict", "apo_bench.observation.noise"),
         ("apo_bench.judging.contacts", "apo_bench.recognition.contacts"),
-        ("apo_bench.judging.rules", "apo_bench.correction.contact.contact"),
+        ("apo_bench.judging.verdict", "apo_bench.correction.contact.contact"),
     ],
     "corrector": [
         ("apo_bench.correction.contact.contact", "apo_bench.scenario.scenario"),

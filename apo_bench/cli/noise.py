@@ -116,8 +116,8 @@ def noise_still(
     """Measure a camera on parts that rest: how its frames scatter, how many are missing, how many are wrong."""
     from apo_bench.observation.fitting import fit
     from apo_bench.recording.formats import read_log
+    from apo_bench.recording.rests import still_residuals
     from apo_bench.recording.setup_files import read_camera
-    from apo_bench.recording.still_noise import still_residuals
     from apo_bench.show.fit_text import fit_lines
 
     check_outputs([(out, "--out", (".toml",)), (picture, "--picture", (".png",))], (camera,))
@@ -173,7 +173,7 @@ def _write_fit(
 ) -> None:
     """Write the noise file and the picture of a fit, where they are asked for."""
     from apo_bench.observation.noise_file import noise_text
-    from apo_bench.show.fit_picture import draw_fit
+    from apo_bench.show.fit_text import draw_fit
 
     out, picture = files
     with writing():

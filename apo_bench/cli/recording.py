@@ -74,7 +74,7 @@ def recording_import(
 def _import(
     log: Any, objects: Any, camera: Any, tracks: Any, scenario: str, order: tuple[str | None, str | None], files: Any
 ) -> None:
-    from apo_bench.io.tables import write_csv
+    from apo_bench.io.strict_csv import write_csv
     from apo_bench.recording.importing import import_recording
     from apo_bench.recording.show.drawing import draw_recording, drawing_of, unfit_drawing
     from apo_bench.recording.show.text import PATH_HEAD, imported_lines, path_rows

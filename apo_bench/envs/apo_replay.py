@@ -8,8 +8,7 @@ from typing import Any, final
 import gymnasium
 
 from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Step
-from apo_bench.envs.episode import Episode, Scenes, Settings, watch_human, with_options
-from apo_bench.envs.infos import VERDICTS, step_info, verdicts
+from apo_bench.envs.episode import VERDICTS, Episode, Scenes, Settings, step_info, verdicts, watch_human, with_options
 from apo_bench.envs.rendering import FPS, MODES, Rendering
 from apo_bench.envs.spaces import Action, Seen, action_space, as_seen_entries, moved, observation_space
 from apo_bench.envs.starts import RobotSettings, carried_out

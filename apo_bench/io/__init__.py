@@ -19,8 +19,7 @@ from apo_bench.io.ordinary_files import (
 )
 from apo_bench.io.plain_text import CONTROL, UNSHOWN, brief, clean
 from apo_bench.io.processes import SAFE_PATH, descendants, end_descendants, environment, flush, redirect_output
-from apo_bench.io.strict_csv import Columns, CsvRow, check_separator, read_csv
-from apo_bench.io.tables import write_columns, write_csv
+from apo_bench.io.strict_csv import Columns, CsvRow, check_separator, read_csv, write_columns, write_csv
 from apo_bench.io.words import columns, direction, listed_words, with_article
 
 __all__ = (

@@ -7,10 +7,14 @@ from apo_bench.records.limits import CORRECTOR_LIMIT_S, USUAL_LIMITS, Limits
 from apo_bench.records.outcomes import CODES, STAGES, sentence, touching_sentence
 from apo_bench.records.robot_error import (
     NO_ROBOT_ERROR,
+    USUAL_WRENCH,
+    WrenchNoise,
     checked_robot_error,
     checked_stated_error,
+    checked_wrench,
     robot_sigmas,
     told_error,
+    wrench_noise,
 )
 from apo_bench.records.row import (
     LARGEST_NUMBER,
@@ -68,7 +72,6 @@ from apo_bench.records.short_names import (
     with_simulated,
 )
 from apo_bench.records.thresholds import MEANINGS, Criteria, Meaning, Thresholds
-from apo_bench.records.wrench_sensor import USUAL_WRENCH, WrenchNoise, checked_wrench, wrench_noise
 
 __all__ = (
     "CODES",

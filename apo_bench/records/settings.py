@@ -14,11 +14,17 @@ import numpy as np
 from msgspec import Meta
 
 from apo_bench.errors import InputError, require
-from apo_bench.records.robot_error import DRAWN, NO_ROBOT_ERROR, checked_robot_error, checked_stated_error
+from apo_bench.records.robot_error import (
+    DRAWN,
+    NO_ROBOT_ERROR,
+    USUAL_WRENCH,
+    checked_robot_error,
+    checked_stated_error,
+    checked_wrench,
+)
 from apo_bench.records.salt import Salt
 from apo_bench.records.setting_info import SettingInfo, about, check_value
 from apo_bench.records.short_names import CORRECTOR, checked_method, checked_relations, feels, is_own, parsed
-from apo_bench.records.wrench_sensor import USUAL_WRENCH, checked_wrench
 
 ENV_ID = "APOReplay-v0"
 ROW = "apo-bench/row/9"

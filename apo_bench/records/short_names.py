@@ -35,7 +35,7 @@ CORRECTORS = MappingProxyType(
         "no-history": "apo_bench.correction.baselines.track:no_history",
         "no-disappeared": "apo_bench.correction.baselines.paper:no_disappeared",
         "snap": "apo_bench.correction.baselines.snap:snap",
-        "least-squares": "apo_bench.correction.baselines.least_squares:least_squares",
+        "least-squares": "apo_bench.correction.baselines.penalty:least_squares",
         "penalty": "apo_bench.correction.baselines.penalty:penalty",
     }
 )

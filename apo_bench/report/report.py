@@ -16,8 +16,16 @@ from apo_bench.report.figures.other_axes import figures
 from apo_bench.report.page.report_page import report_page
 from apo_bench.report.run.trials import Draw, draw_failures, scenario_files
 from apo_bench.report.tables.cells import cell_table, felt_table, gap_table, pair_table
-from apo_bench.report.tables.forecasts import calibration_table, confusion_table, recognition_table
-from apo_bench.report.tables.methods import area_table, effort_table, half_table, time_table, work_table
+from apo_bench.report.tables.methods import (
+    area_table,
+    calibration_table,
+    confusion_table,
+    effort_table,
+    half_table,
+    recognition_table,
+    time_table,
+    work_table,
+)
 from apo_bench.statistics import (
     Cell,
     Confusion,

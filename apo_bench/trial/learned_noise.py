@@ -21,7 +21,7 @@ from apo_bench.correction.learning.likelihood import EstimatedNumber, LearnedNoi
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
 from apo_bench.io import grouped
-from apo_bench.observation.fitting.components import COMPONENTS, component_factors, view_ways
+from apo_bench.observation.fitting.fit import COMPONENTS, component_factors, view_ways
 from apo_bench.observation.models import (
     INLIER_MM,
     TURNED_DEG,

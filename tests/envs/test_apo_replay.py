@@ -25,7 +25,7 @@ from apo_bench import Correction, InputError, Observation, Scene, TrialSettings,
 from apo_bench.assembly import Outcome, Step
 from apo_bench.envs import episode, starts
 from apo_bench.envs.apo_replay import APOReplay
-from apo_bench.envs.infos import nullable, predicted_info
+from apo_bench.envs.episode import nullable, predicted_info
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.records import outcomes

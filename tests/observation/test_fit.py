@@ -23,8 +23,7 @@ from apo_bench.observation.models.fitted import MeasuredNoise
 from apo_bench.observation.models.residuals import Residuals, match_residuals
 from apo_bench.observation.models.tails import Split, Tail
 from apo_bench.observation.noise_file import noise_text, presets, read_noise
-from apo_bench.show.fit_picture import draw_fit
-from apo_bench.show.fit_text import fit_form, fit_lines, fit_notes
+from apo_bench.show.fit_text import draw_fit, fit_form, fit_lines, fit_notes
 from tests import bop_made as made_of
 from tests.bop_made import Known
 

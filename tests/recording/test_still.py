@@ -6,7 +6,7 @@ import numpy as np
 
 from apo_bench.observation.fitting.fit import fit_noise
 from apo_bench.recording.log import Log, PoseTrack
-from apo_bench.recording.still_noise import still_residuals
+from apo_bench.recording.rests import still_residuals
 from tests.recorded import seen
 
 

@@ -15,8 +15,7 @@ from apo_bench import Correction, Observation
 from apo_bench.assembly import Consistency, Contact, PartFace, relation_graph
 from apo_bench.correction.learning.likelihood import EstimatedNumber
 from apo_bench.geometry import pose
-from apo_bench.observation.fitting.components import COMPONENTS
-from apo_bench.observation.fitting.fit import fit_noise, goodness_of_fit
+from apo_bench.observation.fitting.fit import COMPONENTS, fit_noise, goodness_of_fit
 from apo_bench.observation.noise import Level
 from apo_bench.recognition.thresholds import Evidence, PairThresholds, Recognised, Rival
 from apo_bench.show.arm_text import list_line

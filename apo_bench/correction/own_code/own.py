@@ -11,8 +11,14 @@ from typing import Any, final
 
 from apo_bench.assembly import Correction, Look, Observation
 from apo_bench.correction.correctors import CorrectorMisbehaved, checked_corrector, correct
-from apo_bench.correction.own_code.forms import observation_message, parse_correction
-from apo_bench.correction.own_code.message import Arrays, CorrectorMessage, GarbledMessage, MessageForm
+from apo_bench.correction.own_code.forms import (
+    Arrays,
+    CorrectorMessage,
+    GarbledMessage,
+    MessageForm,
+    observation_message,
+    parse_correction,
+)
 from apo_bench.correction.own_code.process import Server
 from apo_bench.errors import InputError, require
 from apo_bench.records import CORRECTOR_LIMIT_S, UNCORRECTED, is_own

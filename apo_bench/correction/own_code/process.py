@@ -11,7 +11,7 @@ from contextlib import suppress
 from multiprocessing import connection
 from typing import final
 
-from apo_bench.correction.own_code.message import Arrays, CorrectorMessage, MessageForm, receive, send
+from apo_bench.correction.own_code.forms import Arrays, CorrectorMessage, MessageForm, receive, send
 from apo_bench.correction.own_code.server import NOTICE
 from apo_bench.errors import require
 from apo_bench.io import descendants, end_descendants

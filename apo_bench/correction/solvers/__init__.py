@@ -1,8 +1,14 @@
 """Solvers of the contact equations, and by how much play lets these equations be off."""
 
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations, linearised_by
-from apo_bench.correction.solvers.curved import descended
-from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE, SMALLEST, NearestGoals, batch_goals, nearest_goals
+from apo_bench.correction.solvers.gauss_newton import (
+    LARGEST_DENSE,
+    SMALLEST,
+    NearestGoals,
+    batch_goals,
+    descended,
+    nearest_goals,
+)
 from apo_bench.correction.solvers.inequalities import (
     Inequalities,
     active_rank,

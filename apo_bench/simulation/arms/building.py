@@ -16,7 +16,7 @@ from apo_bench.simulation.arms.apart import build_apart
 from apo_bench.simulation.arms.arm import Arm, ArmLimits
 from apo_bench.simulation.arms.chain import find_flange, find_joints
 from apo_bench.simulation.arms.description import ArmDescription, GripperDescription, read_description
-from apo_bench.simulation.arms.home import with_home
+from apo_bench.simulation.arms.kinematics import with_home
 from apo_bench.simulation.arms.loading import check_surroundings, compiled, files_of, load_model, stated_arm
 from apo_bench.simulation.arms.measuring import Measured, fill_grooves, measure
 from apo_bench.simulation.arms.pressing import PROBE

@@ -18,7 +18,7 @@ from apo_bench.correction.learning.evidence import UNITS, readings
 from apo_bench.correction.learning.likelihood import ObservedErrors
 from apo_bench.files.json_forms import observation_form, write_form
 from apo_bench.geometry import pose
-from apo_bench.observation.fitting.components import COMPONENTS, component_factors, view_ways
+from apo_bench.observation.fitting.fit import COMPONENTS, component_factors, view_ways
 from apo_bench.observation.models.camera import ACROSS_SIGHT, ALONG_SIGHT, IN_IMAGE, OUT_OF_IMAGE, Camera
 from apo_bench.observation.models.fitted import restated, view_frame
 from apo_bench.observation.noise import Level, make_noise

@@ -34,12 +34,15 @@ from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.correction.own_code import own
 from apo_bench.correction.own_code import process as own_process
 from apo_bench.correction.own_code.forms import (
+    FRAME_HEADER,
+    GarbledMessage,
     correction_message,
     observation_message,
     parse_correction,
     parse_observation,
+    receive,
+    send,
 )
-from apo_bench.correction.own_code.message import FRAME_HEADER, GarbledMessage, receive, send
 from apo_bench.correction.own_code.own import CorrectorLost, OwnCorrectors
 from apo_bench.geometry import pose
 from apo_bench.io.processes import descendants
