@@ -73,8 +73,7 @@ def scene_command(
         check(name, value)
     loaded = load_scenario(scenario)
     check_outputs([(out, "--out", (".xml",))])
-    xml = scene_xml(loaded, **settings)
-    out.write_text(xml, encoding="utf-8")
+    out.write_text(scene_xml(loaded, **settings), encoding="utf-8")
     typer.echo(f"Wrote {out}; open it with: python -m mujoco.viewer --mjcf={out}")
 
 

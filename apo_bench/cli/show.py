@@ -124,8 +124,7 @@ def _corrected(scenario: Scenario, observed: Observation, method: str, step: int
             f"{method} did not correct what was seen: {correction.sentence.rstrip('.')}; --seen draws what was seen."
         )
     planned = fitting_plan(correction, observed, scenario)
-    warning = plan_warning(scenario, planned.plan, correction)
-    notes = "; ".join(filter(None, (planned.sentence, warning)))
+    notes = "; ".join(filter(None, (planned.sentence, plan_warning(scenario, planned.plan, correction))))
     return belief_panel(f"corrected by {method}", observed, planned.plan.goals, step, notes)
 
 

@@ -105,8 +105,7 @@ def _admitted(returned: Any, observation: Observation, chosen: Any, name: str) -
     returned = check_correction(returned, observation.assembly, name)
     if returned.ok and not _ours(chosen):
         before = gap_of(observation, observation.goals)
-        after = gap_of(observation, goals)
-        returned = replace(returned, gap_before_m=before, gap_after_m=after)
+        returned = replace(returned, gap_before_m=before, gap_after_m=gap_of(observation, goals))
     return returned
 
 
@@ -114,8 +113,7 @@ def _ours(corrector: Any) -> bool:
     """Whether a corrector comes with the package; what others say of the gaps that they leave is measured instead."""
     while isinstance(corrector, partial):
         corrector = corrector.func
-    module = getattr(corrector, "__module__", "")
-    return str(module).startswith("apo_bench.")
+    return str(getattr(corrector, "__module__", "")).startswith("apo_bench.")
 
 
 def _bare(returned: Any, n: int, name: str) -> Array:

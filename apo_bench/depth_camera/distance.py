@@ -97,8 +97,9 @@ def _cylinder_distance(cylinder: Cylinder, points: Array) -> tuple[Array, Array]
     beyond = np.stack([r - cylinder.radius, np.abs(z) - cylinder.half_length], axis=1)
     outside = np.maximum(beyond, 0.0)
     length = np.linalg.norm(outside, axis=1)
-    deepest = beyond.argmax(axis=1)
-    weights = np.where(length[:, None] > 0.0, outside / np.maximum(length, 1e-15)[:, None], np.eye(2)[deepest])
+    weights = np.where(
+        length[:, None] > 0.0, outside / np.maximum(length, 1e-15)[:, None], np.eye(2)[beyond.argmax(axis=1)]
+    )
     return length + np.minimum(beyond.max(axis=1), 0.0), np.einsum("nk,nki->ni", weights, ways)
 
 
@@ -178,8 +179,7 @@ def _box_distance(shape: Shape, points: Array) -> tuple[Array, Array]:
     beyond = np.abs(local) - shape.half
     outside = np.maximum(beyond, 0.0)
     length = np.sqrt(np.einsum("...i,...i->...", outside, outside))
-    deepest = beyond.max(axis=-1)
-    each = length + np.minimum(deepest, 0.0)
+    each = length + np.minimum(beyond.max(axis=-1), 0.0)
     nearest = each.argmin(axis=-1)[..., None]
     pick = nearest[..., None]
     beyond, local = (np.take_along_axis(a, pick, axis=-2)[..., 0, :] for a in (beyond, local))

@@ -299,8 +299,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
 
     def _set(self, now: Settings) -> None:
         """Have noise and scene of these settings, or raise an `InputError` and change nothing."""
-        same = now.level == self._usual.level
-        noise = self._usual_noise if same else make_noise(self._model, now.level)
+        noise = self._usual_noise if now.level == self._usual.level else make_noise(self._model, now.level)
         self._scene = self._scenes.of(now.clearance_mm)
         self._now = now
         self._noise = noise

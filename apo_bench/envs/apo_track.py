@@ -172,8 +172,7 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
         seen: Observation = self._base.seen
         shown = np.arange(n) < self._shown
         done = np.arange(n) < self._done
-        still = np.eye(4)
-        goals = np.where(shown[:, None, None], seen.goals, still)
+        goals = np.where(shown[:, None, None], seen.goals, np.eye(4))
         return {
             "goals": packed(goals),
             "covariance": np.where(shown[:, None, None], seen.covariance, 0.0),

@@ -167,6 +167,5 @@ def text_lines(path: Path, separator: str | None = ",") -> Iterator[tuple[int, l
             except UnicodeDecodeError as error:
                 raise InputError(f"{path}, line {line}: this is not UTF-8 text; give a log as text.") from error
             if text.strip():
-                quoted = separator and '"' in text
-                words = next(csv.reader([text])) if quoted else text.split(separator)
+                words = next(csv.reader([text])) if separator and '"' in text else text.split(separator)
                 yield line, [word.strip() for word in words]

@@ -97,8 +97,7 @@ def nominal_start(scenario: Scenario) -> Poses:
     """Where every part starts, in the frame of the assembly, for the site in the middle of where it may be."""
     x, y = scenario.site.center_m
     low, high = scenario.site.yaw_rad
-    site = pose.at((x, y, 0.0)) @ pose.exp([0.0, 0.0, 0.0, 0.0, 0.0, (low + high) / 2])
-    back = pose.inverse(site)
+    back = pose.inverse(pose.at((x, y, 0.0)) @ pose.exp([0.0, 0.0, 0.0, 0.0, 0.0, (low + high) / 2]))
     return {part: T if part in scenario.follows_site else back @ T for part, T in scenario.start.items()}
 
 

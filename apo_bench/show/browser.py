@@ -119,12 +119,11 @@ class Page:
     def _set_up(self, story: Story) -> None:
         server = self._server
         world = story.scene.work
-        assembly = story.scene.scenario.assembly
         server.gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
         server.gui.set_panel_label("apo-bench view")
         server.scene.set_up_direction("+z")
         server.scene.configure_default_lights(cast_shadow=False)
-        look_at, far = framing(assembly, [story.assembled])
+        look_at, far = framing(story.scene.scenario.assembly, [story.assembled])
         azimuth, elevation = np.radians([FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG])
         # where the camera looks, as a unit vector
         forwards = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]

@@ -206,8 +206,9 @@ def _tail_facts(
 ) -> list[tuple[str, str]]:
     """One line for each direction: the tail, the standard deviation within the limit, and how well it fits."""
     facts = []
-    each = zip(directions, (split.across, split.along), split.variances, figures, strict=True)
-    for direction, tail, variance, f in each:
+    for direction, tail, variance, f in zip(
+        directions, (split.across, split.along), split.variances, figures, strict=True
+    ):
         shape = f"Student t with {tail.freedom:.3g} degrees of freedom" if np.isfinite(tail.freedom) else "Gaussian"
         text = f"{direction}: scale {tail.scale:.3g} {unit}, {shape}; deviation {np.sqrt(variance):.3g} {unit} below "
         facts.append((name, text + f"{split.limit:g} {unit}; {_goodness(f)}"))

@@ -66,8 +66,7 @@ def _rough(nominal: Array, goals: Array) -> Array:
     # the mean yaw maximises the sum of tr(Rz(yaw)^t R_k) over the turns R_k from nominal to seen
     turns = goals[:, :3, :3] @ np.swapaxes(nominal[:, :3, :3], 1, 2)
     sine = (turns[:, 1, 0] - turns[:, 0, 1]).sum()
-    cosine = (turns[:, 0, 0] + turns[:, 1, 1]).sum()
-    yaw = float(np.arctan2(sine, cosine))
+    yaw = float(np.arctan2(sine, (turns[:, 0, 0] + turns[:, 1, 1]).sum()))
     T = _planar(np.array([0.0, 0.0, yaw]))
     return np.append((goals[:, :2, 3] - (T @ nominal)[:, :2, 3]).mean(axis=0), yaw)
 

@@ -230,9 +230,8 @@ def _fit_share(plan: Plan, where: Scene | Scenario, arm: Sequence[ArmMove], ends
         ends: Where robots bring the parts, one with each of the errors that were drawn; none: as planned.
     """
     scenario = where if isinstance(where, Scenario) else where.scenario
-    margin_mm = scenario.thresholds.fit_margin_mm
     ways = [abs(float(T[2, :3] @ how.direction)) for how, T in zip(scenario.attach, plan.goals, strict=True)]
-    less_mm = [margin_mm if rise < _LEVEL else 0.0 for rise in ways]
+    less_mm = [scenario.thresholds.fit_margin_mm if rise < _LEVEL else 0.0 for rise in ways]
     every = partial(measures, plan, where.clearance_mm, scenario.thresholds, scenario.attach, arm=arm)
     stands = np.prod([_within(each, less_mm) for each in every() if each.kind in _WEIGHED or not ends])
     near = [np.prod([_within(each, less_mm) for each in every(brought=end)]) for end in ends]
@@ -254,8 +253,7 @@ def _within(measure: Measure, less_mm: Sequence[float]) -> float:
 def _cover_share(plan: Plan, truths: Array, where: Scene | Scenario) -> float:
     """How surely faces overlap as the judge asks, were the plan carried out to the letter and the truth among these."""
     scenario = where if isinstance(where, Scenario) else where.scenario
-    final = placements(plan.assembly, plan.start, plan.goals)[-1]
-    overlaps = least_overlaps(plan.assembly, final, truths)
+    overlaps = least_overlaps(plan.assembly, placements(plan.assembly, plan.start, plan.goals)[-1], truths)
     possible = overlaps[np.isfinite(overlaps)]
     if not len(possible):
         return _UNKNOWN

@@ -259,5 +259,4 @@ def _solved(observation: Observation, contact_m: float) -> Array:
         return np.concatenate([space.pulled(z, J) / contact_m, prior])
 
     settings = {"xtol": _TOLERANCE, "ftol": _TOLERANCE, "gtol": _TOLERANCE, "max_nfev": EVALUATIONS}
-    optimum = minimised(residual, np.zeros(len(prior)), jacobian, method="trf", **settings)
-    return space.goals(optimum.x)
+    return space.goals(minimised(residual, np.zeros(len(prior)), jacobian, method="trf", **settings).x)

@@ -51,8 +51,7 @@ def solve_own_contacts(system: Equations, goals: Array, k: int, gap_m: float) ->
         system: All equations that the goal has to respect, those of other operations too.
         gap_m: Largest |e| at which a contact holds, [m].
     """
-    own = system.among(system.made == k)
-    solution = solve_newton(own, goals, (k,))
+    solution = solve_newton(system.among(system.made == k), goals, (k,))
     held = system.gaps(goals) <= gap_m
     holds = system.gaps(solution.goals) <= gap_m
     return solution.goals if solution.finite and (holds | ~held).all() else goals

@@ -98,8 +98,7 @@ def goals_as_given(observation: Observation, goals: Array, sentence: str) -> Cor
     before = largest_gap(observation.assembly, observation.start, observation.goals)
     if not np.isfinite(goals).all():
         return Correction(observation.goals, "not_finite", outcomes.sentence("not_finite"), (), before, before, 0)
-    system = equations(observation.assembly, observation.start, goals)
-    e, J = system.linearised(goals)
+    e, J = equations(observation.assembly, observation.start, goals).linearised(goals)
     _, rank = least_step(J / np.tile(TWIST_UNITS, len(goals)), e, SINGULAR_CUT_OFF)
     freed = tuple(int(k) for k in np.flatnonzero((goals != observation.goals).any(axis=(1, 2)))[::-1])
     after = largest(e)

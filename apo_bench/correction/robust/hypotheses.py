@@ -277,8 +277,7 @@ def believed_observation(case: Case, states: States) -> Observation:
         else:
             goals[k] = every.goal
             covariance[k] = every.covariance
-    seen = np.ones(len(states), dtype=np.bool_)
-    believed = replace(first, goals=goals, covariance=covariance, seen=seen)
+    believed = replace(first, goals=goals, covariance=covariance, seen=np.ones(len(states), dtype=np.bool_))
     if any(len(views) > 1 for views in case.views):
         believed = replace(believed, shared=(), tails=None)
     displaced = tuple(k for k, state in enumerate(states) if state == (DISPLACED,))

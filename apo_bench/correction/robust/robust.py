@@ -88,8 +88,7 @@ class RobustCorrector:
         first = None
         best = None
         while True:
-            case = Case(observation, views, model)
-            search = Search(case, self.level, self.temperature)
+            search = Search(Case(observation, views, model), self.level, self.temperature)
             baseless = _baseless(observation, views)
             best = None if baseless else search.likeliest(best)
             first = first or search.first

@@ -98,8 +98,7 @@ def _shifts(assembly: Assembly, play_m: float) -> tuple[tuple[dict[_Shift, Array
         for face in contact:
             n = assembly.face(face).normal
             for shift, way in _carried(assembly, face.part, made, loose):
-                added = own.get(shift, np.zeros(3)) + way * (_fitting(assembly, shift, loose) @ n)
-                own[shift] = added
+                own[shift] = own.get(shift, np.zeros(3)) + way * (_fitting(assembly, shift, loose) @ n)
         shifts.append(own)
     return tuple(shifts), unit_m
 
@@ -179,8 +178,7 @@ class LaidContacts:
 
     def looking_away(self, forms: Array) -> NDArray[np.bool_]:
         """Which contacts have faces that do not look at each other, (*, c), as `looking_away` has it."""
-        cosines = (forms[..., :3] * self.pattern.onto[:, :3]).sum(axis=-1)
-        return np.asarray(cosines > self.pattern.opposing)
+        return np.asarray((forms[..., :3] * self.pattern.onto[:, :3]).sum(axis=-1) > self.pattern.opposing)
 
 
 def laid_contacts(assembly: Assembly, start: Array, plane: Array, goals: Array) -> LaidContacts:

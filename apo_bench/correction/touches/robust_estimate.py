@@ -57,8 +57,7 @@ def hand_eye_displacement(unknowns: Array, middle: Array) -> Array:
 
 def tip_displacement(unknowns: Array, J: Array) -> Array:
     """exp(J delta) shift(tau), (4, 4): from where the robot believes its tip to where it is, but for E."""
-    tool = pose.rigid(np.eye(3), unknowns[TOOL])
-    return np.asarray(pose.exp(J @ unknowns[joints_in(J.shape[1])]) @ tool)
+    return np.asarray(pose.exp(J @ unknowns[joints_in(J.shape[1])]) @ pose.rigid(np.eye(3), unknowns[TOOL]))
 
 
 def part_poses(unknowns: Array, middle: Array, places: Places) -> tuple[Array, Array]:

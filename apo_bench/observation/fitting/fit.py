@@ -138,10 +138,9 @@ def outliers_by_score(residuals: Residuals) -> tuple[Band, ...]:
 def goodness_of_fit(residuals: Residuals, measured: MeasuredNoise) -> tuple[Figures, ...]:
     """Goodness of fit: of the four distributions that were fitted, to what they were fitted to."""
     upright = residuals.upright
-    known = residuals.turn_known
     shift = measured.shift_mm
     turn = measured.turn_deg
-    turned = residuals.turn_deg[known]
+    turned = residuals.turn_deg[residuals.turn_known]
     tilt = np.linalg.norm(turned[:, :2], axis=1)
     about = np.abs(turned[:, 2])
     return (

@@ -215,8 +215,7 @@ def observe_in_ray_frames(
     """
     scale = np.repeat([level.mm, level.deg], 3)
     xi = camera.twists(demonstration.goals, errors * scale)
-    seen_goals = displaced(demonstration.goals, xi)
-    stated = camera.covariance(seen_goals, covariance * np.outer(scale, scale))
+    stated = camera.covariance(displaced(demonstration.goals, xi), covariance * np.outer(scale, scale))
     seen = observe_displaced(assembly, demonstration, xi, stated)
     missed = missed & (max(level) > 0.0)
     goals = seen.goals.copy()

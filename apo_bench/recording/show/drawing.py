@@ -111,8 +111,7 @@ def _title(log: Log, scenario: Scenario | None) -> str:
 
 def _path_ends(recording: ImportedRecording) -> Sequence[DrawnEnd]:
     drawn = []
-    X = recording.camera.T_world_camera
-    for k, end, macro, off_deg in approaches(recording.scenario, recording.operations, X):
+    for k, end, macro, off_deg in approaches(recording.scenario, recording.operations, recording.camera.T_world_camera):
         if end is not None:
             goal = recording.observation.goals[k]
             ends = np.array([goal[:3, 3] - end.length_m * goal[:3, :3] @ end.direction, goal[:3, 3]])
@@ -191,8 +190,7 @@ def _draw_frame(axis: Any, T: Array, size: float, name: str) -> None:
 
 
 def _draw_box(axis: Any, solid: Solid, T: Array, color: str, style: str) -> None:
-    corners = [np.array(corner[::-1]) for corner in product((0, 1), repeat=3)]
-    for a, b in combinations(corners, 2):
+    for a, b in combinations([np.array(corner[::-1]) for corner in product((0, 1), repeat=3)], 2):
         if np.abs(a - b).sum() == 1:
             ends = np.where(np.array([a, b]) == 1, solid.bounds[1], solid.bounds[0])
             axis.plot(*pose.apply(T, ends).T, color=color, linestyle=style, linewidth=0.9, alpha=0.8)

@@ -179,8 +179,7 @@ def struck_by(scene: Scene, t: Transfer, believed: Poses, after: Poses) -> tuple
 def _struck(scene: Scene, part: str, grip: Grip, beyond: float, poses: Poses) -> tuple[float, str]:
     """How deep the open fingers are in another part, [m], and in which, where a part stands that they take or have let
     go; zero and nothing where they have room."""
-    opening = min(grip.half_width + beyond, scene.arm.opening_m)
-    boxes = gripper_boxes(scene.kinematics, scene.arm, opening)
+    boxes = gripper_boxes(scene.kinematics, scene.arm, min(grip.half_width + beyond, scene.arm.opening_m))
     T = poses[part] @ grip.T_part_tip
     depths = [
         (float(intrusion_depths(boxes, T[:3, :3], T[None, :3, 3], pieces, poses[other], 0.0)[0]), other)
@@ -200,12 +199,11 @@ def _centroid(parts: Iterable[tuple[Solid, Array]]) -> Array:
 def _sag(scene: Scene, q: Array, centroid: Array, weight_n: float) -> Array:
     """Where a weight takes the tip, and what it holds: servos give way by their torque over their stiffness."""
     kinematics = scene.kinematics
-    model = scene.work.model
     tip = kinematics.forward(q)[:3, 3]
     # Joint torques of a wrench at the tip are J^T w; each servo gives way by torque over stiffness, and J takes that to
     # a twist of the tip, which turns about the tip: there exp(twist) back.
     J = _jacobian(kinematics)
-    stiffness = np.array([model.actuator(f"arm/{name}").gainprm[0] for name in scene.arm.joints])
+    stiffness = np.array([scene.work.model.actuator(f"arm/{name}").gainprm[0] for name in scene.arm.joints])
     force = np.array([0.0, 0.0, -weight_n])
     wrench = np.concatenate([force, np.cross(centroid - tip, force)])
     twist = J @ ((J.T @ wrench) / stiffness)

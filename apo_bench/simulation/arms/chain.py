@@ -41,10 +41,8 @@ def find_flange(model: Any, description: ArmDescription) -> tuple[int, Array]:
 
 def _last_link(model: Any, description: ArmDescription) -> int:
     """The body of the last joint that is named, or of the last hinge from which the model branches."""
-    if description.joints is not None:
-        known = [model.joint(j).name for j in range(model.njnt)]
-        if description.joints[-1] in known:
-            return int(model.jnt_bodyid[model.joint(description.joints[-1]).id])
+    if description.joints is not None and description.joints[-1] in [model.joint(j).name for j in range(model.njnt)]:
+        return int(model.jnt_bodyid[model.joint(description.joints[-1]).id])
     body = 0
     while True:
         moving = [b for b in range(1, model.nbody) if int(model.body_parentid[b]) == body and _moves(model, b)]

@@ -263,7 +263,5 @@ def _unwound(q: Array, low: Array, high: Array) -> Array:
 def _in_table(kinematics: Kinematics, q: Array) -> bool:
     """Whether the centre of mass of a link lies in the table."""
     kinematics.forward(q)
-    data = kinematics.configuration.data
-    model = kinematics.model
-    moved = model.body_jntnum[1:] > 0
-    return bool((data.xipos[1:][moved, 2] < _TABLE_ROOM_M).any())
+    moved = kinematics.model.body_jntnum[1:] > 0
+    return bool((kinematics.configuration.data.xipos[1:][moved, 2] < _TABLE_ROOM_M).any())

@@ -158,8 +158,7 @@ def stated_arm(description: ArmDescription, slides: SlideGripper, model: Any, jo
     )
     (grip, *more) = description.gripper.actuators or ("",)
     require(not more, f"{file}, gripper: one of 'actuators' drives all 'slides'; {1 + len(more)} were given.")
-    sites = [model.site(i).name for i in range(model.nsite)]
-    require_known("site", slides.tip, sites, place=file)
+    require_known("site", slides.tip, [model.site(i).name for i in range(model.nsite)], place=file)
     sliding = [
         model.joint(j).name for j in range(model.njnt) if int(model.jnt_type[j]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
     ]

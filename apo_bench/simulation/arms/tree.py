@@ -59,8 +59,7 @@ def read_model_tree(path: Path, kind: str) -> ModelTree:
     """
     reading = _Reading(path, kind)
     root = reading.tree(path, 0)
-    meshes = _meshes(root, path, kind)
-    return ModelTree(root, (*reading.files, *meshes))
+    return ModelTree(root, (*reading.files, *_meshes(root, path, kind)))
 
 
 @final

@@ -69,8 +69,7 @@ class Spiral:
         self.radius = radius
         self.deep = deep
         self.step_s = step_s
-        level = abs(guard.way[2]) < 0.5
-        first = np.cross((0.0, 0.0, 1.0) if level else (0.0, 1.0, 0.0), guard.way)
+        first = np.cross((0.0, 0.0, 1.0) if abs(guard.way[2]) < 0.5 else (0.0, 1.0, 0.0), guard.way)
         first /= np.linalg.norm(first)
         self._axes = np.array([first, np.cross(guard.way, first)])
         self._felt = _Felt(guard, step_s)

@@ -196,8 +196,7 @@ def _lines(assembly: Assembly, moment: FilmMoment) -> tuple[str, ...]:
     words = operation_words(assembly, moment)
     if k is None:
         return (words,)
-    contacts = "; ".join(map(str, assembly.operations[k].contacts))
-    return (words, shortened(contacts))
+    return (words, shortened("; ".join(map(str, assembly.operations[k].contacts))))
 
 
 def framing(assembly: Assembly, states: Sequence[Poses]) -> tuple[Array, float]:
@@ -205,8 +204,7 @@ def framing(assembly: Assembly, states: Sequence[Poses]) -> tuple[Array, float]:
     posed = [(assembly.solids[p], poses[p]) for poses in states for p in assembly.solids if p not in assembly.fixed]
     low, high = world_bounds(posed)
     high = high + np.array([0.0, 0.0, _ROOM_M])
-    far = _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low))
-    return (low + high) / 2, far
+    return (low + high) / 2, _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low))
 
 
 def _looks_at(assembly: Assembly, states: Sequence[Poses]) -> Any:

@@ -103,10 +103,9 @@ class Hands:
 
     def _spans(self, hand: int, line: Trajectory, n: int) -> list[tuple[int, int]]:
         """Which steps of a line are simulated: those where something is near; at last the end."""
-        boxes = self.scene.pieces
         tip = pose.inverse(line.start)
         held = tuple(self._held[hand])
-        moving = [Moving(boxes[part], tip @ self.pose(part)) for part in held]
+        moving = [Moving(self.scene.pieces[part], tip @ self.pose(part)) for part in held]
         s = line.progress(_trailing(np.arange(n + 1.0), n, self._step_s))
         spans = near_spans(self.scene, self.data, moving, held, line, s, self.world, _RUN_UP_S, _NEAR_M)
         return spans if spans and spans[-1][1] == n else [*spans, (n, n)]

@@ -180,8 +180,7 @@ def _bring(hands: Hands, act: Act, stroke: Trajectory) -> None:
 
 def _shift_carried(hands: Hands, act: Act, part: str, clearance_m: float) -> None:
     """Shift a part of the group to its true place beside the main part; lowered, so that it does not rub."""
-    main = hands.pose(act.part)
-    there = main @ pose.inverse(act.true[act.part]) @ act.true[part]
+    there = hands.pose(act.part) @ pose.inverse(act.true[act.part]) @ act.true[part]
     _adjust(hands, part, there, -clearance_m, (), held=True)
     hands.wait(0.05)
     hands.add(0, part)

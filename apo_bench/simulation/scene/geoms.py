@@ -92,8 +92,7 @@ def widest_disc(piece: Piece) -> float:
     # From the middle, along a plane of normal m, a side of normal n is at its distance / |n x m|.
     n = piece.planes[:, :3]
     far = piece.planes[:, 3] - n @ piece.corners.mean(axis=0)
-    tilt = np.sqrt(np.maximum(1.0 - (n @ n.T) ** 2, 1e-12))
-    return float((far / tilt).min(axis=1).max())
+    return float((far / np.sqrt(np.maximum(1.0 - (n @ n.T) ** 2, 1e-12))).min(axis=1).max())
 
 
 _ROLLING_CONDIM = 6

@@ -187,8 +187,7 @@ def _world(observation: Observation) -> World:
     moved = {part for operation in observation.assembly.operations for part in operation.moves}
     free = tuple(part for part in observation.assembly.solids if part in moved)
     fixed = tuple(part for part in observation.assembly.solids if part not in moved)
-    spec = _room(observation.assembly.solids, free, observation.play_m or CLEARANCE_M, physics())
-    model = spec.compile()
+    model = _room(observation.assembly.solids, free, observation.play_m or CLEARANCE_M, physics()).compile()
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
     return world(model, free, fixed, NO_BOUNDS)
 

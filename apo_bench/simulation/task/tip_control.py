@@ -198,7 +198,6 @@ class TipControl:
         dt = robot.step_s
         steps = round(PERIOD_S / dt)
         way = self.start.transfer.into.way
-        weigh = self.start.transfer.slide_n
         T = robot.T
         off = self._off(T)
         low = np.array([-_ACROSS_M, -_ACROSS_M, -self.begins - _BACK_M])
@@ -218,8 +217,7 @@ class TipControl:
         q = robot.q
         left = self._left - float(off[2])
         for _ in range(steps):
-            force = self._felt(self._force, dt)
-            f = np.array(force)
+            f = np.array(self._felt(self._force, dt))
             push = -float(f @ way)
             led = asked
             yields = _YIELD * f
@@ -244,7 +242,7 @@ class TipControl:
         robot.q = q
         robot.T = robot.scene.kinematics.forward(q)
         push = -float(np.dot(self._felt.force, way))
-        self._pushed = self._pushed + 1 if push > weigh / 2 else 0
+        self._pushed = self._pushed + 1 if push > self.start.transfer.slide_n / 2 else 0
         here = left - self._pace.end
         self.arrived = here < _ARRIVED_M or (self._pushed >= _PUSHED and left - self._left < self._stuck)
 
@@ -279,8 +277,7 @@ class TipControl:
 
     def _feel(self) -> Feel:
         robot = self.robot
-        T = robot.scene.kinematics.forward(robot.encoders())
-        tip = self._off(T)
+        tip = self._off(robot.scene.kinematics.forward(robot.encoders()))
         wrench = self._wrist.wrench_there().reshape(2, 3) @ self._R
         return Feel(tip, self._off(robot.T) - tip, robot.opening() - self.start.grip.half_width, wrench.ravel())
 

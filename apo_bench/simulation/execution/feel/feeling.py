@@ -186,8 +186,7 @@ class Feeling:
 
     def _cornered(self, touch: Touch, patch: Array) -> Touch:
         """The touch by the corner of the patch that is foremost as it is believed."""
-        X = self.belief.real(touch.T_world_tip, touch.jacobian)
-        ahead = pose.apply(X, patch) @ touch.normal
+        ahead = pose.apply(self.belief.real(touch.T_world_tip, touch.jacobian), patch) @ touch.normal
         flat = float(np.ptp(ahead)) < _FLAT_M
         return replace(touch, point=patch.mean(axis=0) if flat else patch[int(np.argmin(ahead))])
 

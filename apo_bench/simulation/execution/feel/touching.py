@@ -87,8 +87,7 @@ def _touched(robot: Robot, feeling: Feeling, place: TouchPlace) -> list[tuple[To
     with sleeping(robot.scene.work, False), reading(robot, feeling.wrist):
         end = shifted(robot.T, way, 2.0 * place.stand_off + BEYOND_M)
         left = press(robot, steady(robot.T, end, SPEED), way, feeling.touch_n, feeling.wrist)
-        middle = place.patch.mean(axis=0)
-        touched = feeling.touch(robot, place.normal, place.offset, middle)
+        touched = feeling.touch(robot, place.normal, place.offset, place.patch.mean(axis=0))
         robot.follow(smooth(robot.T, T, _BACK))
     robot.follow(smooth(robot.T, with_height(T, T[2, 3] + _HIGH_M), _BACK))
     return [] if left is None else [(touched, place.patch)]
