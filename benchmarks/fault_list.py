@@ -124,13 +124,13 @@ FAULTS = (
     ),
     Fault("parts/load.py", "<= mass <= HEAVIEST_KG", "<= mass", "the heaviest part is not looked for"),
     Fault(
-        "parts/making/moments.py",
+        "parts/making/body.py",
         "z1 = (high**2 - low**2) / 2.0",
         "z1 = (high - low) ** 2 / 2.0",
         "the moment of a prism as if it stood at zero",
     ),
     Fault(
-        "parts/making/moments.py",
+        "parts/making/body.py",
         "np.pi * r**4 / 4.0",
         "np.pi * r**4 / 2.0",
         "the moment about the axis for one across it",

@@ -85,7 +85,7 @@ BREACHES = {
         ("apo_bench.sweeps.work.worker", "apo_bench.sweeps.grid"),
         ("apo_bench.sweeps.work.worker", "apo_bench.sweeps.local.process"),
         ("apo_bench.sweeps.local.pool", "apo_bench.sweeps.ray.task"),
-        ("apo_bench.sweeps.ray.backend", "apo_bench.sweeps.sweep_file"),
+        ("apo_bench.sweeps.ray.backend", "apo_bench.sweeps.sweep"),
     ],
     "work": [
         ("apo_bench.sweeps.work.environment_lock", "apo_bench.sweeps.work.dispatch"),

@@ -1,9 +1,19 @@
 """Files are read and written here, strictly and within limits, and processes started; knows nothing of assemblies."""
 
-from apo_bench.io.documents import JsonNode, parse_json, read_json, read_toml
+from apo_bench.io.documents import (
+    HALF_BUT_OF_FILES,
+    HALF_LETTER,
+    WHOLE_LETTERS,
+    JsonNode,
+    half_letter,
+    is_whole,
+    parse_json,
+    read_json,
+    read_toml,
+    read_whole,
+)
 from apo_bench.io.figures import default_looks, load_matplotlib, save_figure
 from apo_bench.io.grouping import grouped
-from apo_bench.io.lossless_json import HALF_BUT_OF_FILES, HALF_LETTER, WHOLE_LETTERS, half_letter, is_whole, read_whole
 from apo_bench.io.ordinary_files import (
     check_folders,
     check_target,

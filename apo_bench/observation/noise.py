@@ -30,7 +30,7 @@ NOISES = MappingProxyType(
         "per-part": "apo_bench.observation.models.isotropic:PerPart",
         "camera": "apo_bench.observation.models.camera:Sighted",
         "heavy-tailed": "apo_bench.observation.models.isotropic:HeavyTailed",
-        "outliers": "apo_bench.observation.models.outliers:Outliers",
+        "outliers": "apo_bench.observation.models.failures:Outliers",
         "bias": "apo_bench.observation.models.shared:Bias",
         "bias-view": "apo_bench.observation.models.shared:BiasView",
         "correlated": "apo_bench.observation.models.shared:Correlated",

@@ -12,11 +12,10 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import Array
 from apo_bench.recording.arranging import Arrange, Arrangement
 from apo_bench.recording.averaging import per_axis
-from apo_bench.recording.mistakes import mistakes, reversed_in_time
 from apo_bench.recording.operations import SeenOperation
 from apo_bench.recording.ordering import NoOrder, moves_text
 from apo_bench.recording.setup_files import CameraFile
-from apo_bench.recording.stays import Stays
+from apo_bench.recording.stays import Stays, mistakes, reversed_in_time
 
 _FITS_MM = 20.0
 """A contact that is open by more, or a known place that is missed by more, is no noise; degrees count like mm."""

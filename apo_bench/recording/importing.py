@@ -18,11 +18,10 @@ from apo_bench.observation.models import UNSEEN_DEVIATION, floored, last_seen, w
 from apo_bench.recording.arranging import CameraPose, arrangement_of, solved_camera, staying
 from apo_bench.recording.averaging import per_axis
 from apo_bench.recording.doubts import check_arrangement, check_direction, unclear
-from apo_bench.recording.log import PoseTrack
 from apo_bench.recording.operations import SeenOperation, seen_operation
 from apo_bench.recording.ordering import ContactFit, NoOrder, Stated
 from apo_bench.recording.rests import RestSpan, consecutive, least_rest_s
-from apo_bench.recording.setup_files import CameraFile
+from apo_bench.recording.setup_files import CameraFile, PoseTrack
 from apo_bench.recording.stays import Stay, Stays, all_stays
 from apo_bench.scenario import Scenario, layout_at
 

@@ -17,7 +17,7 @@ from apo_bench.errors import require
 from apo_bench.geometry import Array, frozen, pose
 from apo_bench.observation.models import Camera, Residuals
 from apo_bench.recording.averaging import Mean, average, common_scatter, pooled_mean
-from apo_bench.recording.log import Log, PoseTrack
+from apo_bench.recording.setup_files import Log, PoseTrack
 
 LEAST_REST_S = 0.3
 """Least duration of a rest."""

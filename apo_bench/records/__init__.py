@@ -3,7 +3,6 @@
 Other rooms import from here; the folder of a sweep is in `run`.
 """
 
-from apo_bench.records.limits import CORRECTOR_LIMIT_S, USUAL_LIMITS, Limits
 from apo_bench.records.outcomes import CODES, STAGES, sentence, touching_sentence
 from apo_bench.records.robot_error import (
     NO_ROBOT_ERROR,
@@ -71,7 +70,15 @@ from apo_bench.records.short_names import (
     relations_name,
     with_simulated,
 )
-from apo_bench.records.thresholds import MEANINGS, Criteria, Meaning, Thresholds
+from apo_bench.records.thresholds import (
+    CORRECTOR_LIMIT_S,
+    MEANINGS,
+    USUAL_LIMITS,
+    Criteria,
+    Limits,
+    Meaning,
+    Thresholds,
+)
 
 __all__ = (
     "CODES",

@@ -13,8 +13,18 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.show.stepping import COLOR_NAMES, COLORS, FACES, Cursor
 from apo_bench.simulation.film.film import FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG, framing
-from apo_bench.simulation.film.meshes import BodyMesh, body_meshes, body_poses, part_meshes
-from apo_bench.simulation.film.still import GHOST_OPACITY, HAND_COLOR, HAND_M, Ghost, label_place, show_moment
+from apo_bench.simulation.film.still import (
+    GHOST_OPACITY,
+    HAND_COLOR,
+    HAND_M,
+    BodyMesh,
+    Ghost,
+    body_meshes,
+    body_poses,
+    label_place,
+    part_meshes,
+    show_moment,
+)
 from apo_bench.simulation.scene import initial_state
 from apo_bench.trial.story import Story
 

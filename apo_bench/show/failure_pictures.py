@@ -18,8 +18,7 @@ from apo_bench.errors import InputError, require
 from apo_bench.geometry import pose, world_bounds
 from apo_bench.io import each_line
 from apo_bench.records import Row, Salt, TrialSettings, row_key, settings_of
-from apo_bench.records.run.own_code import left_out, own_code
-from apo_bench.records.run.replay_command import Files
+from apo_bench.records.run.replay_command import Files, left_out, own_code
 from apo_bench.records.run.validation import row_of
 from apo_bench.report.run.trials import FailurePicture
 from apo_bench.show.axes import axis_marks

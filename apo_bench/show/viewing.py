@@ -9,7 +9,7 @@ from typing import Literal
 from apo_bench.errors import InputError, require
 from apo_bench.io import each_line
 from apo_bench.records import Row, read_salt, settings_of
-from apo_bench.records.run.own_code import own_code
+from apo_bench.records.run.replay_command import own_code
 from apo_bench.records.run.run_file import read_run
 from apo_bench.records.run.validation import row_of
 from apo_bench.report.run.trials import scenario_files

@@ -14,6 +14,7 @@ from apo_bench.records import (
     RANGE,
     SETTINGS,
     Salt,
+    SettingInfo,
     TrialSettings,
     check,
     check_squares,
@@ -31,10 +32,10 @@ from apo_bench.sweeps.work.environment_lock import Unit
 LARGEST_TRIALS = 1_000_000
 _MOST_TRIALS = 1_000_000
 """Of all cells of a sweep together: their specifications are held in memory, half a kilobyte each."""
-AXES = tuple(info for info in (*SETTINGS.values(), LEVEL) if info.axis)
+AXES: tuple[SettingInfo, ...] = tuple(info for info in (*SETTINGS.values(), LEVEL) if info.axis)
 """What a sweep has several of."""
 _MAY_BE_EMPTY = ("clearance_mm", "noise")
-SHARED = tuple(info.name for info in SETTINGS.values() if info.shared)
+SHARED: tuple[str, ...] = tuple(info.name for info in SETTINGS.values() if info.shared)
 """What all grids of a sweep have in common, so that no key tells trials apart by it."""
 _BY_RULE = (
     *("scenario", "careless", "clearance_mm", "eye", "noise"),

@@ -24,7 +24,7 @@ from apo_bench.io import read_bytes
 from apo_bench.names import admit
 from apo_bench.observation.noise_file import noise_path
 from apo_bench.records import ROW, TrialSettings
-from apo_bench.records.run.own_code import DATA_PREFIXES, is_own_code
+from apo_bench.records.run.replay_command import DATA_PREFIXES, is_own_code
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario, scenario_path
 

@@ -16,8 +16,14 @@ import numpy as np
 
 from apo_bench.assembly import Observation
 from apo_bench.correction.correctors import correct
-from apo_bench.correction.learning.evidence import UNITS, readings
-from apo_bench.correction.learning.likelihood import EstimatedNumber, LearnedNoise, ObservedErrors, learn_noise
+from apo_bench.correction.learning.likelihood import (
+    UNITS,
+    EstimatedNumber,
+    LearnedNoise,
+    ObservedErrors,
+    learn_noise,
+    readings,
+)
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
 from apo_bench.io import grouped

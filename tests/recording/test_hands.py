@@ -7,8 +7,7 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.geometry import pose
-from apo_bench.recording.log import Log, PoseTrack
-from apo_bench.recording.setup_files import ObjectsFile, TrackedPart, part_tracks
+from apo_bench.recording.setup_files import Log, ObjectsFile, PoseTrack, TrackedPart, part_tracks
 from apo_bench.recording.stays import hands_of
 from tests.recorded import CAMERA, motion, seen
 

@@ -18,8 +18,7 @@ from apo_bench import InputError
 from apo_bench.cli import app as cli
 from apo_bench.cli.terminal import print_cells, print_report
 from apo_bench.io.plain_text import clean
-from apo_bench.records.run.own_code import own_code
-from apo_bench.records.run.replay_command import replay_command
+from apo_bench.records.run.replay_command import own_code, replay_command
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.report import report as reports
 from apo_bench.report.report import report

@@ -12,9 +12,8 @@ from apo_bench.records import wrench_noise
 from apo_bench.simulation.execution.beside import Flush
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.execution.feel.feeling import ACTS, Feeling, touch_guard
-from apo_bench.simulation.execution.feel.laying import _Laying, averaged_s
 from apo_bench.simulation.execution.feel.places import floor_places, opposite_places, wall_places
-from apo_bench.simulation.execution.feel.touching import _stand_off, find_out
+from apo_bench.simulation.execution.feel.touching import _Laying, _stand_off, averaged_s, find_out
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.robot_error import RobotError

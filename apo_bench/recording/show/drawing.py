@@ -14,9 +14,8 @@ from apo_bench.geometry import Array, Solid, pose
 from apo_bench.io import default_looks, save_figure
 from apo_bench.recording.arranging import camera_pose
 from apo_bench.recording.importing import ImportedRecording, UnplannedRecording, planned_starts
-from apo_bench.recording.log import Log, PoseTrack
 from apo_bench.recording.operations import approaches
-from apo_bench.recording.setup_files import CameraFile
+from apo_bench.recording.setup_files import CameraFile, Log, PoseTrack
 from apo_bench.recording.stays import Stays, all_stays
 from apo_bench.scenario.scenario import Scenario
 

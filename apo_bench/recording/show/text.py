@@ -11,10 +11,9 @@ from apo_bench.io import columns, direction
 from apo_bench.recording.arranging import CameraPose
 from apo_bench.recording.averaging import per_axis
 from apo_bench.recording.importing import ImportedRecording, UnplannedRecording
-from apo_bench.recording.log import Log
 from apo_bench.recording.operations import approaches
 from apo_bench.recording.rests import RestSpan
-from apo_bench.recording.setup_files import ObjectsFile
+from apo_bench.recording.setup_files import Log, ObjectsFile
 
 _HEADS: tuple[str, ...] = (
     "",

@@ -9,9 +9,9 @@ from typing import Any, NoReturn
 
 from apo_bench.errors import InputError, require
 from apo_bench.io import read_bytes, to_write
-from apo_bench.records.limits import USUAL_LIMITS, Limits
 from apo_bench.records.run.validation import run_of
 from apo_bench.records.salt import Salt
+from apo_bench.records.thresholds import USUAL_LIMITS, Limits
 
 _RUN = "apo-bench/run/3"
 _LARGEST_BYTES = 16_000_000

@@ -11,8 +11,7 @@ from typing import Any, NamedTuple
 
 from apo_bench.io import grouped
 from apo_bench.records import USUAL_LIMITS, Limits, Row, Salt
-from apo_bench.records.run.own_code import left_out, own_code
-from apo_bench.records.run.replay_command import Files
+from apo_bench.records.run.replay_command import Files, left_out, own_code
 from apo_bench.report.tables.table import Column, Table
 from apo_bench.statistics import NOT_EXECUTED, rank
 

@@ -29,7 +29,7 @@ from apo_bench.simulation.execution import (
     take_up,
 )
 from apo_bench.simulation.execution.feel.feeling import Feeling, Feels
-from apo_bench.simulation.execution.feel.laying import lay
+from apo_bench.simulation.execution.feel.touching import lay
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.robot import Halt, Robot, RobotError, WristSensor, part_loads, wrist_of, zero
 from apo_bench.simulation.scene import Scene, left_out, sleeping

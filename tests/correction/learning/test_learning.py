@@ -14,8 +14,7 @@ from numpy.testing import assert_allclose
 from apo_bench import Demonstration, InputError, Observation, draw_layout, load_scenario
 from apo_bench.cli.app import main
 from apo_bench.correction.learning import likelihood
-from apo_bench.correction.learning.evidence import UNITS, readings
-from apo_bench.correction.learning.likelihood import ObservedErrors
+from apo_bench.correction.learning.likelihood import UNITS, ObservedErrors, readings
 from apo_bench.files.json_forms import observation_form, write_form
 from apo_bench.geometry import pose
 from apo_bench.observation.fitting.fit import COMPONENTS, component_factors, view_ways
