@@ -94,8 +94,7 @@ def noise_fit(
     else:
         typer.echo("\n".join(fit_lines(matched, measured, goodness)))
     command = f"apo-bench noise fit --estimates {estimates.name} --truth {truth.name}"
-    notes = (_printable(command), *fit_notes(matched, measured, goodness))
-    _write_fit(matched, measured, (out, picture), notes)
+    _write_fit(matched, measured, (out, picture), (_printable(command), *fit_notes(matched, measured, goodness)))
     if residuals is not None:
         with writing():
             residuals.write_text(residuals_text(matched), encoding="utf-8")

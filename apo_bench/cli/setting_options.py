@@ -187,8 +187,7 @@ def trial_options(*names: str) -> list[Parameter]:
 def sweep_options() -> list[Parameter]:
     """Options of a sweep: its axes, and what all of its trials have in common."""
     axes = {info.axis: info for info in (LEVEL, *SETTINGS.values()) if info.axis and info.help}
-    shared = [info for info in SETTINGS.values() if info.shared]
-    return [*map(_axis, axes.values()), *map(_of_trial, shared)]
+    return [*map(_axis, axes.values()), *map(_of_trial, [info for info in SETTINGS.values() if info.shared])]
 
 
 def axis_option(info: SettingInfo) -> str:

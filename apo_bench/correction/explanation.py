@@ -268,8 +268,7 @@ def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, spans: A
 
 def _rooted(assembly: Assembly) -> dict[str, ODL]:
     """The ODL of every part at the end, in which one operation per part that puts it at its start comes first."""
-    starts = map(Operation, assembly.solids)
-    return dict(replace(assembly, operations=(*starts, *assembly.operations)).odls()[-1])
+    return dict(replace(assembly, operations=(*map(Operation, assembly.solids), *assembly.operations)).odls()[-1])
 
 
 def _reach(word: ODL, stack: Array, constants: int, n: int) -> Array:

@@ -233,8 +233,7 @@ def _block(scenarios: Sequence[Scenario], noise: Noise, seed: int, number: int, 
 
 def stream(seed: int, scenario: str, number: int) -> np.random.Generator:
     """The random numbers of one block of a scenario of this name."""
-    key = STREAM, crc32(scenario.encode()), number
-    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(STREAM, crc32(scenario.encode()), number)))
 
 
 def _mistakes(scenario: Scenario, careless: float, rng: np.random.Generator) -> Array:

@@ -30,8 +30,7 @@ def convex_of(hull: Hull) -> Convex:
     planes = np.array(hull.planes)
     planes[:, 3] -= planes[:, :3] @ hull.center
     if hull.cylinder is not None:
-        moved = hull.cylinder._replace(center=hull.cylinder.center - hull.center)
-        return Convex(planes, np.zeros((0, 2, 3)), moved)
+        return Convex(planes, np.zeros((0, 2, 3)), hull.cylinder._replace(center=hull.cylinder.center - hull.center))
     # Two corners are the ends of an edge if at least two planes go through both.
     corners = hull.corners - hull.center
     on = np.abs(corners @ planes[:, :3].T - planes[:, 3]) < 100 * _ON_M

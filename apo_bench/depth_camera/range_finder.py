@@ -201,8 +201,7 @@ def share_explained(
         measured = image.ravel()[pixels]
         pixels = pixels[np.isfinite(measured)]
         measured = measured[np.isfinite(measured)]
-        origin = pose.apply(to, view.origin[None])[0]
-        expected, _ = strike_distances(shape, origin, view.rays[pixels] @ T[:3, :3])
+        expected, _ = strike_distances(shape, pose.apply(to, view.origin[None])[0], view.rays[pixels] @ T[:3, :3])
         new = mask.ravel()[pixels]
         # Against the model: what appeared and is not its surface, and what stayed though it would hide that.
         agrees = np.abs(expected - measured) < close

@@ -320,8 +320,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         if promised < self._abstain:
             return failed, abstained(promised, self._abstain), predicted, promised
         watch = self._rendering.watch(self._scene, self.render_mode)
-        truth = simulated.layout.goals
-        attempt = carried_out(robot, plan, self._scene, truth, episode.trial, watch, self._fidelity)
+        attempt = carried_out(robot, plan, self._scene, simulated.layout.goals, episode.trial, watch, self._fidelity)
         if attempt.result.reached.final is not None:
             self._rendering.poses = attempt.result.reached.final.poses
         return verdicts(attempt.verdict), trial_outcome(attempt), predicted, promised

@@ -175,8 +175,7 @@ def judged(scene: Scene, after: tuple[Snapshot | None, ...], final: Snapshot | N
         after: After each of them.
         reference: (k, 4, 4), their true goals, world frame, [m].
     """
-    assembly = scene.scenario.assembly.first(len(after))
-    return judge(assembly, Reached(after, final), reference, scene.criteria)
+    return judge(scene.scenario.assembly.first(len(after)), Reached(after, final), reference, scene.criteria)
 
 
 def _stated(seen: Observation, correction: Correction | None, told: str | None) -> Array:

@@ -60,8 +60,7 @@ def contact_policy(known: Tracked) -> tuple[Act, ...]:
 
 
 def _acts(known: Tracked, goals: Array, freed: list[int] | tuple[int, ...]) -> tuple[Act, ...]:
-    steps = reached_back(len(goals) - 1, freed)
-    return tuple(Act(undo, (known.placed if undo else goals)[k]) for k, undo in steps)
+    return tuple(Act(undo, (known.placed if undo else goals)[k]) for k, undo in reached_back(len(goals) - 1, freed))
 
 
 def first_seen(observation: Observation, m: int) -> Observation:

@@ -221,8 +221,7 @@ def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) 
 
 def _only(rows: PoseRows, kept: Any) -> PoseRows:
     """The rows of a mask."""
-    where = rows.where[kept]
-    return PoseRows(rows.file, where, rows.R[kept], rows.t_mm[kept], rows.place[kept], rows.score[kept])
+    return PoseRows(rows.file, rows.where[kept], rows.R[kept], rows.t_mm[kept], rows.place[kept], rows.score[kept])
 
 
 def _among(where: Any, known: Any) -> Any:

@@ -159,8 +159,7 @@ def measures(
     """
     acts = tuple(_acts(plan, iter(brought)))
     for act in acts if not brought else ():
-        size = imbalance(act.alone, act.operation, act.planned, 1e-3 * room_mm)
-        yield Measure(act.number, "falls", size, BALANCED)
+        yield Measure(act.number, "falls", imbalance(act.alone, act.operation, act.planned, 1e-3 * room_mm), BALANCED)
     physical = physical_solids(plan.assembly, clearance_mm)
     for act in acts:
         k, _, planned, _ = act
@@ -228,8 +227,7 @@ def _tip(
     if as_planned or not any(enters(act.alone, contact) for contact in act.operation.contacts):
         return
     moved = {part: move.sag @ act.planned[part] for part in act.operation.moves}
-    sagging = act._replace(planned=MappingProxyType({**act.planned, **moved}))
-    off = _fit(sagging, how, clearance_mm, thresholds)
+    off = _fit(act._replace(planned=MappingProxyType({**act.planned, **moved})), how, clearance_mm, thresholds)
     own = max(0.0, off.size - planned.size) + move.beside_mm
     yield Measure(act.number, "own", own, max(off.allowed - thresholds.fit_margin_mm, 0.0))
     yield Measure(act.number, "tip", off.size + move.beside_mm, off.allowed)

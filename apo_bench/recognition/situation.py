@@ -207,8 +207,7 @@ class Situation:
         C = J @ self.estimate.covariance @ J.T
         candidate = judged(self.seen, rules, a, b, self.now.poses[b], pair, J, C)
         if candidate is not None:
-            flat = np.diag([_FLAT_M**2] * pair.lengths + [_FLAT_RAD**2] * (len(C) - pair.lengths))
-            soft = candidate.noise + flat
+            soft = candidate.noise + np.diag([_FLAT_M**2] * pair.lengths + [_FLAT_RAD**2] * (len(C) - pair.lengths))
             room = J @ self.estimate.room @ J.T
             gain = float(np.linalg.slogdet(room + soft)[1] - np.linalg.slogdet(C + soft)[1])
             yield candidate._replace(gain=gain)

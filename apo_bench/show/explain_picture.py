@@ -76,8 +76,7 @@ def draw_explanation(scenario: Scenario, observation: Observation, explanation: 
     fovy = float(scene.shown.model.vis.global_.fovy)
     figure = _captioned(image, scenario, explanation, drawn)
     for mark in marks:
-        tips = pixels(mark.tips, camera, fovy, _WIDTH, _HEIGHT)
-        x, y = max(tips, key=lambda tip: (round(tip[1]), tip[0]))
+        x, y = max(pixels(mark.tips, camera, fovy, _WIDTH, _HEIGHT), key=lambda tip: (round(tip[1]), tip[0]))
         figure.axes[0].text(
             x, y, mark.name, color=tuple(0.75 * c for c in mark.color), fontsize=13, weight="bold", ha="center",
             va="center", path_effects=[withStroke(linewidth=3.5, foreground="white")],

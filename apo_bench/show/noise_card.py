@@ -76,8 +76,7 @@ def draw_errors(model: Any, level: Level, draws: int = _DRAWS) -> Drawn:
     for _ in range(draws):
         observation = observe(demonstration, noise, rng)
         # error xi of T Exp(xi), turned from the part's own frame into that of the ray: R_ray^T R_part, for both halves
-        R = np.swapaxes(camera.frames(observation.goals), 1, 2) @ observation.goals[:, :3, :3]
-        Q = np.kron(np.eye(2), R)
+        Q = np.kron(np.eye(2), np.swapaxes(camera.frames(observation.goals), 1, 2) @ observation.goals[:, :3, :3])
         xi = (Q @ pose.log(pose.inverse(demonstration.goals) @ observation.goals)[..., None])[..., 0]
         errors.append(xi[observation.seen])
         covariance = Q @ observation.covariance @ np.swapaxes(Q, 1, 2)

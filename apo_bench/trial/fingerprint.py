@@ -80,8 +80,7 @@ def content_pieces(
 @cache
 def code_files() -> Mapping[str, str]:
     """Source file, relative to the package -> 16 hexadecimal digits over its lines; read once per process."""
-    texts = sorted(sources(files("apo_bench")))
-    return MappingProxyType({path: _hash(text) for path, text in texts if counts(path)})
+    return MappingProxyType({path: _hash(text) for path, text in sorted(sources(files("apo_bench"))) if counts(path)})
 
 
 def counts(path: str) -> bool:

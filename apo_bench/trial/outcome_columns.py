@@ -243,8 +243,7 @@ def head(spec: TrialSettings, scenario: Scenario, hashed: str) -> Row:
         hashed: From `spec_hash`.
     """
     versions = {"schema": ROW, "env_id": ENV_ID, "spec_hash": hashed}
-    columns = setting_columns(spec, scenario.name)
-    return cast(Row, versions | columns | {"thresholds": asdict(scenario.thresholds)})
+    return cast(Row, versions | setting_columns(spec, scenario.name) | {"thresholds": asdict(scenario.thresholds)})
 
 
 def result(end: Outcome, *, success: bool | None) -> Row:

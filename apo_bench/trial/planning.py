@@ -176,8 +176,7 @@ def arm_sentence(scenario: Scenario, plan: Plan | None, arm: str) -> str:
     scene = build_scene(scenario, arm=arm)
     if plan is None:
         x, y = scenario.site.center_m
-        yaw = float(np.mean(scenario.site.yaw_rad))
-        at = layout_at(scenario, x, y, yaw, clearance_mm=scene.clearance_mm)
+        at = layout_at(scenario, x, y, float(np.mean(scenario.site.yaw_rad)), clearance_mm=scene.clearance_mm)
         plan = Plan(scenario.assembly, at.start, at.goals)
     moves = arm_moves(plan, scene)
     prediction = predict(plan, scene.clearance_mm, scenario.thresholds, scenario.attach, moves)

@@ -35,8 +35,7 @@ def expected_badness(case: Case, states: States, dropped: tuple[str, ...], belie
     left_out = unbelieved(states)
     wide = np.array(believed.covariance)
     wide[list(left_out)] = ROOM
-    L = noise_factor(replace(believed, covariance=wide))
-    e, Jt = linearised_by(seen_system(believed), believed.goals, L)
+    e, Jt = linearised_by(seen_system(believed), believed.goals, noise_factor(replace(believed, covariance=wide)))
     _, soft = softened(believed, dropped)
     # -2 log of the density of e, Gaussian with covariance S = J J^t + soft^2; what is not linear is no contradiction.
     S = Jt.T @ Jt + np.diag(soft * soft)

@@ -102,8 +102,7 @@ class CameraFailures(ABC):
     ) -> Observation:
         sigma = self.level.sigma()
         xi = rng.standard_normal((len(assembly), 6)) * sigma
-        seeming = replace(demonstration, goals=failures.goals)
-        seen = observe_displaced(assembly, seeming, xi, np.diag(sigma**2))
+        seen = observe_displaced(assembly, replace(demonstration, goals=failures.goals), xi, np.diag(sigma**2))
         x, y, z = self.camera.T_world_camera[:3, 3].tolist()
         rates = replace(measured_rates(self.rate, 0.0), repeat=min(self.repeat, _MOST_REPEAT), camera_m=(x, y, z))
         return replace(seen, outliers=rates)

@@ -157,8 +157,7 @@ def match_rows(estimates: PoseRows, truth: PoseRows) -> NDArray[np.int64]:
     for there, seen in _groups(truth.where, estimates.where):
         if len(there) * len(seen) > MOST_PAIRS:
             raise InputError(f"{estimates.spot(int(seen[0]))}: {_MOST_IN_ONE_IMAGE}, {len(seen)} were given.")
-        off = np.linalg.norm(truth.t_mm[there][:, None] - estimates.t_mm[seen][None], axis=2)
-        i, j = linear_sum_assignment(off)
+        i, j = linear_sum_assignment(np.linalg.norm(truth.t_mm[there][:, None] - estimates.t_mm[seen][None], axis=2))
         partner[there[i]] = seen[j]
     return partner
 

@@ -86,8 +86,9 @@ def _length(outer: Sequence[Frustum], inner: Sequence[Frustum], a: float, b: flo
         yield Hull("", 1e-3 * np.concatenate([_ring(low, around.count, a), _ring(high, around.count, b)]))
     else:
         n = max(around.count, bore.count)
-        cells = [wedges(inscribed((0.0, 0.0), r, n), np.zeros(2), n) for r in (low, high)]
-        for (u, first), (_, last) in zip(*cells, strict=True):
+        for (u, first), (_, last) in zip(
+            *[wedges(inscribed((0.0, 0.0), r, n), np.zeros(2), n) for r in (low, high)], strict=True
+        ):
             ends = [(clipped(first, -u, -bore.at(a)), a), (clipped(last, -u, -bore.at(b)), b)]
             yield Hull("", 1e-3 * np.concatenate([raised(*end) for end in ends]))
 

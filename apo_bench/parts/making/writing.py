@@ -106,8 +106,7 @@ def write_part(
     indent(root)
     path.write_text(note + tostring(root, encoding="unicode") + "\n", encoding="utf-8")
     if not boxes:
-        text = stated_text(solid, density, friction, source, licence)
-        path.with_suffix(".toml").write_text(text, encoding="utf-8")
+        path.with_suffix(".toml").write_text(stated_text(solid, density, friction, source, licence), encoding="utf-8")
     return path
 
 

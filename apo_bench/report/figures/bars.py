@@ -115,8 +115,7 @@ def _outcome_panel(setting: Setting, cells: Sequence[Cell]) -> Panel:
         for top, cell in bars:
             axis.text(_LEFT - 6, top + _HIGH - 2, _level(cell, setting), ha="right", **_SMALL)
             axis.text(WIDTH - _RIGHT + 5, top + _HIGH - 2, f"n {cell.trials}", **_SMALL)
-        pieces = [piece for top, cell in bars for piece in _bar(cell, setting, top)]
-        boxes, colors, words = zip(*pieces, strict=True)
+        boxes, colors, words = zip(*[piece for top, cell in bars for piece in _bar(cell, setting, top)], strict=True)
         tip(_boxes(axis, boxes, colors), words)
         for share in (0.0, 0.5, 1.0):
             axis.text(_x(share), y + 12, f"{100 * share:.0f} %", ha="center", **_SMALL)

@@ -86,8 +86,7 @@ def _of_menagerie(name: str) -> ArmDescription:
             f"menagerie:{name}: MuJoCo Menagerie was not found; fetch it with 'git clone --depth 1 "
             f"https://github.com/google-deepmind/mujoco_menagerie' and name its folder in {_MENAGERIE}."
         )
-    known = [each.name for each in sorted(root.iterdir()) if any(each.glob("*.xml"))]
-    require_known("arm", name, known, place=root)
+    require_known("arm", name, [each.name for each in sorted(root.iterdir()) if any(each.glob("*.xml"))], place=root)
     plain = name.replace("_", "").lower()
     files = [f for f in sorted((root / name).glob("*.xml")) if plain.endswith(f.stem.replace("_", "").lower())]
     require(files, f"{root / name}: which of its files is the arm is not known; state it as 'mjcf' in an arm file.")

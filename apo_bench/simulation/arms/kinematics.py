@@ -142,8 +142,7 @@ class Kinematics:
 
 def _alone(arm: Arm) -> Any:
     """The model of the arm where it stands, and nothing else."""
-    own_text = arm.model is not None
-    spec = mujoco.MjSpec.from_string(arm.model) if own_text else mujoco.MjSpec.from_file(str(arm.mjcf))
+    spec = mujoco.MjSpec.from_string(arm.model) if arm.model is not None else mujoco.MjSpec.from_file(str(arm.mjcf))
     stand = pose.unpack(np.array([*arm.base, *arm.turn]))
     for body in spec.worldbody.bodies:
         T = pose.pack(stand @ pose.unpack(np.array([*body.pos, *body.quat])))

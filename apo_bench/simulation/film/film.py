@@ -126,8 +126,7 @@ def frames(
     """
     near = _looks_at(assembly, [assembled])
     for chapter in chapters:
-        wide = _looks_at(assembly, [assembled, chapter.start])
-        yield from _chapter(assembly, chapter, near, wide, speed, fps)
+        yield from _chapter(assembly, chapter, near, _looks_at(assembly, [assembled, chapter.start]), speed, fps)
 
 
 def _chapter(

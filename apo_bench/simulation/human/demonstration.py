@@ -209,8 +209,7 @@ def _adjust(
 
 def _first(stroke: Trajectory, fraction: float) -> Trajectory:
     """The first part of a stroke, as a motion of its own."""
-    end = stroke.poses(np.array([fraction]))[0]
-    return Trajectory(stroke.start, end, stroke.seconds * 0.5, minimum_jerk)
+    return Trajectory(stroke.start, stroke.poses(np.array([fraction]))[0], stroke.seconds * 0.5, minimum_jerk)
 
 
 def demonstrate(

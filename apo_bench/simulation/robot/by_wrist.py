@@ -59,8 +59,7 @@ def wrist_of(robot: Robot, name: str, rng: np.random.Generator, bandwidth_hz: fl
     Raises:
         InputError: An unknown name, or a number that is not allowed.
     """
-    sensors = robot.data.sensordata
-    return WristSensor(robot.scene, sensors, robot.encoders, wrench_noise(name), rng, bandwidth_hz)
+    return WristSensor(robot.scene, robot.data.sensordata, robot.encoders, wrench_noise(name), rng, bandwidth_hz)
 
 
 @contextmanager

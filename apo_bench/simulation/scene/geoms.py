@@ -179,8 +179,7 @@ def dress(
             spec.delete(geom)
         others = [piece for piece in several if piece not in own]
         add_pieces(spec, body, [piece for piece in others if not is_lining(bits[piece.name])], surface)
-        walls = [piece for piece in others if is_lining(bits[piece.name])]
-        add_pieces(spec, lining, walls, surface | {"mass": 0.0})
+        add_pieces(spec, lining, [piece for piece in others if is_lining(bits[piece.name])], surface | {"mass": 0.0})
     set_mass(body, solid, density)
     for geom in dict.fromkeys((*body.geoms, *lining.geoms)):
         if geom.name in bits:
