@@ -79,7 +79,7 @@ FAULTS = (
     Fault("judging/verdict.py", "relation.lost <= k for", "relation.lost < k for", "no fixture is put away any more"),
     Fault("judging/verdict.py", "reached.area / true.area", "true.area / reached.area", "shares turned over"),
     Fault("judging/verdict.py", "put.pop(part, None)", "put.get(part)", "a part that is moved on is pushed"),
-    Fault("judging/judgement.py", "np.degrees(snapshot.spin_rad_s)", "snapshot.spin_rad_s", "rad/s taken for deg/s"),
+    Fault("judging/contacts.py", "np.degrees(snapshot.spin_rad_s)", "snapshot.spin_rad_s", "rad/s taken for deg/s"),
     Fault("judging/verdict.py", "or not self.demonstrated.holds)", "or self.demonstrated.holds)", "the wrong reason"),
     Fault(
         "sweeps/work/dispatch.py",

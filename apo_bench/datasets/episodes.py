@@ -111,7 +111,6 @@ class _Recorder:
         self.plan = plan
 
     def _tick(self, data: Any, doing: Doing) -> None:
-        arm = self._scene.arm
         at = [part_pose(self._scene.work, data, part) for part in self.parts]
         look = (
             float(data.time),
@@ -119,8 +118,8 @@ class _Recorder:
             doing.undoes,
             doing.macro,
             float(doing.force_n),
-            [float(data.joint(f"arm/{joint}").qpos[0]) for joint in arm.joints],
-            [float(data.joint(f"arm/{finger}").qpos[0]) for finger in arm.fingers],
+            [float(data.joint(f"arm/{joint}").qpos[0]) for joint in self._scene.arm.joints],
+            [float(data.joint(f"arm/{finger}").qpos[0]) for finger in self._scene.arm.fingers],
             np.array(data.ctrl),
             np.concatenate([data.sensor(name).data for name in WRIST_SENSORS]),
             pose.pack(np.array(at)),

@@ -319,8 +319,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         """What is said once the hand has let go."""
         begun = self._now()
         verdict = judged(self._trials.scene, (*begun.start.after, reached), reached, begun.reference)
-        found = verdict.rests_on
-        return self._said("ok" if verdict.success else found.code, why=found.why)
+        return self._said("ok" if verdict.success else verdict.rests_on.code, why=verdict.rests_on.why)
 
     def _said(self, code: str, part: str = "", why: str = "") -> dict[str, Any]:
         k = self._now().start.operation

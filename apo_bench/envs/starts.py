@@ -154,12 +154,11 @@ class Trials(NamedTuple):
         start = prepare(made.plan, scene, k, error, feels, (robot.wrench, (*key, 1)))
         if isinstance(start, Outcome):
             return start
-        truth = simulated.layout.goals
-        before = judged(scene, start.after, start.after[-1], truth[:k]) if k else None
+        before = judged(scene, start.after, start.after[-1], simulated.layout.goals[:k]) if k else None
         if before is not None and not before.success:
             code = before.rests_on.code
             return Outcome("judge", code, None, f"what was put before is not right: {before.rests_on.why or code}")
-        return Begun(trial, start, made.plan, error, truth, _stated(seen, made.correction, told))
+        return Begun(trial, start, made.plan, error, simulated.layout.goals, _stated(seen, made.correction, told))
 
     def go_on(self, begun: Begun, control: TipControl, reached: Snapshot) -> Begun | Outcome:
         """The start of the next operation, after somebody has done one; or what failed on the way there."""

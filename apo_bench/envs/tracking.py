@@ -68,8 +68,7 @@ def first_seen(observation: Observation, m: int) -> Observation:
     shared = []
     for error in observation.shared:
         kept = [i for i, k in enumerate(error.operations) if k < m]
-        between = error.correlation
-        few = None if between is None else between[np.ix_(kept, kept)]
+        few = None if error.correlation is None else error.correlation[np.ix_(kept, kept)]
         if kept:
             shared.append(replace(error, operations=tuple(error.operations[i] for i in kept), correlation=few))
     tails = observation.tails

@@ -15,9 +15,16 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Poses, Reached, Relation, Snapshot, placements
 from apo_bench.geometry import Array, Overlap, nearest_alike, pose
-from apo_bench.judging.contacts import ContactJudge, ContactMoment, ContactVerdict, Share, face_overlap
+from apo_bench.judging.contacts import (
+    ContactJudge,
+    ContactMoment,
+    ContactVerdict,
+    Judgement,
+    Share,
+    face_overlap,
+    judgement,
+)
 from apo_bench.judging.displaced import displacements, faults_of_place, last_moves
-from apo_bench.judging.judgement import Judgement, judgement
 from apo_bench.records import Criteria, Meaning, Thresholds
 
 

@@ -62,12 +62,11 @@ def check_arrangement(
         if wrong < min(best, _FITS_MM):
             best = wrong
             remedy = f"{sentence}; then all is within {wrong:.1f} mm"
-    fit = arrangement.fit
     pose = arrangement.camera
     missed = f", known places are missed by up to {pose.off_mm:.0f} mm and {pose.off_deg:.0f} deg"
     raise InputError(
-        f"{file}: no contact fits as it is stated (they are open by up to {1e3 * fit.gap_m:.0f} mm and "
-        f"{np.degrees(fit.angle_rad):.0f} deg{missed if pose.residuals else ''}); {remedy}."
+        f"{file}: no contact fits as it is stated (they are open by up to {1e3 * arrangement.fit.gap_m:.0f} mm and "
+        f"{np.degrees(arrangement.fit.angle_rad):.0f} deg{missed if pose.residuals else ''}); {remedy}."
     )
 
 

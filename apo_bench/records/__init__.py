@@ -16,19 +16,25 @@ from apo_bench.records.robot_error import (
     wrench_noise,
 )
 from apo_bench.records.row import (
+    KEY,
     LARGEST_NUMBER,
     LONGEST_SENTENCE,
     REQUIRED,
     ROW_FIELDS,
     FreedSet,
+    Key,
     MovedInHand,
     Predicted,
     Row,
     finite,
+    in_python,
     look_up,
+    row_key,
+    setting_columns,
+    settings_of,
+    trial_key,
 )
 from apo_bench.records.salt import Salt, check_same_salt, one_salt, read_salt, salt_of_sweep, with_salt
-from apo_bench.records.setting_columns import KEY, Key, in_python, row_key, setting_columns, settings_of, trial_key
 from apo_bench.records.setting_info import SettingInfo
 from apo_bench.records.settings import (
     ENV_ID,

@@ -14,8 +14,7 @@ import numpy as np
 from apo_bench.assembly import Layout, Poses
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, extent, physical_pieces, pose
-from apo_bench.insertion.arrival import Arrival, Preference
-from apo_bench.insertion.operations import OperationMacros, understand
+from apo_bench.insertion.arrival import Arrival, OperationMacros, Preference, understand
 from apo_bench.scenario.scenario import Scenario
 
 

@@ -174,9 +174,8 @@ def _is_on(direction: Direction, face: RoundFace) -> bool:
 
 def _about(free: FreeDirection) -> str:
     """The point of a turn, if it is not the origin of the part."""
-    point = free.direction.point
-    is_off = free.direction.turns and np.abs(point).max() >= _OFF_M
-    return f" about ({', '.join(f'{x * 1e3:.0f}' for x in point)}) mm" if is_off else ""
+    is_off = free.direction.turns and np.abs(free.direction.point).max() >= _OFF_M
+    return f" about ({', '.join(f'{x * 1e3:.0f}' for x in free.direction.point)}) mm" if is_off else ""
 
 
 def _free(free: FreeDirection) -> str:

@@ -148,7 +148,6 @@ def draw_sensor(run: SensorRun, out: Path, view: int = 0) -> None:
     from matplotlib.figure import Figure
 
     events = run.events
-    assembly = run.simulated.demonstration.assembly
     figure = Figure(figsize=(15.0, 2.55 * max(1, len(events)) + 0.3), layout="constrained")
     rows = figure.subplots(max(1, len(events)), len(_TITLES), squeeze=False)
     for axes, title in zip(rows[0], _TITLES, strict=True):
@@ -156,7 +155,7 @@ def draw_sensor(run: SensorRun, out: Path, view: int = 0) -> None:
     for axes in rows.ravel():
         axes.set(xticks=[], yticks=[])
     for row, event in zip(rows, events, strict=False):
-        row[0].set_ylabel(_label(assembly, event), fontsize=9)
+        row[0].set_ylabel(_label(run.simulated.demonstration.assembly, event), fontsize=9)
         _draw_row(row, run.watched, run.images, event, view)
     # only where anything ever changed is shown
     changed = [event.regions[view].appeared | event.regions[view].vanished for event in events]

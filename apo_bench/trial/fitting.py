@@ -102,8 +102,7 @@ def fitting_plan(
 
 def _fault(scene: Scene, plan: Plan) -> str | None:
     """What is foretold to fail, or out of reach; empty where contacts are off, None if nothing is wrong."""
-    scenario = scene.scenario
-    prediction = predict(plan, scene.clearance_mm, scenario.thresholds, scenario.attach)
+    prediction = predict(plan, scene.clearance_mm, scene.scenario.thresholds, scene.scenario.attach)
     if prediction.fails:
         return prediction.sentence if prediction.mendable else ""
     return None if in_reach(plan, scene) else "the arm would not reach all of it"
@@ -111,8 +110,7 @@ def _fault(scene: Scene, plan: Plan) -> str | None:
 
 def _measured(scene: Scene, plan: Plan, room_mm: float = 0.0) -> tuple[Measure, ...]:
     """Everything that a plan is measured by, as `predict` does it."""
-    scenario = scene.scenario
-    return tuple(measures(plan, scene.clearance_mm, scenario.thresholds, scenario.attach, room_mm))
+    return tuple(measures(plan, scene.clearance_mm, scene.scenario.thresholds, scene.scenario.attach, room_mm))
 
 
 def _goals_that_fit(plan: Plan, believed: Observation, scene: Scene) -> Array | None:
@@ -158,9 +156,8 @@ def _limits(before: tuple[Measure, ...], with_room: tuple[Measure, ...], room_mm
 
 def _earlier_gaps(plan: Plan) -> list[Array]:
     """The largest |e| of each contact each time before work is taken apart, [m]."""
-    assembly = plan.assembly
     return [
-        equations(assembly.first(upto), plan.start, goals[:upto]).gaps(goals[:upto])
+        equations(plan.assembly.first(upto), plan.start, goals[:upto]).gaps(goals[:upto])
         for upto, goals in goals_in_force(plan)[:-1]
     ]
 

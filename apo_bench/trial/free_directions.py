@@ -207,11 +207,10 @@ def shortest_above(G: Array, h: Array) -> Array | None:
 def _held(observation: Observation, goals: Array) -> _Held:
     """The contacts that hold as they are demanded of `contact`, or as equations where some do not hold so."""
     assembly = observation.assembly
-    tolerance = observation.gap_m
     plain = equations(assembly, observation.start, goals)
     system, exact, inequalities = demanded(plain, assembly, observation.play_m)
     off = violations(system, exact, inequalities, goals)
-    if (off > tolerance).any():
+    if (off > observation.gap_m).any():
         none = np.zeros(0)
         system = plain
         exact = np.ones_like(exact)
@@ -224,7 +223,7 @@ def _held(observation: Observation, goals: Array) -> _Held:
         compact,
         exact,
         inequalities,
-        off <= tolerance,
+        off <= observation.gap_m,
         limits,
         _factor(observation),
     )

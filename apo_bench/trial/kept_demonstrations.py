@@ -125,10 +125,9 @@ def _made_with() -> str:
 
 def _written(key: str, simulated: SimulatedDemonstration) -> str:
     human = simulated.demonstration
-    layout = simulated.layout
     content = {
-        "truth": layout.goals.tolist(),
-        "start": {part: T.tolist() for part, T in layout.start.items()},
+        "truth": simulated.layout.goals.tolist(),
+        "start": {part: T.tolist() for part, T in simulated.layout.start.items()},
         "goals": human.goals.tolist(),
         "final": {part: T.tolist() for part, T in human.final.items()},
         "careless": human.careless.tolist(),

@@ -143,8 +143,7 @@ def predicted_outcome(plan: Plan, scene: Scene, searches: bool = False) -> Predi
         searches: As in `replay_and_judge`.
     """
     arm = arm_moves(plan, scene, searches)
-    scenario = scene.scenario
-    prediction = predict(plan, scene.clearance_mm, scenario.thresholds, scenario.attach, arm)
+    prediction = predict(plan, scene.clearance_mm, scene.scenario.thresholds, scene.scenario.attach, arm)
     operation = None if prediction.operation is None else prediction.operation + 1
     predicted: Predicted = {
         "fails": prediction.fails,
@@ -232,13 +231,11 @@ def replay_and_judge(
 
 def trial_outcome(attempt: Attempt) -> Outcome:
     """Physics decides: what is right is done, and of what is wrong the robot's own word comes first."""
-    outcome = attempt.result.outcome
-    verdict = attempt.verdict
-    if verdict.success:
+    if attempt.verdict.success:
         return Outcome("done", "ok", None, sentence("ok"))
-    if outcome.failed:
-        return outcome
-    conditions = verdict.rests_on
+    if attempt.result.outcome.failed:
+        return attempt.result.outcome
+    conditions = attempt.verdict.rests_on
     why = f": {conditions.why}" if conditions.why else ""
     return Outcome("judge", conditions.code, None, sentence(conditions.code) + why)
 

@@ -16,8 +16,7 @@ from statsmodels.stats.proportion import proportion_confint
 from apo_bench import InputError
 from apo_bench.records import ROW
 from apo_bench.report.figures.levels import success_figure
-from apo_bench.report.figures.sheet import draw
-from apo_bench.report.figures.styles import OWN_STYLES, STYLES
+from apo_bench.report.figures.sheet import OWN_STYLES, STYLES, draw
 from apo_bench.report.report import report
 from apo_bench.report.tables.cells import cell_table
 from apo_bench.report.tables.methods import prediction_summary

@@ -70,14 +70,13 @@ def _ranked(
     problem: Problem, kept: NDArray[np.bool_], groups: Sequence[tuple[str, tuple[int, ...]]]
 ) -> tuple[Suspect, ...]:
     """Groups of contacts, left out in turn: by p-value, and where that underflows by how far chi-square is off."""
-    assembly = problem.observation.assembly
-    relations = assembly.relations()
+    relations = problem.observation.assembly.relations()
     ranked = list[Suspect]()
     for name, group in groups:
         rest = kept.copy()
         rest[list(group)] = False
         test = tested(problem, rest)
-        contacts = tuple(dict.fromkeys(assembly.given(relations[j].contact) for j in group))
+        contacts = tuple(dict.fromkeys(problem.observation.assembly.given(relations[j].contact) for j in group))
         numbers = test.chi_square, test.freedom, test.p_value
         ranked.append(Suspect(name, contacts, relations[group[0]].made, *numbers))
     # A chi-square of f degrees of freedom has mean f and variance 2 f.
@@ -212,7 +211,6 @@ class ContactCorrector:
             test_before: The test before anything was dropped; None if that is the one of what was solved.
         """
         gap_m = problem.observations[i].gap_m
-        rank = solved.rank
         test = test_before or solved.test
         status = _status(solved, gap_m)
         if status == "converged" and self.doubt in ("refuse", "drop") and not solved.test.passes:
@@ -230,9 +228,9 @@ class ContactCorrector:
             freed=problem.laid.pattern.freed,
             gap_before_m=before_m,
             gap_after_m=solved.worst_m,
-            rank=rank,
+            rank=solved.rank,
             # The rank is known where the solver ended only, and stands in every iterate.
-            trace=tuple([Iterate(open_m, rank, step) for open_m, step in solved.trace]),
+            trace=tuple([Iterate(open_m, solved.rank, step) for open_m, step in solved.trace]),
             test=test,
             test_after=solved.test if dropped and test_before else None,
             covariance=solved.covariance if status == "converged" else None,

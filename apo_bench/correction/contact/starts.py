@@ -81,8 +81,7 @@ def _faces_oppose(problem: Problem, *goals: Array) -> bool:
 
 def _is_flush(problem: Problem, solved: Solved) -> bool:
     """Whether contacts also hold with vertices laid where the goals are: seen edge-on, they lie on one line."""
-    goals = solved.goals
-    return largest(_begun_at(problem, goals).gaps(goals[None])) <= problem.observation.gap_m
+    return largest(_begun_at(problem, solved.goals).gaps(solved.goals[None])) <= problem.observation.gap_m
 
 
 def _begun_at(problem: Problem, goals: Array) -> Problem:
@@ -95,11 +94,10 @@ def _starts(problem: Problem, first: Solved) -> Array:
     observation = problem.observation
     doubted = _doubted(problem, first)
     n = len(observation.goals)
-    solids = observation.assembly.solids
     starts = [inferred_goals(observation, some).goals for some in (*((k,) for k in doubted), tuple(range(n)))]
     turned = [observation.goals]
     for k in doubted:
-        for g in symmetries(solids[observation.assembly.operations[k].main])[1:]:
+        for g in symmetries(observation.assembly.solids[observation.assembly.operations[k].main])[1:]:
             goals = np.array(observation.goals)
             goals[k] = goals[k] @ g
             turned.append(goals)

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly, Contact, PartFace, Pattern
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.solvers.compact import CompactEquations, moments
-from apo_bench.correction.solvers.pose_products import Words
+from apo_bench.correction.solvers.compact import CompactEquations, Words, moments
 from apo_bench.geometry import Array, frozen, pose, remembered
 
 LARGEST_CORRELATED = 300

@@ -65,7 +65,6 @@ def fit_noise(residuals: Residuals, source: str) -> MeasuredNoise:
         InputError: Too few inliers, or they are all exactly right.
     """
     found = residuals.found
-    inlier = residuals.inlier
     upright = residuals.upright
     known = residuals.turn_known
     near = f"{INLIER_MM:g} mm and {TURNED_DEG:g} deg"
@@ -75,13 +74,13 @@ def fit_noise(residuals: Residuals, source: str) -> MeasuredNoise:
                 f"{int(kept.sum())} of {len(kept)} parts have an estimate within {limit}; at least {_FEWEST} are "
                 "needed for a fit, so give more images, or the truth of the same ones."
             )
-    far = residuals.off_mm[found & ~inlier]
+    far = residuals.off_mm[found & ~residuals.inlier]
     return MeasuredNoise(
         source=source,
         shift_mm=fit_split(residuals.shift_mm[upright], INLIER_MM, "places"),
         turn_deg=fit_split(residuals.turn_deg[known], TURNED_DEG, "rotations"),
         missed=float(1.0 - found.mean()),
-        outliers=float(1.0 - inlier.sum() / found.sum()),
+        outliers=float(1.0 - residuals.inlier.sum() / found.sum()),
         farthest_mm=INLIER_MM * float(np.exp(2.0 * np.log(far / INLIER_MM).mean())) if len(far) else 2.0 * INLIER_MM,
     )
 
@@ -137,15 +136,14 @@ def outliers_by_score(residuals: Residuals) -> tuple[Band, ...]:
 
 def goodness_of_fit(residuals: Residuals, measured: MeasuredNoise) -> tuple[Figures, ...]:
     """Goodness of fit: of the four distributions that were fitted, to what they were fitted to."""
-    upright = residuals.upright
     shift = measured.shift_mm
     turn = measured.turn_deg
     turned = residuals.turn_deg[residuals.turn_known]
     tilt = np.linalg.norm(turned[:, :2], axis=1)
     about = np.abs(turned[:, 2])
     return (
-        _figures("across the ray", "mm", residuals.across_mm[upright], shift.cdf_across, shift.limit),
-        _figures("along the ray", "mm", residuals.along_mm[upright], shift.cdf_along, shift.limit),
+        _figures("across the ray", "mm", residuals.across_mm[residuals.upright], shift.cdf_across, shift.limit),
+        _figures("along the ray", "mm", residuals.along_mm[residuals.upright], shift.cdf_along, shift.limit),
         _figures("tilt", "deg", tilt, turn.cdf_across, turn.limit),
         _figures("turn about the ray", "deg", about, turn.cdf_along, turn.limit),
     )

@@ -227,11 +227,10 @@ def observe_in_ray_frames(
 
 def _gross(measured: MeasuredNoise, n: int, rng: np.random.Generator) -> Array:
     """Errors (n, 6) of outliers, [mm, deg]: any direction, any rotation."""
-    limit = measured.shift_mm.limit
     # Gaussian vectors have any direction alike often, Gaussian quaternions any rotation; log-uniform sizes.
     direction = rng.standard_normal((n, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    size = limit * (measured.farthest_mm / limit) ** rng.random((n, 1))
+    size = measured.shift_mm.limit * (measured.farthest_mm / measured.shift_mm.limit) ** rng.random((n, 1))
     q = rng.standard_normal((n, 4))
     turned = pose.log(pose.unpack(np.concatenate([np.zeros((n, 3)), q], axis=1)))[:, 3:]
     return np.concatenate([direction * size, np.degrees(turned)], axis=1)

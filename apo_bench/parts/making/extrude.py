@@ -173,9 +173,8 @@ def _sides(outline: Outline, low: float, high: float, hole: bool) -> tuple[list[
     arcs = [arc_of(outline, i) for i in range(len(outline))]
     for i, (edge, arc) in enumerate(zip(outline, arcs, strict=True)):
         if arc is None:
-            a = edge.start
             b = outline[(i + 1) % len(outline)].start
-            corners = np.array([(*a, low), (*b, low), (*b, high), (*a, high)])
+            corners = np.array([(*edge.start, low), (*b, low), (*b, high), (*edge.start, high)])
             flats.append(Face(edge.name, 1e-3 * (corners[::-1] if hole else corners), fit=edge.fit))
             continue
         if goes_on(arcs[i - 1], arc) and outline[i - 1].name == edge.name and i > 0:

@@ -154,9 +154,8 @@ def _inside(face: Face) -> Array:
 
 def stated_text(solid: Solid, density: float, friction: Sequence[float], source: str, licence: str) -> str:
     """The text of `NAME.toml`."""
-    J = solid.inertia
-    assert J is not None
-    six = 1e15 * J[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    assert solid.inertia is not None
+    six = 1e15 * solid.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     lines = [
         f'schema = "{PART_SCHEMA}"',
         f"source = {_quoted(source)}",

@@ -57,7 +57,6 @@ def drawing_of(
     recording: ImportedRecording, log: Log, tracks: Mapping[str, PoseTrack], camera: CameraFile
 ) -> RecordingDrawing:
     """Of a recording that was understood."""
-    operations = recording.scenario.assembly.operations
     return RecordingDrawing(
         title=_title(log, recording.scenario),
         tracks=tracks,
@@ -65,7 +64,7 @@ def drawing_of(
         T_world_camera=recording.camera.T_world_camera,
         ended=[
             (operation.main, seen.rest.begins)
-            for operation, seen in zip(operations, recording.operations, strict=True)
+            for operation, seen in zip(recording.scenario.assembly.operations, recording.operations, strict=True)
             if seen.rest is not None
         ],
         solids=recording.scenario.assembly.solids,

@@ -169,9 +169,8 @@ def _paths(recording: ImportedRecording) -> Iterator[str]:
 def _rest_cells(rest: RestSpan, X: Array) -> list[str]:
     m, rad = per_axis(rest.mean.scatter)
     begins, ends, *place = (f"{x:.2f}" for x in (rest.begins, rest.ends, *(1e3 * (X @ rest.T)[:3, 3])))
-    inlier = rest.mean.inlier
     off = f"{1e3 * m:.2f} mm {np.degrees(rad):.2f} deg"
-    return [begins, ends, str(len(inlier)), str(int((~inlier).sum())), *place, off]
+    return [begins, ends, str(len(rest.mean.inlier)), str(int((~rest.mean.inlier).sum())), *place, off]
 
 
 def _pose_text(T: Array) -> str:

@@ -18,11 +18,10 @@ from typing import IO, Any, Self, cast, final
 
 from apo_bench.errors import InputError, require
 from apo_bench.io import check_target, each_line, is_there, put_back, to_write
-from apo_bench.records.row import ROW_FIELDS, Predicted, Row
+from apo_bench.records.row import ROW_FIELDS, Key, Predicted, Row, row_key
 from apo_bench.records.run.run_file import check_same, write_run
 from apo_bench.records.run.validation import row_of, unwritable
 from apo_bench.records.salt import check_same_salt
-from apo_bench.records.setting_columns import Key, row_key
 
 CHUNK = 1 << 16
 

@@ -22,8 +22,7 @@ from apo_bench.io import (
     is_whole,
     read_whole,
 )
-from apo_bench.records.row import LATER, REQUIRED, ROW_FIELDS, Row
-from apo_bench.records.setting_columns import KEY
+from apo_bench.records.row import KEY, LATER, REQUIRED, ROW_FIELDS, Row
 from apo_bench.records.settings import OLDER_ROWS, ROW, Name, TrialSettings
 
 _Text = Annotated[str, Meta(max_length=100_000)]

@@ -7,8 +7,7 @@ from typing import Any
 
 from apo_bench.io import grouped
 from apo_bench.records import STAGES, knows_truth
-from apo_bench.report.figures.sheet import WIDTH, Entry, Figure, Panel, Tips
-from apo_bench.report.figures.styles import INK, SOFT, STAGE_COLORS, SUCCESS
+from apo_bench.report.figures.sheet import INK, SOFT, STAGE_COLORS, SUCCESS, WIDTH, Entry, Figure, Panel, Tips
 from apo_bench.statistics import ALL, Cell, Confusion, Setting, TrialTimes, level_of, level_words, percent
 
 _LEFT = 138

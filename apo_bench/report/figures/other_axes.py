@@ -17,8 +17,7 @@ from apo_bench.report.figures.levels import (
     success_figure,
 )
 from apo_bench.report.figures.lines import Axis, MethodLine, Point, dodges, entries, levels_axis, line_panel
-from apo_bench.report.figures.sheet import DrawnFigure, Figure, Panel, draw
-from apo_bench.report.figures.styles import styles
+from apo_bench.report.figures.sheet import DrawnFigure, Figure, Panel, draw, styles
 from apo_bench.statistics import (
     Cell,
     Confusion,

@@ -17,8 +17,7 @@ from markupsafe import Markup, escape
 from apo_bench.io import grouped
 from apo_bench.records import RANGE, Limits, Row, knows_truth, look_up, one_salt
 from apo_bench.records.run.replay_command import Files, replay_command
-from apo_bench.report.figures.sheet import DrawnFigure
-from apo_bench.report.figures.styles import dark_properties
+from apo_bench.report.figures.sheet import DrawnFigure, dark_properties
 from apo_bench.report.page.cells import matrices, packed_json, trials
 from apo_bench.report.run.trials import FailurePicture, limits_of, run_facts, scenario_files, why
 from apo_bench.report.tables.table import Table

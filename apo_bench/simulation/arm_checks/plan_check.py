@@ -198,11 +198,10 @@ def _centroid(parts: Iterable[tuple[Solid, Array]]) -> Array:
 
 def _sag(scene: Scene, q: Array, centroid: Array, weight_n: float) -> Array:
     """Where a weight takes the tip, and what it holds: servos give way by their torque over their stiffness."""
-    kinematics = scene.kinematics
-    tip = kinematics.forward(q)[:3, 3]
+    tip = scene.kinematics.forward(q)[:3, 3]
     # Joint torques of a wrench at the tip are J^T w; each servo gives way by torque over stiffness, and J takes that to
     # a twist of the tip, which turns about the tip: there exp(twist) back.
-    J = _jacobian(kinematics)
+    J = _jacobian(scene.kinematics)
     stiffness = np.array([scene.work.model.actuator(f"arm/{name}").gainprm[0] for name in scene.arm.joints])
     force = np.array([0.0, 0.0, -weight_n])
     wrench = np.concatenate([force, np.cross(centroid - tip, force)])

@@ -82,8 +82,7 @@ class Kinematics:
         """The pose of the tip, (4, 4), world."""
         self._full[self.adr] = q
         self.configuration.update(self._full)
-        data = self.configuration.data
-        return frame(data.site_xmat[self.site], data.site_xpos[self.site])
+        return frame(self.configuration.data.site_xmat[self.site], self.configuration.data.site_xpos[self.site])
 
     def jacobian(self, q: Array) -> Array:
         """The body Jacobian of the tip, (6, joints): its twist in its own frame, [m, rad], per radian of each joint."""

@@ -35,9 +35,8 @@ def transfer_grips(
         believed: Where all parts are before the transfer.
         after: Where all parts are after it.
     """
-    solids = scene.scenario.assembly.solids
-    start = RestingPart(believed[part], obstacles(solids, believed, (part,)))
-    goal = RestingPart(after[part], obstacles(solids, after, (part,)))
+    start = RestingPart(believed[part], obstacles(scene.scenario.assembly.solids, believed, (part,)))
+    goal = RestingPart(after[part], obstacles(scene.scenario.assembly.solids, after, (part,)))
     if into.level:
         stroke = Stroke(goal.T, into.way, into.travel, goal.around)
         grips = grips_along(scene, part, preferred, (start,), stroke)

@@ -191,11 +191,10 @@ def operation_words(assembly: Assembly, moment: FilmMoment) -> str:
 
 
 def _lines(assembly: Assembly, moment: FilmMoment) -> tuple[str, ...]:
-    k = moment.doing.operation
     words = operation_words(assembly, moment)
-    if k is None:
+    if moment.doing.operation is None:
         return (words,)
-    return (words, shortened("; ".join(map(str, assembly.operations[k].contacts))))
+    return (words, shortened("; ".join(map(str, assembly.operations[moment.doing.operation].contacts))))
 
 
 def framing(assembly: Assembly, states: Sequence[Poses]) -> tuple[Array, float]:

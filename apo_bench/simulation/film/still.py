@@ -108,9 +108,8 @@ def scenario_chapter(scene: Scene, start: Poses, goals: Array) -> Chapter:
 
 def part_poses(chapter: Chapter, moment: FilmMoment) -> Poses:
     """Where every part is, world frame, [m]."""
-    world = chapter.world
-    free = {part: pose.unpack(moment.qpos[a : a + 7]) for part, a in world.qpos.items()}
-    return {**{part: chapter.start[part] for part in world.fixed}, **free}
+    free = {part: pose.unpack(moment.qpos[a : a + 7]) for part, a in chapter.world.qpos.items()}
+    return {**{part: chapter.start[part] for part in chapter.world.fixed}, **free}
 
 
 def show_moment(scene: Scene, data: Any, chapter: Chapter, moment: FilmMoment) -> None:
@@ -217,10 +216,9 @@ def body_poses(data: Any) -> Array:
 
 def part_meshes(world: World, part: str) -> tuple[BodyMesh, ...]:
     """The meshes of one part, in the frame of the part."""
-    model = world.model
     root = world.body[part]
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    data = mujoco.MjData(world.model)
+    mujoco.mj_kinematics(world.model, data)
     inverse = pose.inverse(pose.unpack([*data.xpos[root], *data.xquat[root]]))
     moved = []
     for mesh in body_meshes(world):

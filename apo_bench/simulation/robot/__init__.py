@@ -1,7 +1,6 @@
 """The arm in motion: lines followed, contacts felt."""
 
 from apo_bench.simulation.robot.by_wrist import comply, press, reading, servo, wrist_of, zero
-from apo_bench.simulation.robot.forces import Guard, LowPass
 from apo_bench.simulation.robot.gripper import ArmAlone, HasGripper, gripper_boxes
 from apo_bench.simulation.robot.in_hand import TINY_S, HoldWatch, take_along, weld
 from apo_bench.simulation.robot.obstacles import Moving, Obstacle, near_spans, obstacle
@@ -18,7 +17,16 @@ from apo_bench.simulation.robot.paths import (
 from apo_bench.simulation.robot.reach import at_end, led_there, way_there
 from apo_bench.simulation.robot.robot import Halt, Robot
 from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, READING_S, WristSensor, felt_noise, low_pass_part, part_loads
+from apo_bench.simulation.robot.wrist import (
+    BANDWIDTH_HZ,
+    READING_S,
+    Guard,
+    LowPass,
+    WristSensor,
+    felt_noise,
+    low_pass_part,
+    part_loads,
+)
 
 __all__ = (
     "BANDWIDTH_HZ",

@@ -10,11 +10,10 @@ import numpy as np
 
 from apo_bench.geometry import Array, pose
 from apo_bench.records import wrench_noise
-from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.robot.paths import Trajectory, shifted
 from apo_bench.simulation.robot.reach import turned_by
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, WristSensor, hand_load
+from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, Guard, WristSensor, hand_load
 from apo_bench.simulation.scene import wrist_felt
 
 ZERO_S = 0.5
@@ -150,12 +149,11 @@ def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wri
 
 def _joint_turns(robot: Robot, q: Array, about: Array) -> Array:
     """How the joints turn, (6, joints), per metre along each axis and per radian about each through a point."""
-    kinematics = robot.scene.kinematics
-    T = kinematics.forward(q)
+    T = robot.scene.kinematics.forward(q)
     to = pose.at(about)
     T_point_tip = pose.inverse(to) @ T
     turns = []
     for ways, by in ((np.eye(6)[:3], _SHIFT_M), (np.eye(6)[3:], _TURN_RAD)):
         ends = [(to @ pose.exp(-by * way) @ T_point_tip, to @ pose.exp(by * way) @ T_point_tip) for way in ways]
-        turns.append(robot.reached(turned_by(kinematics, ends, q, by)))
+        turns.append(robot.reached(turned_by(robot.scene.kinematics, ends, q, by)))
     return np.vstack(turns)

@@ -234,7 +234,6 @@ class DemonstrationCamera:
         self._spell.clear()
 
     def _fire(self, time_s: float, qpos: Array) -> None:
-        view = self.camera.view
-        self._pictures.append(self._grey(qpos).reshape(view.height, view.width))
+        self._pictures.append(self._grey(qpos).reshape(self.camera.view.height, self.camera.view.width))
         self._images.append(self._sight.range_image(self.finder))
         self._times.append(time_s)

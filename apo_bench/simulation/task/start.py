@@ -130,7 +130,6 @@ def _held(
     Args:
         left: What is wrong with the robot and not made up for.
     """
-    scene = robot.scene
     robot.step, t = move
     k = robot.step.operation
     if not t.into.level and t.mouths:
@@ -144,7 +143,7 @@ def _held(
             laying = None if t.flush is None else partial(lay, robot, feeling, k)
         grip, second = before_attach(robot, t, i, laying)
         wrist = wrist_of(robot, wrench[0], np.random.default_rng(wrench[1]))
-        wrist.hold(*part_loads(scene, {t.part: pose.inverse(grip.T_part_tip)}))
+        wrist.hold(*part_loads(robot.scene, {t.part: pose.inverse(grip.T_part_tip)}))
         zero(robot, wrist)
     except Halt as halt:
         return Outcome(halt.stage, halt.code, k, sentence(halt.code, part=halt.part or t.part, operation=k))
@@ -155,7 +154,7 @@ def _held(
         grip=grip,
         second=second,
         way=t.into.way if left is None else left.hand_eye[:3, :3].T @ t.into.way,
-        off=np.zeros(len(scene.arm.joints)) if left is None else left.joints,
+        off=np.zeros(len(robot.scene.arm.joints)) if left is None else left.joints,
         saved=saved_state(robot, i, progress),
         wrist=wrist.at(np.zeros(len(robot.data.sensordata)), _nowhere, np.random.default_rng(0)),
         after=tuple(progress.after[:k]),

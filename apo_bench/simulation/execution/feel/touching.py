@@ -96,9 +96,8 @@ def _room(robot: Robot, feeling: Feeling, place: TouchPlace) -> str:
 
 def _touched(robot: Robot, feeling: Feeling, place: TouchPlace) -> list[tuple[Touch, Array]]:
     """Go there, press, come back; what it tells, if anything was felt, and what of the hand may have touched."""
-    E = feeling.residual.hand_eye
-    T = E @ place.T_world_tip @ feeling.residual.tool
-    way = E[:3, :3] @ place.way
+    T = feeling.residual.hand_eye @ place.T_world_tip @ feeling.residual.tool
+    way = feeling.residual.hand_eye[:3, :3] @ place.way
     high = max(robot.T[2, 3], T[2, 3] + _HIGH_M)
     robot.follow(smooth(robot.T, with_height(robot.T, high), _OVER))
     rest = robot.scene.kinematics.forward(robot.scene.arm.home)
