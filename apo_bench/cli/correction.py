@@ -6,7 +6,7 @@ from typing import Annotated, Any, cast
 import typer
 
 from apo_bench.assembly import Correction, Observation, Plan
-from apo_bench.cli.printing import print_json, print_lines, print_tables
+from apo_bench.cli.printing import print_json, print_lines, print_tables, say
 from apo_bench.cli.setting_options import NO_RESULT, AsJson, ScenarioArgument, check_outputs, writing
 from apo_bench.errors import require
 from apo_bench.files.observation import as_planned, read_observation_file
@@ -76,8 +76,7 @@ def explain_command(
         from apo_bench.show.explain_picture import draw_explanation
 
         draw_explanation(loaded, seen, explanation, out)
-        if not as_json:
-            typer.echo(f"\nWrote {out}")
+        say(f"\nWrote {out}", as_json)
 
 
 def correct_command(
@@ -150,8 +149,7 @@ def correct_command(
         raise typer.Exit(NO_RESULT)
     if out is not None and plan is not None:
         _write_plan(out, scenario, loaded.name, plan)
-        if not as_json:
-            typer.echo(f"Wrote {out}{moved and f': {moved}'}")
+        say(f"Wrote {out}{moved and f': {moved}'}", as_json)
 
 
 def _explained(observation: Observation, correction: Correction) -> Any:

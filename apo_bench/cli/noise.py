@@ -5,27 +5,15 @@ from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.printing import Grouped, print_json
+from apo_bench.cli.printing import group, print_answer, say
 from apo_bench.cli.setting_options import NO_RESULT, AsJson, check_outputs, writing
 from apo_bench.errors import require
 from apo_bench.records import check
 
 _HELP = "Noise models: list, cards, fits to measured poses, noise learned from observations."
 _NAME = "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name."
-noise = typer.Typer(name="noise", cls=Grouped, rich_markup_mode=None, help=_HELP)
-
-_Picture = Annotated[Path | None, typer.Option(help="Draw seen and fitted into this file: .png.")]
-_Source = Annotated[str | None, typer.Option(help="What the noise file says it is of; default: the files.")]
 
 
-@noise.callback(invoke_without_command=True)
-def _without_command(context: typer.Context) -> None:
-    """List the noise models, or read the card of one."""
-    if context.invoked_subcommand is None:
-        noise_list()
-
-
-@noise.command("list")
 def noise_list() -> None:
     """List the noise models that have a name."""
     from apo_bench.show.noise_card import listed_models
@@ -35,6 +23,13 @@ def noise_list() -> None:
     for name, title in models.items():
         typer.echo(f"{name:{width}}  {title}")
     typer.echo("\nThe card of one: apo-bench noise card NAME")
+
+
+noise = group("noise", _HELP, noise_list)
+noise.command("list")(noise_list)
+
+_Picture = Annotated[Path | None, typer.Option(help="Draw seen and fitted into this file: .png.")]
+_Source = Annotated[str | None, typer.Option(help="What the noise file says it is of; default: the files.")]
 
 
 @noise.command("card")
@@ -89,10 +84,7 @@ def noise_fit(
     matched = match_residuals(seen, read_truth(truth, seen, scene_id), scene_id)
     measured = fit.fit_noise(matched, _printable(source or f"{estimates.name} against {truth.name}"))
     goodness = fit.goodness_of_fit(matched, measured)
-    if as_json:
-        print_json(fit_form(matched, measured, goodness))
-    else:
-        typer.echo("\n".join(fit_lines(matched, measured, goodness)))
+    print_answer(fit_form(matched, measured, goodness), fit_lines(matched, measured, goodness), as_json)
     command = f"apo-bench noise fit --estimates {estimates.name} --truth {truth.name}"
     _write_fit(matched, measured, (out, picture), (_printable(command), *fit_notes(matched, measured, goodness)))
     if residuals is not None:
@@ -154,16 +146,12 @@ def noise_learn(
     check_outputs([(out, "--out", (".toml",))])
     named = _printable(source or f"{len(files)} observations of {', '.join(str(path) for path in observations)}")
     learned = learn([read_json_observation(path) for path in files], Camera(), named, constant=constant)
-    if as_json:
-        print_json(learned_form(learned))
-    else:
-        typer.echo("\n".join(learned_lines(learned)))
+    print_answer(learned_form(learned), learned_lines(learned), as_json)
     if out is None:
         return
     with writing(f"--out {out}"):
         out.write_text(noise_text(learned.measured), encoding="utf-8")
-    if not as_json:
-        typer.echo(f"Wrote {out}")
+    say(f"Wrote {out}", as_json)
 
 
 def _write_fit(

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from apo_bench.cli.printing import Grouped, print_json
+from apo_bench.cli.printing import group, print_json, say
 from apo_bench.cli.setting_options import AsJson, check_outputs, path_given, writing
 from apo_bench.errors import InputError, require
 from apo_bench.scenario.file import load_scenario
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from apo_bench.cad.importing import Imported
     from apo_bench.cad.solids.raw_solid import RawSolid
 
-part = typer.Typer(name="part", cls=Grouped, rich_markup_mode=None, help="Parts from CAD files.")
+part = group("part", "Parts from CAD files.")
 
 
 @part.command("import")
@@ -59,13 +59,13 @@ def part_import(
     raws = [renamed(raw, names) for raw in raws]
     with writing(f"--out {out}"):
         out.mkdir(parents=True, exist_ok=True)
-        _say(f"{file}: {unit_line(source)}", as_json)
+        say(f"{file}: {unit_line(source)}", as_json)
         imported, left_out = _written(file, raws, out, density, as_json)
         left_out = [*source.left_out, *left_out]
         places = named_places({each.path.stem: each.raw.places for each in imported})
         poses = write_places(places, out, file.name) if len(places) > 1 else None
     if poses is not None:
-        _say(f"Wrote {poses}: {len(places)} places of {len(imported)} parts", as_json)
+        say(f"Wrote {poses}: {len(places)} places of {len(imported)} parts", as_json)
     if as_json:
         print_json(report_form(source, file, imported, poses))
     require(not left_out, f"{file}: {len(left_out)} of its solids became no parts: {' '.join(left_out)}")
@@ -92,19 +92,14 @@ def _written(
             if len(raws) == 1:
                 raise
             left_out.append(f"{called}: {str(error).removeprefix(f'{file.name}: ')}")
-            _say(f"{called}: NO PART", as_json)
+            say(f"{called}: NO PART", as_json)
             continue
         imported.append(each)
-        _say("\n".join(import_lines(each)), as_json)
+        say("\n".join(import_lines(each)), as_json)
         picture = each.path.with_suffix(".png")
         draw_part(raw, frozenset(each.refused), called, picture)
-        _say(f"Wrote {each.path} and {picture}", as_json)
+        say(f"Wrote {each.path} and {picture}", as_json)
     return imported, left_out
-
-
-def _say(text: str, as_json: bool) -> None:
-    if not as_json:
-        typer.echo(text)
 
 
 def _pairs(renamings: list[str]) -> Mapping[str, str]:
@@ -120,7 +115,7 @@ def _pairs(renamings: list[str]) -> Mapping[str, str]:
     return names
 
 
-arm = typer.Typer(name="arm", cls=Grouped, rich_markup_mode=None, help="Arms: those that come along, and any other.")
+arm = group("arm", "Arms: those that come along, and any other.")
 
 _SIZE = (960, 720)
 _WHOLE_TABLE = (np.array([-0.15, 0.0, 0.3]), 1.9, 140.0, -18.0)

@@ -10,7 +10,7 @@ import numpy as np
 import typer
 
 from apo_bench.assembly import Plan, observed_residuals, relation_graph
-from apo_bench.cli.printing import print_json
+from apo_bench.cli.printing import print_answer, print_json, say
 from apo_bench.cli.setting_options import (
     AsJson,
     ScenarioArgument,
@@ -49,16 +49,13 @@ def graph_command(
     seen = None if observation is None else read_observation(observation, loaded)
     residuals = None if seen is None else observed_residuals(seen, graph)
     gap_m = loaded.gap_mm * 1e-3 if seen is None else seen.gap_m
-    if as_json:
-        print_json(graph_form(loaded.name, graph, residuals))
-    else:
-        typer.echo("\n".join(graph_lines(loaded.name, graph, residuals, gap_m)))
+    lines = graph_lines(loaded.name, graph, residuals, gap_m)
+    print_answer(graph_form(loaded.name, graph, residuals), lines, as_json)
     if out is not None:
         title = graph_title(loaded.name, graph)
         with writing(f"--out {out}"):
             draw_graph(graph, out, title=title, residuals=residuals, gap_m=gap_m, colors=loaded.colors)
-        if not as_json:
-            typer.echo(f"\nWrote {out}")
+        say(f"\nWrote {out}", as_json)
 
 
 @takes(trial_options("clearance_mm", "grasp", "arm", "timestep_s"))

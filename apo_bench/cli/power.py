@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.printing import Grouped, print_json
+from apo_bench.cli.printing import group, print_answer
 from apo_bench.cli.setting_options import AsJson, numbers
 from apo_bench.errors import InputError
 from apo_bench.statistics import (
@@ -29,7 +29,7 @@ _QUESTIONS = """How many trials does it take?
   apo-bench power margin --margin 0.03                  to show that a method is not worse by 3 points
   apo-bench power shows --trials 100                    what so many can show"""
 _SCHEMA = "apo-bench/power/1"
-power = typer.Typer(name="power", cls=Grouped, rich_markup_mode=None, help=_HELP)
+power = group("power", _HELP, lambda: typer.echo(_QUESTIONS))
 
 _Power = Annotated[float, typer.Option(help="How often it shall be shown if it is so.")]
 _Win = Annotated[float | None, typer.Option(help="Share of the seeds at which the method alone is right.")]
@@ -39,13 +39,6 @@ _Agree = Annotated[
     float | None, typer.Option(help="With --rates: share of the seeds at which both end alike; default: by chance.")
 ]
 _Comparisons = Annotated[int, typer.Option(help="How many such tests the report makes; each is held to its share.")]
-
-
-@power.callback(invoke_without_command=True)
-def _without_command(context: typer.Context) -> None:
-    """List the questions that can be asked."""
-    if context.invoked_subcommand is None:
-        typer.echo(_QUESTIONS)
 
 
 @power.command("rate")
@@ -174,7 +167,4 @@ def _held(comparisons: int) -> str:
 
 
 def _say(answer: Mapping[str, Any], words: str, as_json: bool) -> None:
-    if as_json:
-        print_json({"schema": _SCHEMA, **answer})
-    else:
-        typer.echo(words)
+    print_answer({"schema": _SCHEMA, **answer}, [words], as_json)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
@@ -21,6 +21,17 @@ if TYPE_CHECKING:
 def print_json(form: Any) -> None:
     """Print one JSON object."""
     typer.echo(json.dumps(form, allow_nan=False))
+
+
+def print_answer(form: Any, lines: Iterable[str], as_json: bool) -> None:
+    """Print one JSON object, or lines for people."""
+    typer.echo(json.dumps(form, allow_nan=False) if as_json else "\n".join(lines))
+
+
+def say(text: str, as_json: bool) -> None:
+    """Print a text for people, but nothing beside a JSON object."""
+    if not as_json:
+        typer.echo(text)
 
 
 def print_lines(lines: Sequence[tuple[str, str]]) -> None:
@@ -110,3 +121,16 @@ class GroupedOptions(TyperCommand):
             if listed:
                 with formatter.section(heading):
                     formatter.write_dl(listed)
+
+
+def group(name: str, about: str, alone: Callable[[], None] | None = None) -> typer.Typer:
+    """Commands below one name; `alone` is what the name does without any of them."""
+    made = typer.Typer(name=name, cls=Grouped, rich_markup_mode=None, help=about)
+    if alone is not None:
+
+        @made.callback(invoke_without_command=True)
+        def without_command(context: typer.Context) -> None:
+            if context.invoked_subcommand is None:
+                alone()
+
+    return made

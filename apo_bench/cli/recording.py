@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.printing import Grouped, console, print_json, print_lines
+from apo_bench.cli.printing import console, group, print_answer, print_json, print_lines, say
 from apo_bench.cli.setting_options import (
     NO_RESULT,
     AsJson,
@@ -29,7 +29,7 @@ from apo_bench.io import redirect_output
 from apo_bench.records import RECOGNISED
 from apo_bench.scenario.file import load_scenario
 
-recording = typer.Typer(name="recording", cls=Grouped, rich_markup_mode=None, help="Logs of pose trackers.")
+recording = group("recording", "Logs of pose trackers.")
 
 
 @recording.command("import")
@@ -173,16 +173,12 @@ def eye_command(
     drawn_view = checked_view(view)
     sensor_run = run_sensor(scenario, level, seed, careless)
     form = sensor_form(sensor_run, level, seed, careless)
-    if as_json:
-        print_json(form)
-    else:
-        typer.echo("\n".join(sensor_lines(form)))
+    print_answer(form, sensor_lines(form), as_json)
     if out is not None:
         from apo_bench.show.sensor import draw_sensor
 
         draw_sensor(sensor_run, out, drawn_view)
-        if not as_json:
-            typer.echo(f"\nWrote {out}")
+        say(f"\nWrote {out}", as_json)
     if not all(operation["found"] for operation in form["operations"]):
         raise typer.Exit(NO_RESULT)
 

@@ -6,30 +6,22 @@ from typing import Annotated
 
 import typer
 
-from apo_bench.cli.printing import Grouped
+from apo_bench.cli.printing import group
 from apo_bench.cli.setting_options import NO_RESULT, ScenarioArgument, check_writable, path_given
 from apo_bench.errors import InputError, require
 from apo_bench.records import check
 from apo_bench.scenario.file import load_scenario, scenario_names
 
-scenario = typer.Typer(
-    name="scenario", cls=Grouped, rich_markup_mode=None, help="Scenarios: list, task cards, new ones, checks."
-)
 
-
-@scenario.callback(invoke_without_command=True)
-def _without_command(context: typer.Context) -> None:
-    """List the scenarios, or read the card of one."""
-    if context.invoked_subcommand is None:
-        scenario_list()
-
-
-@scenario.command("list")
 def scenario_list() -> None:
     """List the scenarios that come with the package; generated:SEED names any number of others."""
     from apo_bench.cli.terminal import print_scenarios
 
     print_scenarios([load_scenario(name) for name in scenario_names()])
+
+
+scenario = group("scenario", "Scenarios: list, task cards, new ones, checks.", scenario_list)
+scenario.command("list")(scenario_list)
 
 
 @scenario.command("card")

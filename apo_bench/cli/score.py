@@ -12,7 +12,7 @@ from typing import Annotated
 
 import typer
 
-from apo_bench.cli.printing import print_json
+from apo_bench.cli.printing import print_answer, print_json
 from apo_bench.cli.setting_options import AsJson, CorrectorLimit, check_writable, completion, cores, path_given
 from apo_bench.cli.sweep import interrupted
 from apo_bench.errors import InputError, require
@@ -123,11 +123,7 @@ def score_command(
     except KeyboardInterrupt as error:
         raise interrupted(error, "; what had ended is kept, and the same command continues") from error
     write_entry(entry, out)
-    if as_json:
-        print_json(form_of(entry))
-    else:
-        typer.echo("\n".join(entry_lines(entry)))
-        typer.echo(f"Entry: {out}")
+    print_answer(form_of(entry), [*entry_lines(entry), f"Entry: {out}"], as_json)
 
 
 def leaderboard_command(

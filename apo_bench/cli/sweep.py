@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from apo_bench.cli.printing import Grouped
+from apo_bench.cli.printing import group
 from apo_bench.cli.setting_options import (
     CacheFolder,
     CorrectorLimit,
@@ -151,18 +151,13 @@ def _grids(scenarios: list[str], options: Mapping[str, Any]) -> tuple[SweepSetti
     return read_sweep(files[0], others)
 
 
-dataset = typer.Typer(
-    name="dataset", cls=Grouped, rich_markup_mode=None, help="Data to learn from: whole trials as tables."
+dataset = group(
+    "dataset",
+    "Data to learn from: whole trials as tables.",
+    lambda: typer.echo("apo-bench dataset make SCENARIO --episodes 100 --out DIR"),
 )
 _FIRST_SEED = 1_000_000
 """Seeds below are for what is reported."""
-
-
-@dataset.callback(invoke_without_command=True)
-def _without_command(context: typer.Context) -> None:
-    """Say what can be made."""
-    if context.invoked_subcommand is None:
-        typer.echo("apo-bench dataset make SCENARIO --episodes 100 --out DIR")
 
 
 @dataset.command("make")
