@@ -13,7 +13,6 @@ from apo_bench.io.documents import (
     read_whole,
 )
 from apo_bench.io.figures import default_looks, load_matplotlib, save_figure
-from apo_bench.io.grouping import grouped
 from apo_bench.io.ordinary_files import (
     check_folders,
     check_target,
@@ -27,10 +26,9 @@ from apo_bench.io.ordinary_files import (
     to_write,
     write_whole,
 )
-from apo_bench.io.plain_text import CONTROL, UNSHOWN, brief, clean
 from apo_bench.io.processes import SAFE_PATH, descendants, end_descendants, environment, flush, redirect_output
 from apo_bench.io.strict_csv import Columns, CsvRow, check_separator, read_csv, write_columns, write_csv
-from apo_bench.io.words import columns, direction, listed_words, with_article
+from apo_bench.io.words import CONTROL, UNSHOWN, brief, clean, columns, direction, grouped, listed_words, with_article
 
 __all__ = (
     "CONTROL",

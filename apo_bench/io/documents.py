@@ -22,7 +22,7 @@ import numpy as np
 from apo_bench.errors import InputError, one_line, require
 from apo_bench.geometry import Array
 from apo_bench.io.ordinary_files import decoded, read_bytes, read_text
-from apo_bench.io.plain_text import UNSHOWN, clean
+from apo_bench.io.words import UNSHOWN, clean
 
 HALF_LETTER = re.compile("[\ud800-\udfff]")
 """Half a letter, such as a lone \\ud800, which no file can hold as UTF-8."""

@@ -32,8 +32,16 @@ from apo_bench.assembly import (
 )
 from apo_bench.geometry import Array
 from apo_bench.insertion.arrival import Attach
-from apo_bench.prediction.interference import depths_from_above, depths_on_way, physical_solids
-from apo_bench.prediction.resting import between, enters, is_support, residual, resting_poses
+from apo_bench.prediction.resting import (
+    between,
+    depths_from_above,
+    depths_on_way,
+    enters,
+    is_support,
+    physical_solids,
+    residual,
+    resting_poses,
+)
 from apo_bench.prediction.stability import BALANCED, imbalance
 from apo_bench.records import Thresholds
 

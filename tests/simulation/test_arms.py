@@ -14,8 +14,8 @@ from apo_bench.records.run.replay_command import own_code
 from apo_bench.resources import folder
 from apo_bench.show.arm_text import check_lines
 from apo_bench.simulation.arm_checks.arm_check import check_arm, unsaid
+from apo_bench.simulation.arms.arm import ArmDescription, GripperDescription
 from apo_bench.simulation.arms.chain import find_flange
-from apo_bench.simulation.arms.description import ArmDescription, GripperDescription
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.arms.kinematics import Kinematics, tip_down, with_home
 from apo_bench.simulation.arms.loading import compiled, load_model

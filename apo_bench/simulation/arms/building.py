@@ -13,9 +13,8 @@ from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, pose
 from apo_bench.resources import folder
 from apo_bench.simulation.arms.apart import build_apart
-from apo_bench.simulation.arms.arm import Arm, ArmLimits
+from apo_bench.simulation.arms.arm import Arm, ArmDescription, ArmLimits, GripperDescription, read_description
 from apo_bench.simulation.arms.chain import find_flange, find_joints
-from apo_bench.simulation.arms.description import ArmDescription, GripperDescription, read_description
 from apo_bench.simulation.arms.kinematics import with_home
 from apo_bench.simulation.arms.loading import check_surroundings, compiled, files_of, load_model, stated_arm
 from apo_bench.simulation.arms.measuring import Measured, fill_grooves, measure

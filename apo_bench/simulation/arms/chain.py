@@ -7,7 +7,7 @@ import numpy as np
 
 from apo_bench.errors import InputError, require, unknown
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.arms.description import ArmDescription
+from apo_bench.simulation.arms.arm import ArmDescription
 from apo_bench.simulation.arms.rig import geom_reach
 from apo_bench.simulation.frames import frame, rotation
 

@@ -12,8 +12,7 @@ import numpy as np
 from apo_bench.errors import InputError, one_line, require, require_known
 from apo_bench.geometry import pose
 from apo_bench.simulation.arms.allowed import MOST_MESH_BYTES
-from apo_bench.simulation.arms.arm import Arm, ArmLimits
-from apo_bench.simulation.arms.description import ArmDescription, SlideGripper
+from apo_bench.simulation.arms.arm import Arm, ArmDescription, ArmLimits, SlideGripper
 from apo_bench.simulation.arms.tree import checked_size, read_model_tree
 
 _LONGEST = 200

@@ -20,8 +20,7 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
-from apo_bench.simulation.arms.arm import Hand
-from apo_bench.simulation.arms.description import GripperDescription
+from apo_bench.simulation.arms.arm import GripperDescription, Hand
 from apo_bench.simulation.arms.pressing import PROBE_WIDE, force_of
 from apo_bench.simulation.arms.rig import LONGEST_S, Rig, below, command_ends, geom_reach, pads_of, rig_of
 from apo_bench.simulation.frames import frame

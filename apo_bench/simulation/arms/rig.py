@@ -13,7 +13,7 @@ import numpy as np
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, Ints
-from apo_bench.simulation.arms.description import GripperDescription
+from apo_bench.simulation.arms.arm import GripperDescription
 from apo_bench.simulation.physics import physics
 
 STEP_S = 0.001
