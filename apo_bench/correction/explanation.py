@@ -248,7 +248,8 @@ def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, spans: A
         return ()
     final = placements(assembly, start, goals)[-1]
     last = assembly.odls()[-1]
-    words = _rooted(assembly)
+    # The ODLs at the end, in which one operation per part that puts it at its start comes first.
+    words = dict(replace(assembly, operations=(*map(Operation, assembly.solids), *assembly.operations)).odls()[-1])
     stack = np.concatenate([np.array([start[part] for part in assembly.solids]), goals])
     explained = []
     for part in last:
@@ -264,11 +265,6 @@ def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, spans: A
         placing = max(k for k, operation in enumerate(assembly.operations) if part in operation.moves)
         explained.append(PartExplanation(part, placing, last[part], final[part], 6 - len(loose), held(named), loose, C))
     return tuple(sorted(explained, key=lambda one: one.placed))
-
-
-def _rooted(assembly: Assembly) -> dict[str, ODL]:
-    """The ODL of every part at the end, in which one operation per part that puts it at its start comes first."""
-    return dict(replace(assembly, operations=(*map(Operation, assembly.solids), *assembly.operations)).odls()[-1])
 
 
 def _reach(word: ODL, stack: Array, constants: int, n: int) -> Array:

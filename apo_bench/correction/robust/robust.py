@@ -28,7 +28,7 @@ from apo_bench.correction.robust.crowding import least_crowded
 from apo_bench.correction.robust.hypotheses import Case, SolvedHypothesis, as_begun, as_stated
 from apo_bench.correction.robust.noise_scale import LEAST, likeliest_scale, noisier, region_scale, scale_words
 from apo_bench.correction.robust.search import Search
-from apo_bench.correction.robust.views import Sightings, looked_again, views_of
+from apo_bench.correction.robust.views import looked_again, views_of
 from apo_bench.geometry import Array
 
 TEMPERATURE = 3.0
@@ -89,7 +89,7 @@ class RobustCorrector:
         best = None
         while True:
             search = Search(Case(observation, views, model), self.level, self.temperature)
-            baseless = _baseless(observation, views)
+            baseless = inferred_goals(observation, [k for k, own in enumerate(views) if not own]).baseless
             best = None if baseless else search.likeliest(best)
             first = first or search.first
             doubted = baseless or unsure(search, best)
@@ -156,11 +156,6 @@ def with_room(hypothesis: SolvedHypothesis) -> SolvedHypothesis:
 
     better = least_crowded(hypothesis.observation, hypothesis.correction.goals, covariance, unknown, solve)
     return hypothesis if better is None else hypothesis.at(better, unknown)
-
-
-def _baseless(observation: Observation, views: Sightings) -> tuple[int, ...]:
-    """Operations that were never seen and of which no contact says anything."""
-    return inferred_goals(observation, [k for k, own in enumerate(views) if not own]).baseless
 
 
 def _report(
