@@ -103,8 +103,7 @@ def _touched(assembly: Assembly, contact: Contact, rests: PartFace, poses: Poses
         n = -T_moved[:3, :3] @ moved.normal
         yield TouchedContact(contact, rests.part, n, pose.apply(T, still.ends) + still.radius * n)
     else:
-        for n, points in _around(still, T, moved, T_moved):
-            yield TouchedContact(contact, rests.part, n, points)
+        yield from (TouchedContact(contact, rests.part, n, points) for n, points in _around(still, T, moved, T_moved))
 
 
 def _around(still: RoundFace, T: Array, moved: RoundFace, T_moved: Array) -> Iterator[tuple[Array, Array]]:

@@ -229,9 +229,7 @@ def _admissible(macros: Chain, normals: Array, T: Array) -> Iterator[Array]:
     axes = [sign * axis for axis in T[:3, :3].T for sign in (-1.0, 1.0)]
     aslant = normals + _OPENS * normals.sum(axis=0)
     aslant /= np.linalg.norm(aslant, axis=1)[:, None]
-    for way in (UP, *back, *inside, *axes, *aslant, *normals):
-        if cone.admits(way):
-            yield way
+    yield from (way for way in (UP, *back, *inside, *axes, *aslant, *normals) if cone.admits(way))
 
 
 def _directions(along: Array, floors: Sequence[Array], T: Array) -> Iterator[Array]:

@@ -113,8 +113,7 @@ def displaced_together(states: States) -> Iterator[States]:
     # One operation less at either end of a row.
     displaced = [k for k in doubted if states[k] == (DISPLACED,)]
     if len(displaced) > 2:
-        for k in (displaced[0], displaced[-1]):
-            yield changed(states, (k,), ((INLIER,),))
+        yield from (changed(states, (k,), ((INLIER,),)) for k in (displaced[0], displaced[-1]))
 
 
 def false_together(case: Case, start: States) -> Iterator[States]:

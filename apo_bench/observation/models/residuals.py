@@ -166,8 +166,7 @@ def _groups(truth: Any, estimates: Any) -> Iterator[tuple[Any, Any]]:
     """Rows of the truth and of the estimates that are of one object in one image, where there are both."""
     _, key = np.unique(np.concatenate([truth, estimates]), axis=0, return_inverse=True)
     there, seen = (_rows_by_key(keys) for keys in np.split(key.reshape(-1), [len(truth)]))
-    for each in sorted(there.keys() & seen.keys()):
-        yield there[each], seen[each]
+    yield from ((there[each], seen[each]) for each in sorted(there.keys() & seen.keys()))
 
 
 def _rows_by_key(keys: Any) -> dict[int, Any]:

@@ -143,8 +143,7 @@ def each_row(folder: str | Path) -> Iterator[Row]:
         path.exists(),
         f"the folder '{folder}' holds no sweep (no {path.name}); give the one that `apo-bench sweep --out` wrote.",
     )
-    for number, line in each_line(path, "table of trials"):
-        yield row_of(line, f"{path}, line {number}")
+    yield from (row_of(line, f"{path}, line {number}") for number, line in each_line(path, "table of trials"))
 
 
 def _lock(file: int, folder: Path) -> None:
