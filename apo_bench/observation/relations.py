@@ -110,10 +110,8 @@ def _complaint(right: Assembly, wrong: Any) -> str:
 
 def culprit(right: Assembly, wrong: Assembly) -> str | None:
     """The relation (R1, R2, ... of the wrong graph) with a contact that is not a right one; None if there is none."""
-    for arc in relation_graph(wrong).arcs:
-        if not set(arc.contacts) <= set(right.operations[arc.made].contacts):
-            return arc.name
-    return None
+    arcs = relation_graph(wrong).arcs
+    return next((arc.name for arc in arcs if not set(arc.contacts) <= set(right.operations[arc.made].contacts)), None)
 
 
 def missed(assembly: Assembly, start: Poses, goals: Array, rng: np.random.Generator) -> Assembly:

@@ -237,10 +237,7 @@ def place_in_reach(scene: Scene, reaches: Callable[[Scene], bool]) -> str:
     Args:
         reaches: Whether the arm of a scene reaches its scenario.
     """
-    for text, nearer in _places(scene):
-        if reaches(nearer):
-            return text
-    return ""
+    return next((text for text, nearer in _places(scene) if reaches(nearer)), "")
 
 
 def _places(scene: Scene) -> Iterator[tuple[str, Scene]]:
