@@ -9,14 +9,14 @@ from apo_bench.assembly.reached import ReplayResult as ReplayResult
 from apo_bench.assembly.topology import Assembly as Assembly
 from apo_bench.correction.contact.contact import ContactCorrector as ContactCorrector
 from apo_bench.correction.correctors import correct as correct
+from apo_bench.correction.correctors import correct_many as correct_many
 from apo_bench.correction.explanation import explain as explain
-from apo_bench.correction.many import correct_many as correct_many
 from apo_bench.envs.corrected import Corrected as Corrected
 from apo_bench.errors import InputError as InputError
 from apo_bench.files.observation import read_observation as read_observation
 from apo_bench.judging.verdict import Verdict as Verdict
 from apo_bench.judging.verdict import judge as judge
-from apo_bench.observation.observing import observe as observe
+from apo_bench.observation.looking import observe as observe
 from apo_bench.recognition.contacts import recognise as recognise
 from apo_bench.records.settings import TrialSettings as TrialSettings
 from apo_bench.records.thresholds import Criteria as Criteria

@@ -1,6 +1,6 @@
 """The one error a person sees: what was given, what is allowed, what to do."""
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from difflib import get_close_matches
 from typing import Any
 
@@ -57,3 +57,11 @@ def require(holds: object, sentence: str) -> None:
     """Raise an `InputError` with this sentence unless something holds."""
     if not holds:
         raise InputError(sentence)
+
+
+def require_known(kind: str, given: str, allowed: Collection[str], place: object = "", rest: str = "") -> None:
+    """Raise the `InputError` of `unknown` unless a name is allowed; the place stands before it, the rest behind."""
+    if given not in allowed:
+        raise InputError(
+            f"{place}: {unknown(kind, given, allowed)}{rest}" if place else unknown(kind, given, allowed) + rest
+        )

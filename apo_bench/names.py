@@ -14,7 +14,7 @@ from importlib.machinery import ModuleSpec, PathFinder
 from types import FrameType, ModuleType
 from typing import Any, final
 
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import InputError, require, require_known, unknown
 
 
 @final
@@ -97,14 +97,13 @@ def resolve(given: Any, known: Mapping[str, str], kind: str) -> Any:
     if not isinstance(given, str):
         return given
     if ":" not in given:
-        if given not in known:
-            raise InputError(unknown(kind, given, known) + " Or give your own as 'package.module:name'.")
+        require_known(kind, given, known, rest=" Or give your own as 'package.module:name'.")
         given = known[given]
     module_name, _, attribute = given.partition(":")
-    if not module_name or not attribute or module_name.startswith("."):
-        raise InputError(
-            f"the {kind} '{given}' is not of the form 'package.module:name'; name a module and what is in it."
-        )
+    require(
+        module_name and attribute and not module_name.startswith("."),
+        f"the {kind} '{given}' is not of the form 'package.module:name'; name a module and what is in it.",
+    )
     admit(module_name)
     try:
         module = importlib.import_module(module_name)

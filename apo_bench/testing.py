@@ -17,10 +17,10 @@ import numpy as np
 
 from apo_bench.assembly import Correction, Observation
 from apo_bench.correction.own_code.own import OwnCorrectors
-from apo_bench.errors import InputError, require, unknown
+from apo_bench.errors import require, unknown
 from apo_bench.records import CORRECTOR, TrialSettings
 from apo_bench.scoring.track import read_track
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene import Scene
 from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.trial.fingerprint import content_hash
 from apo_bench.trial.stages import scene_key, scene_of, simulate_demonstration
@@ -133,8 +133,10 @@ def _cells(trials: Any, method: str) -> list[TrialSettings]:
         trials = TrialSettings(**trials)
     if isinstance(trials, TrialSettings):
         return [replace(trials, method=method)]
-    if not isinstance(trials, str | Path):
-        raise InputError(f"{trials!r} was given as trials; give a track, by name or file, or TrialSettings.")
+    require(
+        isinstance(trials, str | Path),
+        f"{trials!r} was given as trials; give a track, by name or file, or TrialSettings.",
+    )
     track = read_track(trials)
     grids: list[SweepSettings] = [replace(grid, trials=1) for arm in track.arms for grid in track.of(method, arm)]
     return [trial for grid in grids for unit in units([grid], load_all([grid])) for trial in unit.trials]

@@ -29,13 +29,12 @@ from apo_bench.assembly import Plan, measured_rates, placements
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.contacts import face_overlap
-from apo_bench.observation.looking import Looks
+from apo_bench.observation.looking import Looks, observe
 from apo_bench.observation.models.failures import RATE, AlongRay, CameraFailures, DisplacedView, Flipped, Stale, Swapped
 from apo_bench.observation.noise import Level
-from apo_bench.observation.observing import observe
 from apo_bench.prediction.failure import predict
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.trial.pose_error import goal_errors
+from apo_bench.trial.outcome_columns import goal_errors
 from benchmarks.failures_page import write
 
 

@@ -56,9 +56,7 @@ FAULTS = (
         "chdtri(known.rank, ",
         "directions that are fixed for those that are free",
     ),
-    Fault(
-        "correction/checks/consistency.py", "unit_m / sqrt(3.0)", "unit_m / sqrt(12.0)", "half the play instead of all"
-    ),
+    Fault("correction/checks/status.py", "unit_m / sqrt(3.0)", "unit_m / sqrt(12.0)", "half the play instead of all"),
     Fault(
         "correction/relation_equations.py",
         "self.operations[i] if j > k})",
@@ -78,10 +76,10 @@ FAULTS = (
         "0.0",
         "faces that are inside each other have no gap",
     ),
-    Fault("judging/rules.py", "relation.lost <= k for", "relation.lost < k for", "no fixture is put away any more"),
-    Fault("judging/rules.py", "reached.area / true.area", "true.area / reached.area", "shares turned over"),
-    Fault("judging/rules.py", "put.pop(part, None)", "put.get(part)", "a part that is moved on is pushed"),
-    Fault("judging/judgement.py", "np.degrees(snapshot.spin_rad_s)", "snapshot.spin_rad_s", "rad/s taken for deg/s"),
+    Fault("judging/verdict.py", "relation.lost <= k for", "relation.lost < k for", "no fixture is put away any more"),
+    Fault("judging/verdict.py", "reached.area / true.area", "true.area / reached.area", "shares turned over"),
+    Fault("judging/verdict.py", "put.pop(part, None)", "put.get(part)", "a part that is moved on is pushed"),
+    Fault("judging/contacts.py", "np.degrees(snapshot.spin_rad_s)", "snapshot.spin_rad_s", "rad/s taken for deg/s"),
     Fault("judging/verdict.py", "or not self.demonstrated.holds)", "or self.demonstrated.holds)", "the wrong reason"),
     Fault(
         "sweeps/work/dispatch.py",
@@ -99,14 +97,14 @@ FAULTS = (
     Fault("sweeps/progress.py", "(total - ended) / ended", "total / ended", "the time left does not fall"),
     Fault("assembly/topology.py", "Term(k), *inverted(before)", "Term(k), *before", "a carried part goes twice"),
     Fault(
-        "observation/models/anisotropic.py",
+        "observation/models/camera.py",
         "_stretch(sight, IN_IMAGE, OUT_OF_IMAGE)",
         "_stretch(sight, OUT_OF_IMAGE, IN_IMAGE)",
         "turns are worst about the line of sight",
     ),
     Fault("statistics/paired.py", "np.std(x, ddof=1)", "np.std(x)", "the spread of a sample is that of all"),
     Fault(
-        "simulation/execution/spiral.py",
+        "simulation/execution/search.py",
         "or side > push + self.guard.newton:",
         "or side < 0.0:",
         "a spiral goes on although walls hold the part",
@@ -117,7 +115,7 @@ FAULTS = (
     Fault(
         "parts/stated.py", "v = v - (v @ axis) * axis", "v = v + (v @ axis) * axis", "a part along the axis is doubled"
     ),
-    Fault("parts/check.py", "* float(face.normal @ face.outline[0])", "", "the divergence theorem without positions"),
+    Fault("parts/load.py", "* float(face.normal @ face.outline[0])", "", "the divergence theorem without positions"),
     Fault(
         "parts/load.py",
         "abs(mark.point[surface.axis] - surface.height)",
@@ -126,13 +124,13 @@ FAULTS = (
     ),
     Fault("parts/load.py", "<= mass <= HEAVIEST_KG", "<= mass", "the heaviest part is not looked for"),
     Fault(
-        "parts/making/moments.py",
+        "parts/making/body.py",
         "z1 = (high**2 - low**2) / 2.0",
         "z1 = (high - low) ** 2 / 2.0",
         "the moment of a prism as if it stood at zero",
     ),
     Fault(
-        "parts/making/moments.py",
+        "parts/making/body.py",
         "np.pi * r**4 / 4.0",
         "np.pi * r**4 / 2.0",
         "the moment about the axis for one across it",
@@ -166,8 +164,8 @@ FAULTS = (
         "return {part: T if part not in",
         "the wrong parts follow the site",
     ),
-    Fault("scenario/human_error.py", "R.T @ _guided(", "R @ _guided(", "an error in the wrong frame"),
-    Fault("scenario/human_error.py", "turn @ (before.get(", "(before.get(", "what is carried is not turned"),
+    Fault("scenario/scenario.py", "R.T @ _guided(", "R @ _guided(", "an error in the wrong frame"),
+    Fault("scenario/scenario.py", "turn @ (before.get(", "(before.get(", "what is carried is not turned"),
     Fault(
         "scenario/order.py",
         "for k, operation in enumerate(assembly.operations):",

@@ -34,7 +34,6 @@ from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.feel.feeling import ACTS
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.statistics import wilson
-from apo_bench.trial.feeling import feels_of
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import (
     WRENCH,
@@ -47,7 +46,7 @@ from apo_bench.trial.stages import (
     stream_key,
     trial_outcome,
 )
-from apo_bench.trial.trial import noise_of
+from apo_bench.trial.trial import feels_of, noise_of
 
 SWEEP = Path(__file__).with_name("robot_errors.toml")
 METHODS = ("contact+feel", "oracle+feel")

@@ -28,22 +28,20 @@ from pathlib import Path
 from typing import Any, final
 
 import numpy as np
+from apo_bench.trial.pose_error import goal_errors
 
 from apo_bench import Assembly, Demonstration, Observation, draw_layout, load_scenario
 from apo_bench.assembly import lowered_observation
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.learned.class_mean import ClassMean, class_mean
-from apo_bench.correction.learned.correctors import GROSS_SCALE, learned_set
-from apo_bench.correction.learned.network import forward, shapes
-from apo_bench.correction.learned.tokens import Tokens, tokens
+from apo_bench.correction.learned.network import GROSS_SCALE, Tokens, forward, learned_set, shapes, tokens
 from apo_bench.datasets import pairs
 from apo_bench.generated import FAMILIES
 from apo_bench.geometry import pose
+from apo_bench.observation.looking import observe
 from apo_bench.observation.models.isotropic import Isotropic
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.observation.observing import observe
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.trial.pose_error import goal_errors
 from benchmarks.failures import right
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -27,7 +27,7 @@ from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.fitted import ConstantError, Fitted, MeasuredNoise, ViewNoise, restated
-from apo_bench.observation.models.level import Level
+from apo_bench.observation.models.isotropic import Level
 from apo_bench.observation.models.tails import Split, Tail
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout

@@ -28,8 +28,8 @@ from apo_bench import Plan, Scene, TrialSettings, build_scene, draw_layout, load
 from apo_bench.geometry import pose
 from apo_bench.parts.making import extrude, rectangle
 from apo_bench.scenario.file import scenario_names
-from apo_bench.simulation.robot.forces import ForceSensors
 from apo_bench.simulation.robot.robot import Robot
+from apo_bench.simulation.robot.wrist import ForceSensors
 from apo_bench.simulation.scene.world import initial_state, place
 from tests.round_scenes import peg_in_hole
 from tests.simulation.test_grasping import SIDEWAYS, one_part

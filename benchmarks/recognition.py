@@ -28,7 +28,7 @@ from apo_bench.observation.noise import Level, make_noise
 from apo_bench.records import RECOGNISED
 from apo_bench.report.figures.levels import recognition_figure
 from apo_bench.report.figures.sheet import draw
-from apo_bench.report.tables.forecasts import recognition_table
+from apo_bench.report.tables.methods import recognition_table
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.statistics import ALL, Recognition, recognitions

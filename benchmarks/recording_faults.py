@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from apo_bench.cli.app import main
 from apo_bench.geometry import Array, pose
-from apo_bench.recording.log import MOST_POSES
+from apo_bench.recording.setup_files import MOST_POSES
 from benchmarks.recording_demos import Errors, first_places, tracked, watched
 from benchmarks.recording_forms import Tracked, camera_text, known_text, objects_text
 

@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.records import ROW
-from apo_bench.records.run.report_rows import NUMBERS
+from apo_bench.records.run.run_folder import NUMBERS
 from apo_bench.report.report import report
 
 SCENARIOS = ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table")

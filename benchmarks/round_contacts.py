@@ -21,8 +21,8 @@ from scipy.stats import kstest
 
 from apo_bench.assembly import Assembly, Contact, Observation, Operation, PartFace, largest_gap
 from apo_bench.correction.contact.contact import contact
+from apo_bench.correction.correctors import correct_many
 from apo_bench.correction.explanation import explain
-from apo_bench.correction.many import correct_many
 from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import Array, RoundFace, Solid, pose
 from apo_bench.parts.making import Frustum, bore, extrude, rectangle, solid_of, turned

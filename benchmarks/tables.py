@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.records import ROW_FIELDS, SETTINGS
-from apo_bench.report.tables.forecasts import calibration_table, confusion_table
+from apo_bench.report.tables.methods import calibration_table, confusion_table
 from apo_bench.statistics import Cell, calibrations, confusions, tally
 from apo_bench.statistics.paired import paired
 

@@ -26,14 +26,14 @@ from apo_bench.assembly import Demonstration, placements
 from apo_bench.correction.correctors import correct
 from apo_bench.errors import InputError
 from apo_bench.generated import FAMILIES, drawn, whole_name
-from apo_bench.observation.observing import observe
+from apo_bench.observation.looking import observe
 from apo_bench.records import TrialSettings
 from apo_bench.scenario import draw_layout, load_scenario, nominal_operations
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.render import camera_view, picture
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.statistics import wilson
-from apo_bench.trial.pose_error import goal_errors
+from apo_bench.trial.outcome_columns import goal_errors
 from apo_bench.trial.stages import simulate_demonstration
 from apo_bench.trial.trial import run_trial
 

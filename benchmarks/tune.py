@@ -24,15 +24,14 @@ from statistics import mean
 from typing import Any, NamedTuple
 
 from apo_bench.assembly import Plan
-from apo_bench.correction.baselines.least_squares import least_squares
-from apo_bench.correction.baselines.penalty import penalty
+from apo_bench.correction.baselines.penalty import least_squares, penalty
 from apo_bench.correction.baselines.snap import snap
 from apo_bench.correction.correctors import correct
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.scene.settling import settle
-from apo_bench.trial.pose_error import goal_errors
+from apo_bench.trial.outcome_columns import goal_errors
 from apo_bench.trial.stages import (
     SimulatedDemonstration,
     observe_demonstration,

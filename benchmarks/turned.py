@@ -31,7 +31,7 @@ from apo_bench.observation.noise import Level, make_noise
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.trial.pose_error import goal_errors
+from apo_bench.trial.outcome_columns import goal_errors
 
 OURS = (
     "contact",

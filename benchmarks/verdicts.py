@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from apo_bench.assembly import Contact, Layout, joint_play_mm, placements
 from apo_bench.geometry import Array, nearest_alike, pose
 from apo_bench.geometry.covering import overlap
-from apo_bench.judging.rules import fixtures
+from apo_bench.judging.verdict import fixtures
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.scenario.file import load_scenario

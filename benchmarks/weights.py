@@ -25,8 +25,8 @@ from apo_bench import Demonstration, draw_layout, load_scenario
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.robust.robust import TEMPERATURE, UNNAMED, RobustCorrector
 from apo_bench.geometry import Array
-from apo_bench.observation.observing import observe
-from apo_bench.trial.pose_error import goal_errors
+from apo_bench.observation.looking import observe
+from apo_bench.trial.outcome_columns import goal_errors
 from benchmarks.failures import CLEARANCE_MM, KINDS, LEVEL
 
 SCENES = ("carried_bridge", "pocket_table", "fixture_alignment", "shaft_through_brackets")

@@ -28,8 +28,7 @@ from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.sweeps.local.pool import run_locally
 from apo_bench.sweeps.sweep import names_of
-from apo_bench.sweeps.work.environment_lock import EnvironmentLock, environment_lock
-from apo_bench.sweeps.work.messages import Unit
+from apo_bench.sweeps.work.environment_lock import EnvironmentLock, Unit, environment_lock
 from apo_bench.sweeps.work.worker import Emit, Timing, Worker
 
 SCENARIOS = ("stick_in_tower", "carried_bridge", "vanished_fixture", "pocket_table")

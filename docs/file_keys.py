@@ -24,15 +24,14 @@ from apo_bench.cli.setting_options import shown_default
 from apo_bench.drafting.writing import THRESHOLDS
 from apo_bench.io.documents import JsonNode
 from apo_bench.observation.models.fitted import ConstantError, ViewNoise
-from apo_bench.observation.noise_file import noise_text, read_noise
-from apo_bench.observation.presets import presets
+from apo_bench.observation.noise_file import noise_text, presets, read_noise
 from apo_bench.parts.allowed import ELEMENT_RULES
 from apo_bench.parts.stated import PART_SCHEMA, read_stated_part
 from apo_bench.records import SETTINGS, SettingInfo
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.sweeps.grid import AXES, SHARED
-from apo_bench.sweeps.sweep_file import read_sweep
+from apo_bench.sweeps.sweep import read_sweep
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "docs" / "guide" / "scenario.md", ROOT / "docs" / "guide" / "sweeps.md"

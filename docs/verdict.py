@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 sys.path.insert(0, str(ROOT))
 
 from apo_bench.geometry import Array, pose
-from apo_bench.judging.rules import fixtures
+from apo_bench.judging.verdict import fixtures
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.render import SceneCamera, camera_view, picture
 from apo_bench.simulation.scene.scene import build_scene

@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench import Assembly, Scenario
 from apo_bench.assembly import Contact, Operation, PartFace
 from apo_bench.geometry import Array, pose
-from apo_bench.insertion.line import Preference
+from apo_bench.insertion.arrival import Preference
 from apo_bench.parts import load_part, part_path
 from apo_bench.parts.making import Body, bore, extrude, rectangle, shaft, write_part
 from apo_bench.records import Thresholds

@@ -26,7 +26,7 @@ BREACHES = {
         ("apo_bench.sweeps.sweep", "apo_bench.report.report"),
     ],
     "simulation": [
-        ("apo_bench.simulation.arms.home", "apo_bench.simulation.scene.world"),
+        ("apo_bench.simulation.arms.kinematics", "apo_bench.simulation.scene.world"),
         ("apo_bench.simulation.scene.scene", "apo_bench.simulation.robot.gripper"),
         ("apo_bench.simulation.robot.robot_error", "apo_bench.simulation.execution.transfer"),
         ("apo_bench.simulation.human.hands", "apo_bench.simulation.execution.fingers"),
@@ -49,7 +49,7 @@ BREACHES = {
     ],
     "correction": [
         ("apo_bench.correction.solvers.gauss_newton", "apo_bench.correction.contact.contact"),
-        ("apo_bench.correction.solvers.posterior", "apo_bench.correction.checks.consistency"),
+        ("apo_bench.correction.solvers.posterior", "apo_bench.correction.checks.status"),
         ("apo_bench.correction.checks.status", "apo_bench.correction.contact.solved"),
         ("apo_bench.correction.baselines.paper", "apo_bench.correction.contact.problem"),
         ("apo_bench.correction.contact.starts", "apo_bench.correction.robust.views"),
@@ -57,12 +57,12 @@ BREACHES = {
         ("apo_bench.correction.correctors", "apo_bench.correction.own_code.forms"),
     ],
     "contact": [
-        ("apo_bench.correction.contact.problem", "apo_bench.correction.contact.chi_square"),
-        ("apo_bench.correction.contact.heavy_tails", "apo_bench.correction.contact.inferred"),
-        ("apo_bench.correction.contact.suspects", "apo_bench.correction.contact.starts"),
+        ("apo_bench.correction.contact.problem", "apo_bench.correction.contact.solved"),
+        ("apo_bench.correction.contact.inferred", "apo_bench.correction.contact.problem"),
+        ("apo_bench.correction.contact.starts", "apo_bench.correction.contact.contact"),
     ],
     "touches": [
-        ("apo_bench.correction.touches.robot_model", "apo_bench.correction.touches.robust_estimate"),
+        ("apo_bench.correction.touches.robust_estimate", "apo_bench.correction.touches.belief"),
         ("apo_bench.correction.touches.robust_estimate", "apo_bench.correction.touches.belief"),
     ],
     "workshop": [
@@ -71,30 +71,30 @@ BREACHES = {
         ("apo_bench.scenario.file", "apo_bench.cad.importing"),
     ],
     "report": [
-        ("apo_bench.report.page.document", "apo_bench.report.comparison.text"),
+        ("apo_bench.report.page.report_page", "apo_bench.report.comparison.text"),
         ("apo_bench.report.page.report_page", "apo_bench.report.answer"),
-        ("apo_bench.report.tables.cells", "apo_bench.report.run.facts"),
-        ("apo_bench.report.figures.levels", "apo_bench.report.page.document"),
+        ("apo_bench.report.tables.cells", "apo_bench.report.run.trials"),
+        ("apo_bench.report.figures.levels", "apo_bench.report.page.report_page"),
     ],
     "statistics": [
         ("apo_bench.statistics.rates", "apo_bench.statistics.levels.curves"),
-        ("apo_bench.statistics.settings", "apo_bench.statistics.levels.summary"),
+        ("apo_bench.statistics.settings", "apo_bench.statistics.levels.half_level"),
         ("apo_bench.statistics.paired", "apo_bench.statistics.power"),
     ],
     "sweeps": [
         ("apo_bench.sweeps.work.worker", "apo_bench.sweeps.grid"),
         ("apo_bench.sweeps.work.worker", "apo_bench.sweeps.local.process"),
         ("apo_bench.sweeps.local.pool", "apo_bench.sweeps.ray.task"),
-        ("apo_bench.sweeps.ray.backend", "apo_bench.sweeps.sweep_file"),
+        ("apo_bench.sweeps.ray.backend", "apo_bench.sweeps.sweep"),
     ],
     "work": [
         ("apo_bench.sweeps.work.environment_lock", "apo_bench.sweeps.work.dispatch"),
-        ("apo_bench.sweeps.work.messages", "apo_bench.sweeps.work.worker"),
+        ("apo_bench.sweeps.work.environment_lock", "apo_bench.sweeps.work.worker"),
     ],
     "judge": [
         ("apo_bench.judging.verdict", "apo_bench.observation.noise"),
         ("apo_bench.judging.contacts", "apo_bench.recognition.contacts"),
-        ("apo_bench.judging.rules", "apo_bench.correction.contact.contact"),
+        ("apo_bench.judging.verdict", "apo_bench.correction.contact.contact"),
     ],
     "corrector": [
         ("apo_bench.correction.contact.contact", "apo_bench.scenario.scenario"),

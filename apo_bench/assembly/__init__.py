@@ -19,8 +19,16 @@ from apo_bench.assembly.error_models import (
     joint_covariance,
     measured_rates,
 )
-from apo_bench.assembly.facing import face_gap, height, opposed
-from apo_bench.assembly.facing_round import Facing, measure_round, round_pairs
+from apo_bench.assembly.facing_round import (
+    CONTACT_KINDS,
+    ContactKind,
+    Facing,
+    contact_kind,
+    geometric_play,
+    measure_round,
+    play_mm,
+    round_pairs,
+)
 from apo_bench.assembly.goals import (
     SCHEDULE_REMEDY,
     Demonstration,
@@ -35,7 +43,6 @@ from apo_bench.assembly.goals import (
 )
 from apo_bench.assembly.graph import Arc, ArcResiduals, Graph, Node, arc_residuals, observed_residuals, relation_graph
 from apo_bench.assembly.joint_play import apart_limit_mm, deep_limit_mm, joint_play_mm
-from apo_bench.assembly.kinds import CONTACT_KINDS, ContactKind, contact_kind, geometric_play, play_mm
 from apo_bench.assembly.lowering import lowered, lowered_observation, lowered_together
 from apo_bench.assembly.pattern import Pattern, looking_away
 from apo_bench.assembly.reached import Felt, InHand, Outcome, Reached, ReplayResult, Snapshot
@@ -54,7 +61,16 @@ from apo_bench.assembly.topology import (
     spelled,
 )
 from apo_bench.assembly.touch import Touch
-from apo_bench.assembly.touching import TouchedContact, corners, mouth, outline_points, touched_contacts
+from apo_bench.assembly.touching import (
+    TouchedContact,
+    corners,
+    face_gap,
+    height,
+    mouth,
+    opposed,
+    outline_points,
+    touched_contacts,
+)
 
 __all__ = (
     "CONTACT_KINDS",

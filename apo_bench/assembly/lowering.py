@@ -22,8 +22,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from apo_bench.assembly.facing_round import WALLS, contact_kind
 from apo_bench.assembly.goals import Observation
-from apo_bench.assembly.kinds import WALLS, contact_kind
 from apo_bench.assembly.topology import Assembly, Contact, Gap, PartFace
 from apo_bench.errors import require
 from apo_bench.geometry import Array, Face, RoundFace, remembered

@@ -12,8 +12,8 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.assembly.facing_round import OPPOSING, contact_kind
 from apo_bench.assembly.goals import Poses
-from apo_bench.assembly.kinds import OPPOSING, contact_kind
 from apo_bench.assembly.lowering import lowered
 from apo_bench.assembly.topology import ODL, Assembly, Contact, Operation, inverted, simplified
 from apo_bench.geometry import Array, Face, remembered

@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly.kinds import WALLS, contact_kind, geometric_play
+from apo_bench.assembly.facing_round import WALLS, contact_kind, geometric_play
 from apo_bench.geometry import Array, Face, RoundFace, Solid, copyable, freeze, frozen, pose, remembered
 
 
@@ -179,8 +179,7 @@ class Assembly:
     @remembered
     def intervals(self, play_m: float) -> Array:
         """The least and the largest distance of every contact, (c, 2), in the order of `relations()`, [m]."""
-        every = [self.interval(relation.contact, play_m) for relation in self.relations()]
-        return frozen(np.reshape(every, (-1, 2)))
+        return frozen(np.reshape([self.interval(relation.contact, play_m) for relation in self.relations()], (-1, 2)))
 
     def first(self, n: int) -> "Assembly":
         """What is known after n operations: the same parts, no later operation."""

@@ -7,7 +7,7 @@ import numpy as np
 
 from apo_bench.cad.solids.raw_solid import RawSolid
 from apo_bench.geometry import Array
-from apo_bench.io.figures import default_looks
+from apo_bench.io import default_looks
 
 _VIEWS = ((28.0, -55.0), (-28.0, 125.0))
 """Elevation and azimuth, [deg]."""

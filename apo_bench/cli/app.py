@@ -14,27 +14,21 @@ import typer
 
 from apo_bench import __version__
 from apo_bench.cli import (
-    arm,
     correction,
-    dataset,
     noise,
     part,
-    perception,
     plan,
     power,
     recording,
-    replay_trial,
-    report,
     scenario,
     score,
     show,
     sweep,
 )
-from apo_bench.cli.arguments import NO_RESULT
-from apo_bench.cli.help_groups import Grouped, GroupedOptions
+from apo_bench.cli.printing import Grouped, GroupedOptions
+from apo_bench.cli.setting_options import NO_RESULT
 from apo_bench.errors import InputError
-from apo_bench.io import processes
-from apo_bench.io.plain_text import brief, clean
+from apo_bench.io import brief, clean, processes
 from apo_bench.names import own_modules_in
 
 app = typer.Typer(
@@ -107,23 +101,23 @@ _COMMANDS: dict[str, Callable[..., None]] = {
     "graph": plan.graph_command,
     "explain": correction.explain_command,
     "correct": correction.correct_command,
-    "eye": perception.eye_command,
+    "eye": recording.eye_command,
     "plan": plan.plan_command,
-    "recognise": perception.recognise_command,
+    "recognise": recording.recognise_command,
     "scenarios": scenario.scenarios_command,
     "show": show.show_command,
     "sweep": sweep.sweep_command,
-    "report": report.report_command,
-    "compare": report.compare_command,
+    "report": score.report_command,
+    "compare": score.compare_command,
     "score": score.score_command,
     "leaderboard": score.leaderboard_command,
     "view": show.view_command,
     "scene": plan.scene_command,
-    "replay": replay_trial.run_replay,
+    "replay": show.run_replay,
 }
 for _name, _command in _COMMANDS.items():
     app.command(_name, cls=GroupedOptions if _name in _LONG else None)(_command)
-for _group in (dataset.dataset, noise.noise, arm.arm, part.part, power.power, scenario.scenario, recording.recording):
+for _group in (sweep.dataset, noise.noise, part.arm, part.part, power.power, scenario.scenario, recording.recording):
     app.add_typer(_group)
 
 if __name__ == "__main__":

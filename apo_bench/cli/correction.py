@@ -6,12 +6,13 @@ from typing import Annotated, Any, cast
 import typer
 
 from apo_bench.assembly import Correction, Observation, Plan
-from apo_bench.cli.arguments import NO_RESULT, check_outputs, writing
-from apo_bench.cli.printing import print_json, print_lines, print_tables
-from apo_bench.cli.setting_options import AsJson, ScenarioArgument
-from apo_bench.errors import InputError
-from apo_bench.io.processes import redirect_output
-from apo_bench.records import CORRECTOR
+from apo_bench.cli.printing import print_json, print_lines, print_tables, say
+from apo_bench.cli.setting_options import NO_RESULT, AsJson, ScenarioArgument, check_outputs, writing
+from apo_bench.errors import require
+from apo_bench.files.observation import as_planned, read_observation_file
+from apo_bench.io import redirect_output
+from apo_bench.records import CORRECTOR, with_simulated
+from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 
 _EXACT_M = 1e-9
@@ -35,8 +36,6 @@ def explain_command(
     """Say what the contacts determine: what is fixed by which relations, what is free, how well poses are known."""
     from apo_bench.correction.correctors import correct
     from apo_bench.correction.explanation import explain
-    from apo_bench.files.observation import as_planned, read_observation_file
-    from apo_bench.scenario.file import load_scenario
     from apo_bench.show.explain_text import (
         explanation_form,
         explanation_tables,
@@ -77,8 +76,7 @@ def explain_command(
         from apo_bench.show.explain_picture import draw_explanation
 
         draw_explanation(loaded, seen, explanation, out)
-        if not as_json:
-            typer.echo(f"\nWrote {out}")
+        say(f"\nWrote {out}", as_json)
 
 
 def correct_command(
@@ -106,13 +104,14 @@ def correct_command(
 ) -> None:
     """Correct observed poses by their face contacts; no simulator is needed."""
     from apo_bench.correction.own_code.own import correct_named
-    from apo_bench.files.observation import read_observation_file
     from apo_bench.show.correct_text import correction_form, correction_lines, pose_table, suspect_table
     from apo_bench.trial.promise import promise_sentence
 
     check_outputs([(out, "--out", (".json", ".csv"))])
-    if out is not None and out.exists() and observation.exists() and out.samefile(observation):
-        raise InputError(f"--out {out} is the file of the observation; name another, so that what was seen is kept.")
+    require(
+        out is None or not out.exists() or not observation.exists() or not out.samefile(observation),
+        f"--out {out} is the file of the observation; name another, so that what was seen is kept.",
+    )
     method = method or (CORRECTOR if if_doubtful is None else "contact")
     corrector = _corrector(method, if_doubtful)
     seen, loaded, assumed = read_observation_file(
@@ -150,13 +149,12 @@ def correct_command(
         raise typer.Exit(NO_RESULT)
     if out is not None and plan is not None:
         _write_plan(out, scenario, loaded.name, plan)
-        if not as_json:
-            typer.echo(f"Wrote {out}{moved and f': {moved}'}")
+        say(f"Wrote {out}{moved and f': {moved}'}", as_json)
 
 
 def _explained(observation: Observation, correction: Correction) -> Any:
     """What the contacts determine at corrected goals; None of corrections that leave contacts open, or of too many."""
-    from apo_bench.correction.baselines.measured import gap_of
+    from apo_bench.correction.checks.status import gap_of
     from apo_bench.correction.explanation import explain
     from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR
 
@@ -172,14 +170,14 @@ def _explained(observation: Observation, correction: Correction) -> Any:
 def _corrector(method: str, doubt: str | None) -> Any:
     """The corrector `contact` with what it is to do in doubt, or any other as a trial knows it."""
     from apo_bench.correction.contact.contact import ContactCorrector, Doubt
-    from apo_bench.records import with_simulated
 
-    if doubt is not None and doubt not in _DOUBTS:
-        raise InputError(f"--if-doubtful {doubt} was given; {', '.join(_DOUBTS[:-1])} or {_DOUBTS[-1]} is allowed.")
+    require(
+        doubt is None or doubt in _DOUBTS,
+        f"--if-doubtful {doubt} was given; {', '.join(_DOUBTS[:-1])} or {_DOUBTS[-1]} is allowed.",
+    )
     if method == "contact":
         return ContactCorrector(cast(Doubt, doubt or "warn"))
-    if doubt is not None:
-        raise InputError(f"--if-doubtful was given with --method {method}; only contact can be told what to do.")
+    require(doubt is None, f"--if-doubtful was given with --method {method}; only contact can be told what to do.")
     return with_simulated(method)
 
 

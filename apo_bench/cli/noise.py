@@ -5,28 +5,15 @@ from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.arguments import NO_RESULT, check_outputs, writing
-from apo_bench.cli.help_groups import Grouped
-from apo_bench.cli.printing import print_json
-from apo_bench.cli.setting_options import AsJson
-from apo_bench.errors import InputError
+from apo_bench.cli.printing import group, print_answer, say
+from apo_bench.cli.setting_options import NO_RESULT, AsJson, check_outputs, writing
+from apo_bench.errors import require
+from apo_bench.records import check
 
 _HELP = "Noise models: list, cards, fits to measured poses, noise learned from observations."
 _NAME = "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name."
-noise = typer.Typer(name="noise", cls=Grouped, rich_markup_mode=None, help=_HELP)
-
-_Picture = Annotated[Path | None, typer.Option(help="Draw seen and fitted into this file: .png.")]
-_Source = Annotated[str | None, typer.Option(help="What the noise file says it is of; default: the files.")]
 
 
-@noise.callback(invoke_without_command=True)
-def _without_command(context: typer.Context) -> None:
-    """List the noise models, or read the card of one."""
-    if context.invoked_subcommand is None:
-        noise_list()
-
-
-@noise.command("list")
 def noise_list() -> None:
     """List the noise models that have a name."""
     from apo_bench.show.noise_card import listed_models
@@ -36,6 +23,13 @@ def noise_list() -> None:
     for name, title in models.items():
         typer.echo(f"{name:{width}}  {title}")
     typer.echo("\nThe card of one: apo-bench noise card NAME")
+
+
+noise = group("noise", _HELP, noise_list)
+noise.command("list")(noise_list)
+
+_Picture = Annotated[Path | None, typer.Option(help="Draw seen and fitted into this file: .png.")]
+_Source = Annotated[str | None, typer.Option(help="What the noise file says it is of; default: the files.")]
 
 
 @noise.command("card")
@@ -48,7 +42,6 @@ def print_noise_card(
 ) -> None:
     """Print the card of a noise model: formula, frame, parameters, and a histogram of its errors."""
     from apo_bench.observation.noise import Level
-    from apo_bench.records import check
     from apo_bench.show.noise_card import draw_errors, draw_histogram, noise_card
 
     check("level_mm", level, called="level")
@@ -79,8 +72,7 @@ def noise_fit(
     as_json: AsJson = False,
 ) -> None:
     """Measure a pose estimator: fit tails along and across the ray, outliers and misses, to its published results."""
-    from apo_bench.files.bop import read_results
-    from apo_bench.files.bop_truth import read_truth
+    from apo_bench.files.bop import read_results, read_truth
     from apo_bench.observation.fitting import fit
     from apo_bench.observation.models.empirical import residuals_text
     from apo_bench.observation.models.residuals import match_residuals
@@ -92,13 +84,9 @@ def noise_fit(
     matched = match_residuals(seen, read_truth(truth, seen, scene_id), scene_id)
     measured = fit.fit_noise(matched, _printable(source or f"{estimates.name} against {truth.name}"))
     goodness = fit.goodness_of_fit(matched, measured)
-    if as_json:
-        print_json(fit_form(matched, measured, goodness))
-    else:
-        typer.echo("\n".join(fit_lines(matched, measured, goodness)))
+    print_answer(fit_form(matched, measured, goodness), fit_lines(matched, measured, goodness), as_json)
     command = f"apo-bench noise fit --estimates {estimates.name} --truth {truth.name}"
-    notes = (_printable(command), *fit_notes(matched, measured, goodness))
-    _write_fit(matched, measured, (out, picture), notes)
+    _write_fit(matched, measured, (out, picture), (_printable(command), *fit_notes(matched, measured, goodness)))
     if residuals is not None:
         with writing():
             residuals.write_text(residuals_text(matched), encoding="utf-8")
@@ -118,8 +106,8 @@ def noise_still(
     """Measure a camera on parts that rest: how its frames scatter, how many are missing, how many are wrong."""
     from apo_bench.observation.fitting import fit
     from apo_bench.recording.formats import read_log
+    from apo_bench.recording.rests import still_residuals
     from apo_bench.recording.setup_files import read_camera
-    from apo_bench.recording.still_noise import still_residuals
     from apo_bench.show.fit_text import fit_lines
 
     check_outputs([(out, "--out", (".toml",)), (picture, "--picture", (".png",))], (camera,))
@@ -158,16 +146,12 @@ def noise_learn(
     check_outputs([(out, "--out", (".toml",))])
     named = _printable(source or f"{len(files)} observations of {', '.join(str(path) for path in observations)}")
     learned = learn([read_json_observation(path) for path in files], Camera(), named, constant=constant)
-    if as_json:
-        print_json(learned_form(learned))
-    else:
-        typer.echo("\n".join(learned_lines(learned)))
+    print_answer(learned_form(learned), learned_lines(learned), as_json)
     if out is None:
         return
     with writing(f"--out {out}"):
         out.write_text(noise_text(learned.measured), encoding="utf-8")
-    if not as_json:
-        typer.echo(f"Wrote {out}")
+    say(f"Wrote {out}", as_json)
 
 
 def _write_fit(
@@ -175,7 +159,7 @@ def _write_fit(
 ) -> None:
     """Write the noise file and the picture of a fit, where they are asked for."""
     from apo_bench.observation.noise_file import noise_text
-    from apo_bench.show.fit_picture import draw_fit
+    from apo_bench.show.fit_text import draw_fit
 
     out, picture = files
     with writing():
@@ -190,8 +174,7 @@ def _observation_files(paths: list[Path]) -> list[Path]:
     files = list[Path]()
     for path in paths:
         inside = sorted(path.glob("*.json")) if path.is_dir() else [path]
-        if not inside:
-            raise InputError(f"the folder {path} holds no .json file; name a folder of observations.")
+        require(inside, f"the folder {path} holds no .json file; name a folder of observations.")
         files += inside
     return files
 

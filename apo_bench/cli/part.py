@@ -1,4 +1,7 @@
-"""The command `apo-bench part import`: a CAD file becomes part files."""
+"""The command `apo-bench part import`: a CAD file becomes part files.
+
+The commands `apo-bench arm list | check`: which arms there are, and what one can do at the table.
+"""
 
 from __future__ import annotations
 
@@ -6,19 +9,19 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
+import numpy as np
 import typer
 
-from apo_bench.cli.arguments import path_given, writing
-from apo_bench.cli.help_groups import Grouped
-from apo_bench.cli.printing import print_json
-from apo_bench.cli.setting_options import AsJson
-from apo_bench.errors import InputError
+from apo_bench.cli.printing import group, print_json, say
+from apo_bench.cli.setting_options import AsJson, check_outputs, path_given, writing
+from apo_bench.errors import InputError, require
+from apo_bench.scenario.file import load_scenario
 
 if TYPE_CHECKING:
     from apo_bench.cad.importing import Imported
     from apo_bench.cad.solids.raw_solid import RawSolid
 
-part = typer.Typer(name="part", cls=Grouped, rich_markup_mode=None, help="Parts from CAD files.")
+part = group("part", "Parts from CAD files.")
 
 
 @part.command("import")
@@ -44,29 +47,28 @@ def part_import(
     from apo_bench.cad.solids.naming import renamed
 
     names = _pairs(name or [])
-    if not 1.0 <= density <= 25_000.0:
-        raise InputError(f"--density {density:g} was given; 1 to 25000 kg/m^3 are allowed.")
-    if fewest_sides is not None and not 5 <= fewest_sides <= 64:
-        raise InputError(f"--round {fewest_sides} was given; 5 to 64 sides are allowed.")
+    require(1.0 <= density <= 25_000.0, f"--density {density:g} was given; 1 to 25000 kg/m^3 are allowed.")
+    require(
+        fewest_sides is None or 5 <= fewest_sides <= 64, f"--round {fewest_sides} was given; 5 to 64 sides are allowed."
+    )
     source, raws = raw_solids(file, unit, *(() if fewest_sides is None else (fewest_sides,)))
-    if names and len(raws) > 1:
-        raise InputError(
-            f"--name was given, and {file} holds {len(raws)} different solids; import them from files of their own."
-        )
+    require(
+        not names or len(raws) <= 1,
+        f"--name was given, and {file} holds {len(raws)} different solids; import them from files of their own.",
+    )
     raws = [renamed(raw, names) for raw in raws]
     with writing(f"--out {out}"):
         out.mkdir(parents=True, exist_ok=True)
-        _say(f"{file}: {unit_line(source)}", as_json)
+        say(f"{file}: {unit_line(source)}", as_json)
         imported, left_out = _written(file, raws, out, density, as_json)
         left_out = [*source.left_out, *left_out]
         places = named_places({each.path.stem: each.raw.places for each in imported})
         poses = write_places(places, out, file.name) if len(places) > 1 else None
     if poses is not None:
-        _say(f"Wrote {poses}: {len(places)} places of {len(imported)} parts", as_json)
+        say(f"Wrote {poses}: {len(places)} places of {len(imported)} parts", as_json)
     if as_json:
         print_json(report_form(source, file, imported, poses))
-    if left_out:
-        raise InputError(f"{file}: {len(left_out)} of its solids became no parts: {' '.join(left_out)}")
+    require(not left_out, f"{file}: {len(left_out)} of its solids became no parts: {' '.join(left_out)}")
 
 
 def _written(
@@ -90,19 +92,14 @@ def _written(
             if len(raws) == 1:
                 raise
             left_out.append(f"{called}: {str(error).removeprefix(f'{file.name}: ')}")
-            _say(f"{called}: NO PART", as_json)
+            say(f"{called}: NO PART", as_json)
             continue
         imported.append(each)
-        _say("\n".join(import_lines(each)), as_json)
+        say("\n".join(import_lines(each)), as_json)
         picture = each.path.with_suffix(".png")
         draw_part(raw, frozenset(each.refused), called, picture)
-        _say(f"Wrote {each.path} and {picture}", as_json)
+        say(f"Wrote {each.path} and {picture}", as_json)
     return imported, left_out
-
-
-def _say(text: str, as_json: bool) -> None:
-    if not as_json:
-        typer.echo(text)
 
 
 def _pairs(renamings: list[str]) -> Mapping[str, str]:
@@ -110,7 +107,61 @@ def _pairs(renamings: list[str]) -> Mapping[str, str]:
     names: dict[str, str] = {}
     for renaming in renamings:
         old, equals, new = renaming.partition("=")
-        if not (old and equals and new) or old in names:
-            raise InputError(f"--name {renaming} was given; FACE=NEW is allowed, each face once, such as hole1=bore.")
+        require(
+            old and equals and new and old not in names,
+            f"--name {renaming} was given; FACE=NEW is allowed, each face once, such as hole1=bore.",
+        )
         names[old] = new
     return names
+
+
+arm = group("arm", "Arms: those that come along, and any other.")
+
+_SIZE = (960, 720)
+_WHOLE_TABLE = (np.array([-0.15, 0.0, 0.3]), 1.9, 140.0, -18.0)
+"""A view of the whole arm and the table."""
+
+
+@arm.command("list")
+def arm_list() -> None:
+    """List the arms that come with the benchmark, and how others are named."""
+    from apo_bench.show.arm_text import list_line
+    from apo_bench.simulation.arms.finding import arm_names, find_arm
+
+    for name in arm_names():
+        typer.echo(list_line(name, find_arm(name)))
+    typer.echo(
+        "any other: FILE.toml, menagerie:NAME (as in MuJoCo Menagerie), robosuite:NAME, or package.module:name; "
+        "`apo-bench arm check` says what it can do"
+    )
+
+
+@arm.command("check")
+def arm_check(
+    name: Annotated[str, typer.Argument(metavar="ARM", help="A name, FILE.toml, menagerie:NAME or robosuite:NAME.")],
+    scenario: Annotated[
+        str, typer.Argument(help="A name out of `apo-bench scenarios`, or a scenario file.")
+    ] = "stick_in_tower",
+    layouts: Annotated[int, typer.Option(min=1, max=1000, help="How many layouts are looked at.")] = 20,
+    out: Annotated[Path | None, typer.Option(help="Draw it at the table into this file: .png.")] = None,
+) -> None:
+    """Say what an arm can do at the table: reach, errors of its tip, stiffness, gripper, room along a plan."""
+    from apo_bench.show.arm_text import check_lines
+    from apo_bench.simulation.arm_checks.arm_check import check_arm
+    from apo_bench.simulation.arms.finding import find_arm
+
+    check_outputs([(out, "--out", (".png",))])
+    loaded = load_scenario(scenario)
+    robot = find_arm(name)
+    typer.echo(f"{name} at the table of {loaded.name}:")
+    for line in check_lines(check_arm(robot, loaded, layouts)):
+        typer.echo(f"  {line}")
+    if out is not None:
+        import imageio.v3 as imageio
+
+        from apo_bench.simulation.scene.render import camera_view, picture_with_arm
+        from apo_bench.simulation.scene.scene import build_scene
+
+        scene = build_scene(loaded, arm=robot, grasp="weld")
+        imageio.imwrite(out, picture_with_arm(scene, loaded.start, None, *_SIZE, camera_view(*_WHOLE_TABLE)))
+        typer.echo(f"Wrote {out}")

@@ -9,16 +9,26 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from apo_bench.assembly import Plan
-from apo_bench.cli.arguments import check_outputs, writing
-from apo_bench.cli.printing import print_json
-from apo_bench.cli.setting_options import AsJson, ScenarioArgument, StatedDeg, StatedMm, takes, trial_options
-from apo_bench.errors import InputError
-from apo_bench.files.deviations import assumed_deviations
-from apo_bench.files.robot_frames import RobotFrames
-from apo_bench.geometry import Array
-from apo_bench.io.processes import redirect_output
-from apo_bench.records import CORRECTOR
+from apo_bench.assembly import Plan, observed_residuals, relation_graph
+from apo_bench.cli.printing import print_answer, print_json, say
+from apo_bench.cli.setting_options import (
+    AsJson,
+    ScenarioArgument,
+    StatedDeg,
+    StatedMm,
+    check_outputs,
+    takes,
+    trial_options,
+    writing,
+)
+from apo_bench.errors import require
+from apo_bench.files.csv_form import assumed_deviations
+from apo_bench.files.json_forms import RobotFrames, read_robot_frames
+from apo_bench.files.observation import read_observation, read_observation_file
+from apo_bench.geometry import Array, pose
+from apo_bench.io import redirect_output
+from apo_bench.records import CORRECTOR, SETTINGS, check, in_python
+from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 
 
@@ -30,9 +40,6 @@ def graph_command(
     as_json: AsJson = False,
 ) -> None:
     """Print the relation graph: parts at their placements with their ODLs, contacts made and lost."""
-    from apo_bench.assembly import observed_residuals, relation_graph
-    from apo_bench.files.observation import read_observation
-    from apo_bench.scenario.file import load_scenario
     from apo_bench.show.graph.drawing import draw_graph
     from apo_bench.show.graph.text import graph_form, graph_lines, graph_title
 
@@ -42,16 +49,13 @@ def graph_command(
     seen = None if observation is None else read_observation(observation, loaded)
     residuals = None if seen is None else observed_residuals(seen, graph)
     gap_m = loaded.gap_mm * 1e-3 if seen is None else seen.gap_m
-    if as_json:
-        print_json(graph_form(loaded.name, graph, residuals))
-    else:
-        typer.echo("\n".join(graph_lines(loaded.name, graph, residuals, gap_m)))
+    lines = graph_lines(loaded.name, graph, residuals, gap_m)
+    print_answer(graph_form(loaded.name, graph, residuals), lines, as_json)
     if out is not None:
         title = graph_title(loaded.name, graph)
         with writing(f"--out {out}"):
             draw_graph(graph, out, title=title, residuals=residuals, gap_m=gap_m, colors=loaded.colors)
-        if not as_json:
-            typer.echo(f"\nWrote {out}")
+        say(f"\nWrote {out}", as_json)
 
 
 @takes(trial_options("clearance_mm", "grasp", "arm", "timestep_s"))
@@ -59,8 +63,6 @@ def scene_command(
     scenario: ScenarioArgument, out: Annotated[Path, typer.Option(help="The MJCF file to write.")], **options: Any
 ) -> None:
     """Write the scene of a scenario as one MJCF file that opens in MuJoCo's viewer."""
-    from apo_bench.records import check, in_python
-    from apo_bench.scenario.file import load_scenario
     from apo_bench.simulation.scene.scene import scene_xml
 
     settings = in_python({name: value for name, value in options.items() if value is not None})
@@ -68,8 +70,7 @@ def scene_command(
         check(name, value)
     loaded = load_scenario(scenario)
     check_outputs([(out, "--out", (".xml",))])
-    xml = scene_xml(loaded, **settings)
-    out.write_text(xml, encoding="utf-8")
+    out.write_text(scene_xml(loaded, **settings), encoding="utf-8")
     typer.echo(f"Wrote {out}; open it with: python -m mujoco.viewer --mjcf={out}")
 
 
@@ -104,24 +105,25 @@ def plan_command(
 ) -> None:
     """Say how every operation is done: contact states, macros, from where until where, what is guarded, the grasp."""
     from apo_bench.files.json_forms import write_form
-    from apo_bench.files.robot_frames import read_robot_frames
-    from apo_bench.scenario.file import load_scenario
     from apo_bench.show.plan_text import plan_lines, plan_lines_form, plan_text
     from apo_bench.show.robot_form import robot_form
 
     check_outputs([(robot, "--robot", (".json",))])
-    if frames is not None and robot is None:
-        raise InputError(f"--frames {frames} was given without --robot, whose frames they would be; give both.")
-    if acts is not None and robot is None:
-        raise InputError(f"--acts {acts} was given without --robot, the file for them; give both.")
+    require(
+        frames is None or robot is not None,
+        f"--frames {frames} was given without --robot, whose frames they would be; give both.",
+    )
+    require(
+        acts is None or robot is not None, f"--acts {acts} was given without --robot, the file for them; give both."
+    )
     robot_frames = RobotFrames() if frames is None else read_robot_frames(frames)
     if observation is None:
-        if method is not None:
-            raise InputError(f"--method {method} was given without --observation; give both, or neither.")
-        if (deviation_mm, deviation_deg) != (None, None):
-            raise InputError("a standard deviation was given without --observation, whose it would be; leave it out.")
-        if robot is not None:
-            raise InputError("--robot was given without --observation, which says where things are; give both.")
+        require(method is None, f"--method {method} was given without --observation; give both, or neither.")
+        require(
+            (deviation_mm, deviation_deg) == (None, None),
+            "a standard deviation was given without --observation, whose it would be; leave it out.",
+        )
+        require(robot is None, "--robot was given without --observation, which says where things are; give both.")
         loaded = load_scenario(scenario)
         notes = list[str]()
         promised = None
@@ -160,7 +162,6 @@ def plan_command(
 
 def _base_of(arm: str) -> Array:
     """Where an arm stands, (4, 4), world, [m]."""
-    from apo_bench.geometry import pose
     from apo_bench.simulation.arms.finding import find_arm
 
     found = find_arm(arm)
@@ -168,7 +169,6 @@ def _base_of(arm: str) -> Array:
 
 
 def _acts_form(scenario: Scenario, plan: Plan, frames: RobotFrames, sensor: str, arm: str | None) -> dict[str, Any]:
-    from apo_bench.records import SETTINGS
     from apo_bench.show.acts_form import acts_form
     from apo_bench.simulation.scene.scene import build_scene
 
@@ -179,15 +179,13 @@ def _planned(
     scenario: str, observation: Path, method: str, deviations: tuple[float | None, float | None]
 ) -> tuple[Scenario, Plan, float, list[str]]:
     """The scenario, the plan that a method makes of an observation of it, what it promises, and what is to be said."""
-    from apo_bench.files.observation import read_observation_file
     from apo_bench.trial.planning import apply_method, plan_warning
     from apo_bench.trial.promise import promised_success
 
     seen, loaded, assumed = read_observation_file(
         observation, scenario, deviation_mm=deviations[0], deviation_deg=deviations[1]
     )
-    if method == "oracle":
-        raise InputError("--method oracle was given; it knows the truth, which an observation does not tell.")
+    require(method != "oracle", "--method oracle was given; it knows the truth, which an observation does not tell.")
     result = apply_method(method, seen, None, where=loaded)
     if result.plan is None:
         why = result.failure.sentence if result.failure is not None else "no plan was made"

@@ -5,11 +5,22 @@ from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.arguments import numbers
-from apo_bench.cli.help_groups import Grouped
-from apo_bench.cli.printing import print_json
-from apo_bench.cli.setting_options import AsJson
+from apo_bench.cli.printing import group, print_answer
+from apo_bench.cli.setting_options import AsJson, numbers
 from apo_bench.errors import InputError
+from apo_bench.statistics import (
+    ERROR,
+    evidence,
+    least_discordant,
+    margin_power,
+    margin_trials,
+    paired_power,
+    paired_trials,
+    percent,
+    rate_trials,
+    shares,
+    wilson_half_width,
+)
 
 _HELP = "How many trials it takes: for a rate, for a difference, for no loss; and what so many can show."
 _QUESTIONS = """How many trials does it take?
@@ -18,7 +29,7 @@ _QUESTIONS = """How many trials does it take?
   apo-bench power margin --margin 0.03                  to show that a method is not worse by 3 points
   apo-bench power shows --trials 100                    what so many can show"""
 _SCHEMA = "apo-bench/power/1"
-power = typer.Typer(name="power", cls=Grouped, rich_markup_mode=None, help=_HELP)
+power = group("power", _HELP, lambda: typer.echo(_QUESTIONS))
 
 _Power = Annotated[float, typer.Option(help="How often it shall be shown if it is so.")]
 _Win = Annotated[float | None, typer.Option(help="Share of the seeds at which the method alone is right.")]
@@ -30,13 +41,6 @@ _Agree = Annotated[
 _Comparisons = Annotated[int, typer.Option(help="How many such tests the report makes; each is held to its share.")]
 
 
-@power.callback(invoke_without_command=True)
-def _without_command(context: typer.Context) -> None:
-    """List the questions that can be asked."""
-    if context.invoked_subcommand is None:
-        typer.echo(_QUESTIONS)
-
-
 @power.command("rate")
 def power_rate(
     half_width: Annotated[float, typer.Option(help="Half the width that the 95 % interval may have, as 0.05.")],
@@ -44,8 +48,6 @@ def power_rate(
     as_json: AsJson = False,
 ) -> None:
     """Trials for a success rate: until Wilson's 95 % interval is narrow enough."""
-    from apo_bench.statistics import rate_trials, wilson_half_width
-
     n = rate_trials(rate, half_width)
     reached = wilson_half_width(rate, n)
     _say(
@@ -67,8 +69,6 @@ def power_pairs(
     as_json: AsJson = False,
 ) -> None:
     """Seeds, met by both methods, until McNemar's exact test shows which one is better."""
-    from apo_bench.statistics import ERROR, paired_power, paired_trials, percent
-
     win, lose = _shares(win, lose, rates, agree)
     n = paired_trials(win, lose, power, comparisons)
     reached = paired_power(n, win, lose, ERROR / comparisons)
@@ -92,8 +92,6 @@ def power_margin(
     as_json: AsJson = False,
 ) -> None:
     """Seeds, met by both methods, until Tango's 95 % interval shows that one is not worse by a margin."""
-    from apo_bench.statistics import margin_power, margin_trials, percent
-
     win, lose = (0.0, 0.0) if all(x is None for x in (win, lose, rates, agree)) else _shares(win, lose, rates, agree)
     n = margin_trials(margin, win, lose, power)
     reached = margin_power(n, margin, win, lose)
@@ -115,8 +113,6 @@ def power_shows(
     as_json: AsJson = False,
 ) -> None:
     """What so many trials per cell can show at best."""
-    from apo_bench.statistics import ERROR, evidence, least_discordant
-
     s = evidence(trials, power, comparisons)
     if s.discordant is None or s.least_win is None:
         fewest = least_discordant(ERROR / comparisons)
@@ -146,8 +142,6 @@ def power_shows(
 
 
 def _shares(win: float | None, lose: float | None, rates: str | None, agree: float | None) -> tuple[float, float]:
-    from apo_bench.statistics import shares
-
     if rates is None and win is not None and lose is not None and agree is None:
         return win, lose
     if rates is None or win is not None or lose is not None:
@@ -173,7 +167,4 @@ def _held(comparisons: int) -> str:
 
 
 def _say(answer: Mapping[str, Any], words: str, as_json: bool) -> None:
-    if as_json:
-        print_json({"schema": _SCHEMA, **answer})
-    else:
-        typer.echo(words)
+    print_answer({"schema": _SCHEMA, **answer}, [words], as_json)

@@ -1,16 +1,35 @@
-"""The command `apo-bench recording import`: the log of a tracker becomes an observation file."""
+"""The command `apo-bench recording import`: the log of a tracker becomes an observation file.
+
+Two commands on what a camera sees: `apo-bench eye | recognise`, poses from depth images, contacts from poses.
+"""
 
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.arguments import check_outputs, numbers, path_given, whole_numbers, writing
-from apo_bench.cli.help_groups import Grouped
-from apo_bench.cli.printing import print_lines
-from apo_bench.errors import InputError
+from apo_bench.cli.printing import console, group, print_answer, print_json, print_lines, say
+from apo_bench.cli.setting_options import (
+    NO_RESULT,
+    AsJson,
+    ScenarioArgument,
+    StatedDeg,
+    StatedMm,
+    check_outputs,
+    numbers,
+    path_given,
+    takes,
+    trial_options,
+    whole_numbers,
+    writing,
+)
+from apo_bench.errors import InputError, require, require_known
+from apo_bench.files.csv_form import assumed_deviations
+from apo_bench.io import redirect_output
+from apo_bench.records import RECOGNISED
+from apo_bench.scenario.file import load_scenario
 
-recording = typer.Typer(name="recording", cls=Grouped, rich_markup_mode=None, help="Logs of pose trackers.")
+recording = group("recording", "Logs of pose trackers.")
 
 
 @recording.command("import")
@@ -30,16 +49,16 @@ def recording_import(
 ) -> None:
     """Turn the log of a pose tracker into an observation: frames, rests, the order of operations."""
     from apo_bench.recording.formats import read_log
-    from apo_bench.recording.hands import hands_of
     from apo_bench.recording.setup_files import part_tracks, read_camera, read_objects
     from apo_bench.recording.show.text import reading_lines
+    from apo_bench.recording.stays import hands_of
 
     outputs = [(out, "--out", (".json", ".csv")), (picture, "--picture", (".png",)), (paths, "--paths", (".csv",))]
     check_outputs(outputs, (log, camera, objects))
-    if scenario is None and (out.suffix.lower() == ".json" or ends or unseen or paths):
-        raise InputError(
-            "--out .json, --ends, --unseen and --paths need --scenario; give one, or --out FILE.csv alone."
-        )
+    require(
+        scenario is not None or (out.suffix.lower() != ".json" and not ends and not unseen and not paths),
+        "--out .json, --ends, --unseen and --paths need --scenario; give one, or --out FILE.csv alone.",
+    )
     stated = read_camera(camera)
     named = read_objects(objects)
     read = read_log(log, form, stated.conventions)
@@ -55,11 +74,10 @@ def recording_import(
 def _import(
     log: Any, objects: Any, camera: Any, tracks: Any, scenario: str, order: tuple[str | None, str | None], files: Any
 ) -> None:
-    from apo_bench.io.tables import write_csv
+    from apo_bench.io.strict_csv import write_csv
     from apo_bench.recording.importing import import_recording
     from apo_bench.recording.show.drawing import draw_recording, drawing_of, unfit_drawing
     from apo_bench.recording.show.text import PATH_HEAD, imported_lines, path_rows
-    from apo_bench.scenario.file import load_scenario
 
     out, picture, paths = files
     loaded = load_scenario(scenario)
@@ -92,9 +110,9 @@ def _import(
 
 
 def _import_unplanned(log: Any, objects: Any, camera: Any, tracks: Any, out: Path, picture: Path | None) -> None:
+    from apo_bench.recording.importing import goals_of, unplanned_recording
     from apo_bench.recording.show.drawing import draw_recording, unplanned_drawing
     from apo_bench.recording.show.text import put_lines
-    from apo_bench.recording.without_scenario import goals_of, unplanned_recording
 
     recording = unplanned_recording(tracks, camera, log.file)
     parts = [put.part for put in recording.puts]
@@ -111,10 +129,11 @@ def _stated(ends: str | None, unseen: str | None, operations: int) -> Any:
     from apo_bench.recording.ordering import Stated
 
     hidden = whole_numbers(unseen, "--unseen") if unseen else ()
-    if not all(1 <= k <= operations for k in hidden):
-        raise InputError(f"--unseen {unseen} was given; operations from 1 to {operations} are allowed.")
-    if ends and hidden:
-        raise InputError("--ends and --unseen were given; give one of the two.")
+    require(
+        all(1 <= k <= operations for k in hidden),
+        f"--unseen {unseen} was given; operations from 1 to {operations} are allowed.",
+    )
+    require(not ends or not hidden, "--ends and --unseen were given; give one of the two.")
     return Stated(numbers(ends, "--ends") if ends else (), tuple(k - 1 for k in hidden))
 
 
@@ -130,9 +149,71 @@ def _print_rests(camera: Any, parts: list[str], rests: list[Any], tracks: Any, f
 
 def _write_table(path: Path, parts: list[str], rests: list[Any], goals: Any, camera: Any) -> None:
     """Write goals as CSV; an operation that the log does not show has no rest."""
+    from apo_bench.recording.importing import deviations
     from apo_bench.recording.show.text import observation_table
-    from apo_bench.recording.without_scenario import deviations
 
     sizes = [(1.0, 1.0) if rest is None else deviations(rest, camera) for rest in rests]
     with writing(f"--out {path}"):
         path.write_text(observation_table(parts, goals, sizes, [rest is not None for rest in rests]), encoding="utf-8")
+
+
+def eye_command(
+    scenario: ScenarioArgument,
+    level: Annotated[float, typer.Option(help="Standard deviation of one ray, mm.")] = 1.0,
+    seed: Annotated[int, typer.Option(help="Which demonstration.")] = 0,
+    careless: Annotated[float, typer.Option(help="0 is a careful human, 1 the scenario's.")] = 1.0,
+    view: Annotated[int, typer.Option(help="Which view of the range finder the picture shows, from 1.")] = 1,
+    out: Annotated[Path | None, typer.Option(help="Draw every stage of seeing into this file: .png.")] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Watch a demonstration with a range finder: what moved, which part it was, where it went."""
+    from apo_bench.show.sensor import checked_view, run_sensor, sensor_form, sensor_lines
+
+    check_outputs([(out, "--out", (".png",))])
+    drawn_view = checked_view(view)
+    sensor_run = run_sensor(scenario, level, seed, careless)
+    form = sensor_form(sensor_run, level, seed, careless)
+    print_answer(form, sensor_lines(form), as_json)
+    if out is not None:
+        from apo_bench.show.sensor import draw_sensor
+
+        draw_sensor(sensor_run, out, drawn_view)
+        say(f"\nWrote {out}", as_json)
+    if not all(operation["found"] for operation in form["operations"]):
+        raise typer.Exit(NO_RESULT)
+
+
+@takes(trial_options("level", "careless", "seed", "noise", "eye"))
+def recognise_command(
+    scenario: ScenarioArgument,
+    *,
+    observation: Annotated[Path | None, typer.Option(help="What was seen, .csv or .json, instead of a trial.")] = None,
+    deviation_mm: StatedMm = None,
+    deviation_deg: StatedDeg = None,
+    relations: Annotated[
+        str,
+        typer.Option(help="recognised, recognised-fixed (6 mm and 10 deg), recognised-twice or recognised-jointly."),
+    ] = "recognised",
+    as_json: AsJson = False,
+    **options: Any,
+) -> None:
+    """Find the contacts of what was seen, and say how they differ from those of the scenario."""
+    from apo_bench.show.recognised_text import confidence_line, difference_lines, evidence_table, recognition_form
+    from apo_bench.trial.recognised_contacts import recognise_by
+    from apo_bench.trial.request import looked_at
+
+    require_known("way of recognising", relations, RECOGNISED)
+    name = load_scenario(scenario).name
+    with redirect_output(as_json):
+        seen, assumed = looked_at(scenario, observation, options, deviation_mm, deviation_deg)
+    recognised = recognise_by(seen, relations)
+    if as_json:
+        print_json(recognition_form(name, relations, seen, recognised, assumed))
+        return
+    console(140).print(evidence_table(recognised, seen.assembly))
+    if assumed:
+        typer.echo("\n" + assumed_deviations(deviation_mm, deviation_deg))
+    typer.echo("\n" + "\n".join([*confidence_line(recognised), *difference_lines(seen, recognised)]))
+    if not seen.seen.all():
+        missing = ", ".join(str(k + 1) for k, was_seen in enumerate(seen.seen) if not was_seen)
+        typer.echo(f"not seen, so nothing is recognised there: operation {missing}")

@@ -6,36 +6,27 @@ from typing import Annotated
 
 import typer
 
-from apo_bench.cli.arguments import NO_RESULT, check_writable, path_given
-from apo_bench.cli.help_groups import Grouped
-from apo_bench.cli.setting_options import ScenarioArgument
-from apo_bench.errors import InputError
-
-scenario = typer.Typer(
-    name="scenario", cls=Grouped, rich_markup_mode=None, help="Scenarios: list, task cards, new ones, checks."
-)
+from apo_bench.cli.printing import group
+from apo_bench.cli.setting_options import NO_RESULT, ScenarioArgument, check_writable, path_given
+from apo_bench.errors import InputError, require
+from apo_bench.records import check
+from apo_bench.scenario.file import load_scenario, scenario_names
 
 
-@scenario.callback(invoke_without_command=True)
-def _without_command(context: typer.Context) -> None:
-    """List the scenarios, or read the card of one."""
-    if context.invoked_subcommand is None:
-        scenario_list()
-
-
-@scenario.command("list")
 def scenario_list() -> None:
     """List the scenarios that come with the package; generated:SEED names any number of others."""
     from apo_bench.cli.terminal import print_scenarios
-    from apo_bench.scenario.file import load_scenario, scenario_names
 
     print_scenarios([load_scenario(name) for name in scenario_names()])
+
+
+scenario = group("scenario", "Scenarios: list, task cards, new ones, checks.", scenario_list)
+scenario.command("list")(scenario_list)
 
 
 @scenario.command("card")
 def print_card(scenario: ScenarioArgument) -> None:
     """Print the task card of a scenario; the file is checked."""
-    from apo_bench.scenario.file import load_scenario
     from apo_bench.show.card import scenario_card
 
     typer.echo(scenario_card(load_scenario(scenario)), nl=False)
@@ -92,22 +83,19 @@ def scenario_new(
     from apo_bench.drafting.posed import UPS, read_posed
     from apo_bench.drafting.upright import drafted
     from apo_bench.drafting.writing import draft_lines, write_scenario
-    from apo_bench.scenario.file import load_scenario
 
     check_writable(out, "--out", (".toml",))
-    if out.exists() and not overwrite:
-        raise InputError(f"--out {out} is there already, maybe with changes by hand; name another, or add --overwrite.")
-    if up is not None and up not in UPS:
-        raise InputError(f"--up {up} was given; {', '.join(UPS)} are allowed.")
-    if not 0.0 <= clearance <= 5.0:
-        raise InputError(f"--clearance {clearance:g} was given; 0 to 5 mm are allowed.")
-    if not 0.0 <= loosen <= 1.0:
-        raise InputError(f"--loosen {loosen:g} was given; 0 to 1 mm are allowed.")
+    require(
+        not out.exists() or overwrite,
+        f"--out {out} is there already, maybe with changes by hand; name another, or add --overwrite.",
+    )
+    require(up is None or up in UPS, f"--up {up} was given; {', '.join(UPS)} are allowed.")
+    require(0.0 <= clearance <= 5.0, f"--clearance {clearance:g} was given; 0 to 5 mm are allowed.")
+    require(0.0 <= loosen <= 1.0, f"--loosen {loosen:g} was given; 0 to 1 mm are allowed.")
     named = [*(assembly or parts or []), *(more or [])]
     source = ", ".join(Path(each).name for each in named) if assembly else "" if poses is None else poses.name
     if assembly:
-        if poses is not None or parts:
-            raise InputError("--assembly was given with --parts or --poses; give one or the other.")
+        require(poses is None and not parts, "--assembly was given with --parts or --poses; give one or the other.")
         files, named = [path_given(each) for each in named], []
         poses, lines = import_assembly(files, out.with_name(f"{out.stem}_parts"), unit)
         typer.echo("\n".join([*lines, f"Wrote {poses} and its parts"]))
@@ -132,10 +120,8 @@ def scenario_check(
 ) -> None:
     """Say whether human and robot can do a scenario, and which line of its file to change if not."""
     from apo_bench.drafting.checking import check_file
-    from apo_bench.records import check
 
-    if not 0 <= seeds <= 1000:
-        raise InputError(f"--seeds {seeds} was given; 0 to 1000 are allowed.")
+    require(0 <= seeds <= 1000, f"--seeds {seeds} was given; 0 to 1000 are allowed.")
     check("fidelity", fidelity)
 
     is_well = True

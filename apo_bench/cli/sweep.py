@@ -1,4 +1,7 @@
-"""One command: `apo-bench sweep`, many trials out of flags or a file, resumed where they were left."""
+"""One command: `apo-bench sweep`, many trials out of flags or a file, resumed where they were left.
+
+The command `apo-bench dataset make`: whole trials as tables to learn from.
+"""
 
 from __future__ import annotations
 
@@ -6,24 +9,32 @@ import shlex
 import signal
 import sys
 from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from apo_bench.cli.arguments import cores, path_given
+from apo_bench.cli.printing import group
 from apo_bench.cli.setting_options import (
     CacheFolder,
     CorrectorLimit,
+    ScenarioArgument,
     axis_flag,
     axis_option,
     completion,
+    cores,
+    path_given,
     read_axis,
     sweep_options,
     takes,
+    trial_options,
+    writing,
 )
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.records import CORRECTOR_LIMIT_S, in_python
+from apo_bench.scenario.file import load_scenario
 
 if TYPE_CHECKING:
     from apo_bench.sweeps.grid import SweepSettings
@@ -119,7 +130,7 @@ def sweep_command(
 def _grids(scenarios: list[str], options: Mapping[str, Any]) -> tuple[SweepSettings, ...]:
     """The grid of the options, or those of a sweep file with some settings replaced."""
     from apo_bench.sweeps.grid import AXES, SweepSettings
-    from apo_bench.sweeps.sweep_file import is_sweep_file, read_sweep
+    from apo_bench.sweeps.sweep import is_sweep_file, read_sweep
 
     axes = {axis_option(info): info for info in AXES}
     texts = {axes[option]: text for option, text in options.items() if option in axes}
@@ -138,3 +149,46 @@ def _grids(scenarios: list[str], options: Mapping[str, Any]) -> tuple[SweepSetti
             f"{axis_flag(info)} was given together with the sweep file {files[0]}; write {info.axis} into the file."
         )
     return read_sweep(files[0], others)
+
+
+dataset = group(
+    "dataset",
+    "Data to learn from: whole trials as tables.",
+    lambda: typer.echo("apo-bench dataset make SCENARIO --episodes 100 --out DIR"),
+)
+_FIRST_SEED = 1_000_000
+"""Seeds below are for what is reported."""
+
+
+@dataset.command("make")
+@takes(trial_options("level", "careless", "noise", "method", "clearance_mm", "robot_error", "arm"))
+def dataset_make(
+    scenario: ScenarioArgument,
+    more: Annotated[list[str] | None, typer.Argument(help="More scenarios.")] = None,
+    *,
+    out: Annotated[Path, typer.Option(parser=path_given, metavar="<path>", help="A folder that is not there yet.")],
+    episodes: Annotated[int, typer.Option(help="Trials of each scenario.")] = 10,
+    seed: Annotated[int, typer.Option(help="First seed; those of tracks and of the headline are small.")] = _FIRST_SEED,
+    format: Annotated[str, typer.Option(help="parquet, lerobot or minari.")] = "parquet",
+    record: Annotated[str, typer.Option(help="replays, or insertions: APOInsert-v0 led by a policy.")] = "replays",
+    policy: Annotated[
+        str, typer.Option(help="Of insertions: expert, straight, dagger-insert, or your own.")
+    ] = "expert",
+    **options: Any,
+) -> None:
+    """Run trials and write what was seen, planned and true, and all frames, with a card for people and programs."""
+    from apo_bench.datasets.making import make_dataset
+    from apo_bench.trial.request import Request, requested_settings
+
+    require(record in ("replays", "insertions"), f"--record {record} was given; replays or insertions is allowed.")
+    require(episodes >= 1, f"--episodes {episodes} was given; a whole number from 1 is allowed.")
+    options["seed"] = seed
+    asked = [Request(scenario=name, options=options) for name in (scenario, *(more or ()))]
+    several = [requested_settings(each, load_scenario(each.scenario).clearance_mm) for each in asked]
+    trials = [replace(each, seed=each.seed + k) for each in several for k in range(episodes)]
+    led = policy if record == "insertions" else None
+    with writing():
+        made, right = make_dataset(
+            trials, out, shlex.join(["apo-bench", *sys.argv[1:]]), format, led, partial(typer.echo, err=True)
+        )
+    typer.echo(f"{made} trials, {right} right; the card is {out / 'README.md'}")

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 
 from apo_bench.cli.printing import console
-from apo_bench.io.plain_text import clean
+from apo_bench.io import clean
 from apo_bench.records import RANGE, SETTINGS, FreedSet, MovedInHand, Predicted, Row, feels, look_up
 from apo_bench.report.tables.cells import cell_table
-from apo_bench.report.tables.forecasts import prediction_summary
+from apo_bench.report.tables.methods import prediction_summary
 from apo_bench.report.tables.table import Column
 from apo_bench.report.tables.table import Table as Data
 from apo_bench.scenario.scenario import Scenario

@@ -1,19 +1,22 @@
-"""Correct an observation by any corrector: by name, as `module:name`, or the object itself."""
+"""Correct an observation by any corrector: by name, as `module:name`, or the object itself.
 
-from collections.abc import Callable
+Correct many observations of one assembly at once: what they share is worked out once, the rest is one array.
+"""
+
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from math import ceil
 from typing import Any
 
 import numpy as np
 
 from apo_bench.assembly import Correction, Look, LookingCorrector, Observation, lowered_observation
-from apo_bench.correction.baselines.measured import gap_of, goals_as_given
-from apo_bench.correction.checks.correction_checks import RIGID, check_correction, check_near
-from apo_bench.correction.checks.observation_checks import check_observations
-from apo_bench.correction.checks.status import opposing
+from apo_bench.correction.checks.correction_checks import RIGID, check_correction, check_near, check_observations
+from apo_bench.correction.checks.status import gap_of, goals_as_given, opposing
 from apo_bench.correction.contact.contact import ContactCorrector
-from apo_bench.errors import InputError, failed, kind
+from apo_bench.correction.robust.robust import RobustCorrector, contact_robust
+from apo_bench.errors import InputError, failed, kind, require
 from apo_bench.geometry import Array, NotReal, is_rigid, real
 from apo_bench.names import resolve
 from apo_bench.records import CORRECTOR, CORRECTORS
@@ -94,16 +97,15 @@ def _admitted(returned: Any, observation: Observation, chosen: Any, name: str) -
         return goals_as_given(
             observation, _bare(returned, len(observation.goals), name), "the corrector returned goals and no status"
         )
-    if returned.status not in _STATUSES:
-        raise InputError(
-            f"the corrector '{name}' returned the status {returned.status!r}; return one of {', '.join(_STATUSES)}."
-        )
+    require(
+        returned.status in _STATUSES,
+        f"the corrector '{name}' returned the status {returned.status!r}; return one of {', '.join(_STATUSES)}.",
+    )
     goals = _bare(returned.goals, len(observation.goals), name)
     returned = check_correction(returned, observation.assembly, name)
     if returned.ok and not _ours(chosen):
         before = gap_of(observation, observation.goals)
-        after = gap_of(observation, goals)
-        returned = replace(returned, gap_before_m=before, gap_after_m=after)
+        returned = replace(returned, gap_before_m=before, gap_after_m=gap_of(observation, goals))
     return returned
 
 
@@ -111,8 +113,7 @@ def _ours(corrector: Any) -> bool:
     """Whether a corrector comes with the package; what others say of the gaps that they leave is measured instead."""
     while isinstance(corrector, partial):
         corrector = corrector.func
-    module = getattr(corrector, "__module__", "")
-    return str(module).startswith("apo_bench.")
+    return str(getattr(corrector, "__module__", "")).startswith("apo_bench.")
 
 
 def _bare(returned: Any, n: int, name: str) -> Array:
@@ -134,3 +135,63 @@ def _bare(returned: Any, n: int, name: str) -> Array:
         )
     check_near(goals, name, "a goal for operation")
     return goals
+
+
+BATCH = 150
+"""Observations that are solved together, at most."""
+LARGEST_JACOBIANS = 96_000
+"""Entries of all their Jacobians: more would leave the cache of the processor."""
+
+
+def correct_many(
+    observations: Sequence[Observation], corrector: ContactCorrector | RobustCorrector = contact_robust
+) -> tuple[Correction, ...]:
+    """Correct many observations of one assembly at once: as one after the other up to rounding, and faster.
+
+    Args:
+        observations: Observations of one and the same assembly with the same start poses and play.
+        corrector: As `correct` has it by default; those whose test fails are then corrected one after the other.
+
+    Raises:
+        InputError: They are not, one makes no sense, or a covariance is not positive definite.
+    """
+    require(
+        not isinstance(observations, Observation) and isinstance(observations, Sequence),
+        "correct_many needs a list of observations; ask `correct` for one, or make a list of them.",
+    )
+    require(
+        isinstance(corrector, ContactCorrector | RobustCorrector),
+        f"correct_many was given {corrector!r}; give a ContactCorrector, such as ContactCorrector('drop'), or a "
+        "RobustCorrector.",
+    )
+    if not observations:
+        return ()
+    check_observations(observations)
+    if (odd := _odd_one(observations)) is not None:
+        raise InputError(
+            f"observation {odd + 1} is of another assembly, start or play than observation 1; "
+            "correct those together that share them."
+        )
+    one = observations[0].assembly
+    entries = 3 * len(one.relations()) * 6 * len(one)
+    most = min(BATCH, max(1, LARGEST_JACOBIANS // max(1, entries)))
+    # Batches of equal size, since a small last one takes nearly as long as others.
+    size = ceil(len(observations) / ceil(len(observations) / most))
+    batches = (observations[i : i + size] for i in range(0, len(observations), size))
+    return tuple(correction for some in batches for correction in corrector.together(some))
+
+
+def _odd_one(observations: Sequence[Observation]) -> int | None:
+    """The first that is not of the same assembly, start and play as the one at the head; None if all are."""
+    first = observations[0]
+    for i, observation in enumerate(observations):
+        if (
+            observation.assembly is not first.assembly
+            or observation.play_m != first.play_m
+            or observation.start.keys() != first.start.keys()
+        ):
+            return i
+    poses = [observation.start[part] for observation in observations for part in first.start]
+    starts = np.concatenate([np.zeros((0, 4)), *poses]).reshape(len(observations), -1)
+    odd = np.flatnonzero((starts != starts[0]).any(axis=1))
+    return int(odd[0]) if len(odd) else None

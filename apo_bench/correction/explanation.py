@@ -30,11 +30,14 @@ from apo_bench.assembly import (
 from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.contact.problem import problem_of
 from apo_bench.correction.directions import Direction, directions, held
-from apo_bench.correction.relation_equations import RelationHold, by_relation, relation_holds
-from apo_bench.correction.shared_estimate import SharedEstimate, estimate_shared
-from apo_bench.correction.solvers.compact import linearised_by
-from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR, Freedom, freedom_of
-from apo_bench.correction.solvers.whitened import twists_of
+from apo_bench.correction.relation_equations import (
+    RelationHold,
+    SharedEstimate,
+    by_relation,
+    estimate_shared,
+    relation_holds,
+)
+from apo_bench.correction.solvers import LARGEST_POSTERIOR, Freedom, freedom_of, linearised_by, twists_of
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose, right_jacobian
 
@@ -245,7 +248,8 @@ def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, spans: A
         return ()
     final = placements(assembly, start, goals)[-1]
     last = assembly.odls()[-1]
-    words = _rooted(assembly)
+    # The ODLs at the end, in which one operation per part that puts it at its start comes first.
+    words = dict(replace(assembly, operations=(*map(Operation, assembly.solids), *assembly.operations)).odls()[-1])
     stack = np.concatenate([np.array([start[part] for part in assembly.solids]), goals])
     explained = []
     for part in last:
@@ -261,12 +265,6 @@ def _standing(assembly: Assembly, start: Poses, goals: Array, B: Array, spans: A
         placing = max(k for k, operation in enumerate(assembly.operations) if part in operation.moves)
         explained.append(PartExplanation(part, placing, last[part], final[part], 6 - len(loose), held(named), loose, C))
     return tuple(sorted(explained, key=lambda one: one.placed))
-
-
-def _rooted(assembly: Assembly) -> dict[str, ODL]:
-    """The ODL of every part at the end, in which one operation per part that puts it at its start comes first."""
-    starts = map(Operation, assembly.solids)
-    return dict(replace(assembly, operations=(*starts, *assembly.operations)).odls()[-1])
 
 
 def _reach(word: ODL, stack: Array, constants: int, n: int) -> Array:

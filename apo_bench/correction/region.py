@@ -4,11 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Correction, Observation, lowered_observation
-from apo_bench.correction.contact.heavy_tails import drawn_radius
 from apo_bench.correction.contact.problem import seen_system
-from apo_bench.correction.solvers.compact import linearised_by
-from apo_bench.correction.solvers.posterior import freedom_of
-from apo_bench.correction.solvers.whitened import coordinates_of, noise_factor
+from apo_bench.correction.contact.solved import drawn_radius
+from apo_bench.correction.solvers import coordinates_of, freedom_of, linearised_by, noise_factor
 from apo_bench.geometry import Array, pose, right_jacobian
 
 

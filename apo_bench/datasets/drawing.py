@@ -1,23 +1,117 @@
-"""Pairs of observation and truth, drawn without physics from streams of chance that no trial uses."""
+"""Pairs of observation and truth, drawn without physics from streams of chance that no trial uses.
+
+Many demonstrations, seen by one call of a noise model: as one long demonstration whose parts are all different.
+"""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, fields
+from functools import lru_cache
 from itertools import count
 from pathlib import Path
-from typing import Any, final
+from typing import Any, NamedTuple, final
 from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.assembly import Layout
-from apo_bench.datasets.together import by_part, observe_many
+from apo_bench.assembly import Assembly, Demonstration, Layout, Observation, Operation
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
+from apo_bench.observation.looking import observe
+from apo_bench.observation.models import (
+    AlongRay,
+    Anisotropic,
+    AnyTurn,
+    Bias,
+    Empirical,
+    Fitted,
+    Flipped,
+    HeavyTailed,
+    Isotropic,
+    Outliers,
+    PerPart,
+    Sighted,
+    Stale,
+    Symmetric,
+)
 from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.records import USUAL, TrialSettings, check, level_pair
 from apo_bench.scenario import Scenario, careless_covariance, load_scenario, spread_error
-from apo_bench.scenario.layouts import Layouts, draw_layouts
+from apo_bench.scenario.layout import Layouts, draw_layouts
+
+_BY_PART = frozenset(
+    (
+        *(Isotropic, Anisotropic, PerPart, Sighted, HeavyTailed, Outliers, Bias, Symmetric, AnyTurn),
+        *(Flipped, Stale, AlongRay, Empirical, Fitted),
+    )
+)
+"""Models whose errors of operations on different parts are independent, whatever else is seen."""
+
+
+@final
+class Seen(NamedTuple):
+    """What was seen of many demonstrations."""
+
+    goals: Array
+    """(n, k, 4, 4)."""
+    covariance: Array
+    """(n, k, 6, 6)."""
+    seen: NDArray[np.bool_]
+    """(n, k)."""
+
+
+def by_part(noise: Noise) -> bool:
+    """Whether a noise model draws many demonstrations at once; others draw one after the other."""
+    shares_view = isinstance(noise, Fitted) and noise.measured.view is not None
+    return type(noise) in _BY_PART and not shares_view
+
+
+def observe_many(assembly: Assembly, shown: Layouts, careless: Array, noise: Noise, rng: np.random.Generator) -> Seen:
+    """What a noise model makes of many demonstrations of one assembly.
+
+    Args:
+        shown: Where every part was put.
+        careless: (k, 6, 6), as in a `Demonstration`.
+    """
+    n, k = shown.goals.shape[:2]
+    if by_part(noise):
+        start = {_copy(part, i): T for part, poses in shown.start.items() for i, T in enumerate(poses)}
+        long = Demonstration(
+            _repeated(assembly, n), start, shown.goals.reshape(-1, 4, 4), {}, np.tile(careless, (n, 1, 1))
+        )
+        return _stacked([noise(long.assembly, long, rng)], n, k)
+    each = []
+    for i, goals in enumerate(shown.goals):
+        one = Demonstration(assembly, {part: poses[i] for part, poses in shown.start.items()}, goals, {}, careless)
+        each.append(observe(one, noise, rng))
+    return _stacked(each, n, k)
+
+
+def _stacked(observations: list[Observation], n: int, k: int) -> Seen:
+    return Seen(
+        np.concatenate([seen.goals for seen in observations]).reshape(n, k, 4, 4),
+        np.concatenate([seen.covariance for seen in observations]).reshape(n, k, 6, 6),
+        np.concatenate([seen.seen for seen in observations]).reshape(n, k),
+    )
+
+
+def _copy(part: str, i: int) -> str:
+    return f"{part}/{i}"
+
+
+@lru_cache(maxsize=32)
+def _repeated(assembly: Assembly, n: int) -> Assembly:
+    """The same operations n times, each time with parts of their own, and without contacts, which no camera sees."""
+    return Assembly(
+        {_copy(part, i): solid for part, solid in assembly.solids.items() for i in range(n)},
+        tuple(
+            Operation(_copy(each.main, i), carries=tuple(_copy(part, i) for part in each.carries))
+            for i in range(n)
+            for each in assembly.operations
+        ),
+        frozenset(_copy(part, i) for part in assembly.fixed for i in range(n)),
+    )
+
 
 BLOCK = 128
 """So many pairs of a scenario are drawn at once, whatever is asked for: more of them begin with the same ones."""
@@ -139,8 +233,7 @@ def _block(scenarios: Sequence[Scenario], noise: Noise, seed: int, number: int, 
 
 def stream(seed: int, scenario: str, number: int) -> np.random.Generator:
     """The random numbers of one block of a scenario of this name."""
-    key = STREAM, crc32(scenario.encode()), number
-    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
+    return np.random.default_rng(np.random.SeedSequence(seed, spawn_key=(STREAM, crc32(scenario.encode()), number)))
 
 
 def _mistakes(scenario: Scenario, careless: float, rng: np.random.Generator) -> Array:

@@ -8,14 +8,12 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly import Plan
-from apo_bench.datasets.card import write_card
-from apo_bench.datasets.rollout import FPS, About, Field, Rollout
+from apo_bench.datasets.card import FPS, About, Field, Rollout, write_card
 from apo_bench.geometry import Array, pose
-from apo_bench.io.tables import write_columns
+from apo_bench.io import write_columns
 from apo_bench.records import Row, TrialSettings
 from apo_bench.simulation.hooks import Doing, Hooks
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import WRIST_SENSORS, part_pose, wrist_felt
+from apo_bench.simulation.scene import WRIST_SENSORS, Scene, part_pose, wrist_felt
 from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
 from apo_bench.trial.trial import noise_of, run_trial
 
@@ -113,7 +111,6 @@ class _Recorder:
         self.plan = plan
 
     def _tick(self, data: Any, doing: Doing) -> None:
-        arm = self._scene.arm
         at = [part_pose(self._scene.work, data, part) for part in self.parts]
         look = (
             float(data.time),
@@ -121,8 +118,8 @@ class _Recorder:
             doing.undoes,
             doing.macro,
             float(doing.force_n),
-            [float(data.joint(f"arm/{joint}").qpos[0]) for joint in arm.joints],
-            [float(data.joint(f"arm/{finger}").qpos[0]) for finger in arm.fingers],
+            [float(data.joint(f"arm/{joint}").qpos[0]) for joint in self._scene.arm.joints],
+            [float(data.joint(f"arm/{finger}").qpos[0]) for finger in self._scene.arm.fingers],
             np.array(data.ctrl),
             np.concatenate([data.sensor(name).data for name in WRIST_SENSORS]),
             pose.pack(np.array(at)),

@@ -1,15 +1,127 @@
-"""What `apo-bench dataset make` makes: trials, in one of three formats."""
+"""What `apo-bench dataset make` makes: trials, in one of three formats.
 
-from collections.abc import Callable, Sequence
+Insertions as data: what a policy saw and did in `APOInsert-v0`, and what the judge said.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
+from types import MappingProxyType
+from typing import Any
 
+import numpy as np
+
+from apo_bench.datasets.card import About, Field, Rollout
 from apo_bench.datasets.episodes import about_replays, replay_rollouts, replays, write_parquet
-from apo_bench.datasets.insertions import insertions
-from apo_bench.datasets.lerobot import write_lerobot
-from apo_bench.datasets.minari import write_minari
-from apo_bench.errors import InputError, require, unknown
+from apo_bench.datasets.lerobot import write_lerobot, write_minari
+from apo_bench.envs.policies import POLICIES, insert_env
+from apo_bench.errors import InputError, require, require_known
+from apo_bench.names import resolve
 from apo_bench.records import TrialSettings
 from apo_bench.trial.stages import scene_of
+
+_FRAME = "way in"
+
+
+def _named(*kinds: str) -> tuple[str, ...]:
+    return tuple(f"{kind}_{axis}" for kind in kinds for axis in ("x", "y", "z", "rx", "ry", "rz"))
+
+
+_FIELDS: Mapping[str, Field] = MappingProxyType(
+    {
+        "agent_pos": Field(
+            (*_named("tip", "lag"), "opening"),
+            "mm, deg",
+            _FRAME,
+            "front of the part and its turn less those where it is believed to end, by the encoders; what is commanded "
+            "less that; opening of a finger less half the width of the part",
+        ),
+        "wrench": Field(_named("wrench"), "N, Nm", _FRAME, "on the hand and what is in it, about the flange"),
+        "plan": Field(
+            ("way_x", "way_y", "way_z", "left", "least_left", "time_left", *_named("sigma", "last"), "last_gripper"),
+            "mm, deg, s",
+            f"{_FRAME}; of the way: world",
+            "the way in; what is left of it, now and at least; time left; stated sigmas of the front; the last action",
+        ),
+        "action": Field(
+            (*_named("shift"), "gripper"),
+            "1",
+            _FRAME,
+            "shift and turn of the front, in shift_mm and turn_deg of the environment; above 0.5 the hand opens",
+        ),
+    }
+)
+_OF_EPISODE: Mapping[str, str] = MappingProxyType(
+    {
+        "scenario": "the assembly",
+        "operation": "the operation, from 1",
+        "policy": "what acted",
+        "success": "whether the operation, and those before it, are right after release; the judge's word",
+        "code": "how it failed, or ok",
+        "sentence": "the same in words",
+    }
+)
+
+
+def insertions(
+    trials: Sequence[TrialSettings], policy: str, command: str, say: Callable[[str], None]
+) -> tuple[About, Iterator[Rollout]]:
+    """Have a policy insert, trial by trial, all scenarios one after the other.
+
+    Args:
+        policy: One of `POLICIES`, or `module:function` of the environment and what is seen, or `module:class`, of which
+            each episode makes one.
+        say: Is told in a sentence of each trial that does not come to the operation.
+
+    Raises:
+        InputError: There is no such policy, or the environment does not take a setting.
+    """
+    act = resolve(policy, POLICIES, "policy")
+    env = insert_env(trials[0])
+    boxes = {**dict(env.observation_space.items()), "action": env.action_space}  # type: ignore[attr-defined]
+    fields = {name: _FIELDS[name]._replace(most=tuple(box.high.tolist())) for name, box in boxes.items()}
+    about = About(
+        name="insertions",
+        summary="A robot holds a part before its mouth and is led by a policy until it lets go, in `APOInsert-v0` of "
+        f"apo_bench; the policy is `{policy}`. `reset(seed=seed, options={{'trial': seed}})` begins an episode.",
+        command=command,
+        action=fields.pop("action"),
+        fields=fields,
+        episodes=_OF_EPISODE,
+        robot=trials[0].arm,
+        env_spec=env.spec.to_json() if env.spec and len({each.scenario for each in trials}) == 1 else None,
+    )
+    return about, _rollouts(trials, policy, act, say)
+
+
+def _rollouts(trials: Iterable[TrialSettings], policy: str, act: Any, say: Callable[[str], None]) -> Iterator[Rollout]:
+    env = None
+    for trial in trials:
+        if env is None or env.scene.scenario.name != trial.scenario:
+            env = insert_env(trial)
+        try:
+            seen, info = env.reset(seed=trial.seed, options={"trial": trial.seed})
+        except InputError as error:
+            say(str(error))
+            continue
+        scenario, k = env.scene.scenario, env.operation
+        decide = act() if isinstance(act, type) else act
+        sights, actions, rewards = [seen], [], []
+        over = False
+        while not over:
+            actions.append(np.clip(decide(env, seen), -1.0, 1.0).astype(np.float32))
+            seen, reward, over, _, info = env.step(actions[-1])
+            sights.append(seen)
+            rewards.append(reward)
+        told = {"scenario": scenario.name, "operation": k, "policy": policy}
+        yield Rollout(
+            seed=trial.seed,
+            task=f"{scenario.title}: insert the part in the hand, the last one.",
+            observations={name: np.array([each[name] for each in sights]) for name in seen},
+            actions=np.array(actions),
+            rewards=np.array(rewards),
+            more={**told, **{name: info[name] for name in ("success", "code", "sentence")}},
+        )
+
 
 _WRITERS = {"lerobot": write_lerobot, "minari": write_minari}
 FORMATS = ("parquet", *_WRITERS)
@@ -42,8 +154,7 @@ def make_dataset(
         InputError: The folder holds something, a trial cannot be run, or a package is missing.
         OSError: Something cannot be written.
     """
-    if form not in FORMATS:
-        raise InputError(unknown("format", form, FORMATS))
+    require_known("format", form, FORMATS)
     require(
         not out.exists() or (out.is_dir() and not any(out.iterdir())),
         f"'{out}' is there already and not an empty folder; name another.",

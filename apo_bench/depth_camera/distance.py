@@ -30,8 +30,7 @@ def convex_of(hull: Hull) -> Convex:
     planes = np.array(hull.planes)
     planes[:, 3] -= planes[:, :3] @ hull.center
     if hull.cylinder is not None:
-        moved = hull.cylinder._replace(center=hull.cylinder.center - hull.center)
-        return Convex(planes, np.zeros((0, 2, 3)), moved)
+        return Convex(planes, np.zeros((0, 2, 3)), hull.cylinder._replace(center=hull.cylinder.center - hull.center))
     # Two corners are the ends of an edge if at least two planes go through both.
     corners = hull.corners - hull.center
     on = np.abs(corners @ planes[:, :3].T - planes[:, 3]) < 100 * _ON_M
@@ -97,8 +96,9 @@ def _cylinder_distance(cylinder: Cylinder, points: Array) -> tuple[Array, Array]
     beyond = np.stack([r - cylinder.radius, np.abs(z) - cylinder.half_length], axis=1)
     outside = np.maximum(beyond, 0.0)
     length = np.linalg.norm(outside, axis=1)
-    deepest = beyond.argmax(axis=1)
-    weights = np.where(length[:, None] > 0.0, outside / np.maximum(length, 1e-15)[:, None], np.eye(2)[deepest])
+    weights = np.where(
+        length[:, None] > 0.0, outside / np.maximum(length, 1e-15)[:, None], np.eye(2)[beyond.argmax(axis=1)]
+    )
     return length + np.minimum(beyond.max(axis=1), 0.0), np.einsum("nk,nki->ni", weights, ways)
 
 
@@ -178,8 +178,7 @@ def _box_distance(shape: Shape, points: Array) -> tuple[Array, Array]:
     beyond = np.abs(local) - shape.half
     outside = np.maximum(beyond, 0.0)
     length = np.sqrt(np.einsum("...i,...i->...", outside, outside))
-    deepest = beyond.max(axis=-1)
-    each = length + np.minimum(deepest, 0.0)
+    each = length + np.minimum(beyond.max(axis=-1), 0.0)
     nearest = each.argmin(axis=-1)[..., None]
     pick = nearest[..., None]
     beyond, local = (np.take_along_axis(a, pick, axis=-2)[..., 0, :] for a in (beyond, local))

@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Assembly, Demonstration, Observation, Poses
 from apo_bench.depth_camera.distance import Shape, alike, join_shapes, shape_of, strike_distances
 from apo_bench.depth_camera.locate import ALIKE, Appearance, LocatedModel, Model, locate, model_shares
-from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder, RangeImage
-from apo_bench.depth_camera.regions import Regions, regions
+from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder, RangeImage, Regions, regions
 from apo_bench.geometry import Array, frozen, nearest_symmetric_pose, physical_pieces, pose, symmetries, turned_alike
-from apo_bench.observation.models.isotropic import floored
+from apo_bench.observation.models import floored
 
 _GONE = 0.5
 """A part has moved if so much of what was seen of it has vanished."""

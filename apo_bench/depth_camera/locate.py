@@ -9,8 +9,7 @@ import numpy as np
 
 from apo_bench.depth_camera.distance import Shape, signed_distance
 from apo_bench.depth_camera.fit import Points, ShapeFits, covariance, refine, starts
-from apo_bench.depth_camera.range_finder import PinholeView
-from apo_bench.depth_camera.regions import Mask, median_filtered, share_explained
+from apo_bench.depth_camera.range_finder import Mask, PinholeView, median_filtered, share_explained
 from apo_bench.geometry import Array, frozen
 
 _COARSE = 150

@@ -16,14 +16,13 @@ from apo_bench.drafting.touching import walls_without_play
 from apo_bench.drafting.waiting import stance
 from apo_bench.errors import InputError
 from apo_bench.geometry import extent, is_held
-from apo_bench.io.ordinary_files import read_bytes
+from apo_bench.io import read_bytes
 from apo_bench.records import TrialSettings
 from apo_bench.scenario import Scenario, layout_at, load_scenario, nominal_operations
-from apo_bench.simulation.arm_checks.placing import place_in_reach
+from apo_bench.simulation.arm_checks.arm_check import place_in_reach
 from apo_bench.simulation.arm_checks.plan_check import struck_by
-from apo_bench.simulation.execution.prepare import key_angles, moves
-from apo_bench.simulation.execution.transfer import after_transfer
-from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.simulation.execution import after_transfer, key_angles, moves
+from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.trial.trial import run_trial
 
 _ON_TABLE_M = 1e-4

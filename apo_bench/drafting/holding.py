@@ -16,9 +16,8 @@ from apo_bench.insertion.macros import UP
 from apo_bench.scenario.scenario import Grasp, Site
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.arms.kinematics import Kinematics
-from apo_bench.simulation.execution.grasping import RestingPart, Stroke, first_clear, obstacles, tip_frame
-from apo_bench.simulation.execution.transfer import arrival_line, hover
-from apo_bench.simulation.robot.gripper import ArmAlone
+from apo_bench.simulation.execution import RestingPart, Stroke, arrival_line, first_clear, hover, obstacles, tip_frame
+from apo_bench.simulation.robot import ArmAlone
 
 _ARM = "six_axis"
 _OVER_M = (0.0, 0.005, 0.0085)

@@ -10,12 +10,12 @@ from dataclasses import replace
 from itertools import combinations
 
 from apo_bench.assembly import Contact, PartFace, contact_kind, geometric_play
-from apo_bench.assembly.facing import facing
+from apo_bench.assembly.touching import facing
 from apo_bench.drafting.posed import PosedPart
 from apo_bench.drafting.touching import NEAR_M, NEAR_RAD, NO_PLAY_MM, SHARE, walls_without_play
 from apo_bench.errors import InputError
 from apo_bench.geometry import physical_pieces
-from apo_bench.parts.receding import with_fit
+from apo_bench.parts.agreement import with_fit
 
 LOOSEN_MM = 0.2
 """Faces that are deeper in each other are not made looser."""

@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench.cad.solids.naming import free_name
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Solid, pose, world_bounds
-from apo_bench.io.documents import JsonNode, read_toml
+from apo_bench.io import JsonNode, read_toml
 from apo_bench.parts import load_part, part_path
 from apo_bench.parts.allowed import FACE_OR_PART_NAME
 

@@ -12,7 +12,7 @@ from types import MappingProxyType
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Facing, PartFace, Poses, contact_kind, geometric_play, play_mm
-from apo_bench.assembly.facing import facing
+from apo_bench.assembly.touching import facing
 from apo_bench.cad.solids.drawn import drawn_mesh, overlap
 from apo_bench.geometry import Array, Solid, intrusion, mate, pose
 

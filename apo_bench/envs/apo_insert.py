@@ -11,9 +11,8 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Outcome, Poses, Snapshot
-from apo_bench.envs.insert_spaces import PIXELS, as_seen, insert_space
-from apo_bench.envs.robot import RobotSettings
-from apo_bench.envs.starts import Begun, Trials, judged
+from apo_bench.envs.spaces import PIXELS, as_seen, insert_space
+from apo_bench.envs.starts import Begun, RobotSettings, Trials, judged
 from apo_bench.errors import InputError, require, unknown
 from apo_bench.geometry import Array
 from apo_bench.names import resolve
@@ -21,8 +20,8 @@ from apo_bench.observation.noise import Level, make_noise
 from apo_bench.records import CORRECTOR, CORRECTORS, SIMULATED, USUAL, TrialSettings, check, level_pair, sentence
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
-from apo_bench.simulation.robot.robot import Halt
-from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.simulation.robot import Halt
+from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.simulation.task.tip_control import PERIOD_S, TipControl
 
 Seen = dict[str, Any]
@@ -128,8 +127,10 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         pixels: bool = False,
         render_mode: str | None = None,
     ) -> None:
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise InputError(f"the render mode '{render_mode}' was given; use rgb_array or None.")
+        require(
+            render_mode in (None, *self.metadata["render_modes"]),
+            f"the render mode '{render_mode}' was given; use rgb_array or None.",
+        )
         if reward not in _REWARDS:
             raise InputError(unknown("reward", str(reward), _REWARDS))
         for name, size in (("shift_mm", shift_mm), ("turn_deg", turn_deg), ("fails_above_n", fails_above_n)):
@@ -213,8 +214,10 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         """
         if seed is not None:
             check("seed", int(seed))
-        if not isinstance(options or {}, Mapping) or set(options or {}) - {"trial"}:
-            raise InputError(f"the options {options!r} were given to reset(); a dict with trial is allowed.")
+        require(
+            isinstance(options or {}, Mapping) and not set(options or {}) - {"trial"},
+            f"the options {options!r} were given to reset(); a dict with trial is allowed.",
+        )
         super().reset(seed=seed)
         self._over = True
         self._begin(self._drawn((options or {}).get("trial")))
@@ -316,8 +319,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         """What is said once the hand has let go."""
         begun = self._now()
         verdict = judged(self._trials.scene, (*begun.start.after, reached), reached, begun.reference)
-        found = verdict.rests_on
-        return self._said("ok" if verdict.success else found.code, why=found.why)
+        return self._said("ok" if verdict.success else verdict.rests_on.code, why=verdict.rests_on.why)
 
     def _said(self, code: str, part: str = "", why: str = "") -> dict[str, Any]:
         k = self._now().start.operation

@@ -8,12 +8,11 @@ from typing import Any, final
 import gymnasium
 
 from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Step
-from apo_bench.envs.episode import Episode, Scenes, Settings, watch_human, with_options
-from apo_bench.envs.infos import VERDICTS, step_info, verdicts
+from apo_bench.envs.episode import VERDICTS, Episode, Scenes, Settings, step_info, verdicts, watch_human, with_options
 from apo_bench.envs.rendering import FPS, MODES, Rendering
-from apo_bench.envs.robot import RobotSettings, carried_out
 from apo_bench.envs.spaces import Action, Seen, action_space, as_seen_entries, moved, observation_space
-from apo_bench.errors import InputError
+from apo_bench.envs.starts import RobotSettings, carried_out
+from apo_bench.errors import require
 from apo_bench.geometry import Array
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level, make_noise
@@ -30,7 +29,7 @@ from apo_bench.records import (
 )
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
-from apo_bench.simulation.scene.scene import build_scene
+from apo_bench.simulation.scene import build_scene
 from apo_bench.trial.fitting import fitting_plan
 from apo_bench.trial.promise import abstained, promised_success
 from apo_bench.trial.stages import (
@@ -142,10 +141,10 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         fidelity: str = TrialSettings.fidelity,
         render_mode: str | None = None,
     ) -> None:
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise InputError(
-                f"the render mode '{render_mode}' was given; use rgb_array, rgb_array_list, human or None."
-            )
+        require(
+            render_mode in (None, *self.metadata["render_modes"]),
+            f"the render mode '{render_mode}' was given; use rgb_array, rgb_array_list, human or None.",
+        )
         check("eye", eye)
         check("looks", looks)
         check("abstain", abstain)
@@ -300,8 +299,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
 
     def _set(self, now: Settings) -> None:
         """Have noise and scene of these settings, or raise an `InputError` and change nothing."""
-        same = now.level == self._usual.level
-        noise = self._usual_noise if same else make_noise(self._model, now.level)
+        noise = self._usual_noise if now.level == self._usual.level else make_noise(self._model, now.level)
         self._scene = self._scenes.of(now.clearance_mm)
         self._now = now
         self._noise = noise
@@ -322,8 +320,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         if promised < self._abstain:
             return failed, abstained(promised, self._abstain), predicted, promised
         watch = self._rendering.watch(self._scene, self.render_mode)
-        truth = simulated.layout.goals
-        attempt = carried_out(robot, plan, self._scene, truth, episode.trial, watch, self._fidelity)
+        attempt = carried_out(robot, plan, self._scene, simulated.layout.goals, episode.trial, watch, self._fidelity)
         if attempt.result.reached.final is not None:
             self._rendering.poses = attempt.result.reached.final.poses
         return verdicts(attempt.verdict), trial_outcome(attempt), predicted, promised

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly import Observation, Outcome, ReplayResult, Step
 from apo_bench.envs.apo_replay import APOReplay
-from apo_bench.envs.infos import VERDICTS, step_info, verdicts
+from apo_bench.envs.episode import VERDICTS, step_info, verdicts
 from apo_bench.envs.spaces import Seen, packed, track_spaces
 from apo_bench.envs.tracking import Act, Policy, Tracked, exactly_at, first_seen
 from apo_bench.errors import InputError
@@ -172,8 +172,7 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
         seen: Observation = self._base.seen
         shown = np.arange(n) < self._shown
         done = np.arange(n) < self._done
-        still = np.eye(4)
-        goals = np.where(shown[:, None, None], seen.goals, still)
+        goals = np.where(shown[:, None, None], seen.goals, np.eye(4))
         return {
             "goals": packed(goals),
             "covariance": np.where(shown[:, None, None], seen.covariance, 0.0),

@@ -6,7 +6,7 @@ import numpy as np
 
 from apo_bench.assembly import Poses
 from apo_bench.geometry import Array
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene import Scene
 
 MODES = ("rgb_array", "rgb_array_list", "human")
 FPS = 25

@@ -1,4 +1,7 @@
-"""The starts of `APOInsert-v0`: trials as the bench draws them, carried out up to where the learner takes over."""
+"""The starts of `APOInsert-v0`: trials as the bench draws them, carried out up to where the learner takes over.
+
+The robot of an environment: what is wrong with it, whether it feels, and one replay by it.
+"""
 
 import math
 from dataclasses import dataclass, replace
@@ -7,25 +10,85 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly import Correction, Observation, Outcome, Plan, Reached, Snapshot, placements
-from apo_bench.envs.robot import RobotSettings
+from apo_bench.errors import kind, require
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import Verdict, judge
 from apo_bench.observation.noise import Noise
-from apo_bench.records import NO_ROBOT_ERROR, robot_sigmas, told_error
-from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.records import (
+    NO_ROBOT_ERROR,
+    checked_robot_error,
+    checked_stated_error,
+    checked_wrench,
+    robot_sigmas,
+    told_error,
+)
+from apo_bench.simulation.robot import RobotError
+from apo_bench.simulation.scene import Scene
 from apo_bench.simulation.task.start import Start, go_on, prepare
 from apo_bench.simulation.task.tip_control import TipControl
-from apo_bench.trial.feeling import feels_of
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import (
     WRENCH,
+    Attempt,
     demonstration_failure,
     draw_robot_error,
     observe_demonstration,
+    replay_and_judge,
     simulate_demonstration,
     stream_key,
 )
+from apo_bench.trial.trial import feels_of
+
+LONGEST_REPLAY_S = 1000.0
+"""Simulated time after which a replay begins no further step: seven times the longest of the benchmark."""
+
+
+class RobotSettings(NamedTuple):
+    """As the environment's arguments of these names."""
+
+    robot_error: str
+    feels: bool
+    wrench: str
+    stated_error: str
+
+    def checked(self) -> "RobotSettings":
+        """The same, spelled as rows spell them.
+
+        Raises:
+            InputError: An unknown name, a number that is not allowed, or no truth value.
+        """
+        require(
+            isinstance(self.feels, bool | np.bool_),
+            f"{kind(self.feels)} was given as feels; True or False is allowed: whether the robot feels.",
+        )
+        error = checked_robot_error(self.robot_error)
+        return RobotSettings(
+            error, bool(self.feels), checked_wrench(self.wrench), checked_stated_error(self.stated_error)
+        )
+
+
+def carried_out(
+    robot: RobotSettings, plan: Plan, scene: Scene, reference: Array, trial: int, watch: Any, fidelity: str
+) -> Attempt:
+    """One replay by this robot, and the verdict on it.
+
+    Args:
+        reference: As in `replay_and_judge`.
+        trial: Its number; the robot's errors, and the noise of what it feels, are those of this trial.
+        watch, fidelity: As in `replay_and_judge`.
+    """
+    told = told_error(robot.stated_error, robot.robot_error)
+    return replay_and_judge(
+        plan,
+        scene,
+        reference,
+        watch,
+        fidelity,
+        searches=robot.feels,
+        most_s=LONGEST_REPLAY_S,
+        error=draw_robot_error(robot.robot_error, scene, trial),
+        feels=feels_of(plan, scene, told, stream_key(trial, WRENCH), robot.wrench) if robot.feels else None,
+    )
 
 
 @final
@@ -95,12 +158,11 @@ class Trials(NamedTuple):
         start = prepare(made.plan, scene, k, error, feels, (robot.wrench, (*key, 1)))
         if isinstance(start, Outcome):
             return start
-        truth = simulated.layout.goals
-        before = judged(scene, start.after, start.after[-1], truth[:k]) if k else None
+        before = judged(scene, start.after, start.after[-1], simulated.layout.goals[:k]) if k else None
         if before is not None and not before.success:
             code = before.rests_on.code
             return Outcome("judge", code, None, f"what was put before is not right: {before.rests_on.why or code}")
-        return Begun(trial, start, made.plan, error, truth, _stated(seen, made.correction, told))
+        return Begun(trial, start, made.plan, error, simulated.layout.goals, _stated(seen, made.correction, told))
 
     def go_on(self, begun: Begun, control: TipControl, reached: Snapshot) -> Begun | Outcome:
         """The start of the next operation, after somebody has done one; or what failed on the way there."""
@@ -116,8 +178,7 @@ def judged(scene: Scene, after: tuple[Snapshot | None, ...], final: Snapshot | N
         after: After each of them.
         reference: (k, 4, 4), their true goals, world frame, [m].
     """
-    assembly = scene.scenario.assembly.first(len(after))
-    return judge(assembly, Reached(after, final), reference, scene.criteria)
+    return judge(scene.scenario.assembly.first(len(after)), Reached(after, final), reference, scene.criteria)
 
 
 def _stated(seen: Observation, correction: Correction | None, told: str | None) -> Array:

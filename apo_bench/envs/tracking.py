@@ -12,7 +12,7 @@ import numpy as np
 from apo_bench.assembly import Observation, Reached, Snapshot, lowered_observation, placements
 from apo_bench.correction.baselines.track import nested, next_operation, reached_back
 from apo_bench.correction.correctors import correct
-from apo_bench.correction.solvers.newton import LENGTH_M
+from apo_bench.correction.solvers import LENGTH_M
 from apo_bench.geometry import Array, pose
 
 
@@ -60,8 +60,7 @@ def contact_policy(known: Tracked) -> tuple[Act, ...]:
 
 
 def _acts(known: Tracked, goals: Array, freed: list[int] | tuple[int, ...]) -> tuple[Act, ...]:
-    steps = reached_back(len(goals) - 1, freed)
-    return tuple(Act(undo, (known.placed if undo else goals)[k]) for k, undo in steps)
+    return tuple(Act(undo, (known.placed if undo else goals)[k]) for k, undo in reached_back(len(goals) - 1, freed))
 
 
 def first_seen(observation: Observation, m: int) -> Observation:
@@ -69,8 +68,7 @@ def first_seen(observation: Observation, m: int) -> Observation:
     shared = []
     for error in observation.shared:
         kept = [i for i, k in enumerate(error.operations) if k < m]
-        between = error.correlation
-        few = None if between is None else between[np.ix_(kept, kept)]
+        few = None if error.correlation is None else error.correlation[np.ix_(kept, kept)]
         if kept:
             shared.append(replace(error, operations=tuple(error.operations[i] for i in kept), correlation=few))
     tails = observation.tails

@@ -6,22 +6,69 @@ The unit stands in the name: lengths in `_mm` or `_m`, angles in `_deg` or `_rad
 that of the quaternion too. The last three may be left out, as columns or in single rows: standard deviations along and
 about each axis of the part (then those that are assumed), and whether the operation was seen (then it was). One more
 column, `play_mm`, is the room that parts which fit have per side (else the scenario's clearance), the same in each row.
+
+How small and how large a standard deviation may be, wherever one is stated.
 """
 
 import csv
 import io
 import math
 from collections.abc import Sequence
+from math import pi
 from pathlib import Path
 
 import numpy as np
 
 from apo_bench.assembly import Assembly, Observation
-from apo_bench.errors import require
-from apo_bench.files.deviations import DEVIATION_DEG, DEVIATION_MM, SHIFT_M, TURN_RAD, is_within
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import FARTHEST_M, Array, pose
-from apo_bench.io.strict_csv import Columns, CsvRow, read_csv
+from apo_bench.io import Columns, CsvRow, read_csv
 from apo_bench.scenario import Scenario, layout_at
+
+DEVIATION_MM = 1.0
+DEVIATION_DEG = 1.0
+"""What is assumed where a file states no standard deviations."""
+SHIFT_M = (1e-7, 10.0)
+TURN_RAD = (1e-4 * pi / 180.0, pi)
+"""Least and greatest standard deviation, [m] and [rad]: within, ranks and gaps are told from rounding."""
+ALLOWED_DEVIATIONS = "standard deviations from 0.0001 to 10000 mm and from 0.0001 to 180 deg are allowed"
+_ROUNDING = 1e-9
+
+
+def check_deviations(deviation_mm: float, deviation_deg: float) -> None:
+    """Refuse standard deviations that make no sense.
+
+    Raises:
+        InputError: One is too small, too large, or no number.
+    """
+    for name, deviation, size, limits in (
+        ("deviation_mm", deviation_mm, 1e-3, SHIFT_M),
+        ("deviation_deg", deviation_deg, pi / 180.0, TURN_RAD),
+    ):
+        number = isinstance(deviation, int | float | np.floating | np.integer) and not isinstance(deviation, bool)
+        if not number or not is_within(deviation * size, limits):
+            text = f"{deviation:g}" if number else repr(deviation)
+            low, high = (x / size for x in limits)
+            raise InputError(f"{name} {text} was given; a number from {low:g} to {high:g} is allowed.")
+
+
+def assumed_deviations(deviation_mm: float | None, deviation_deg: float | None) -> str:
+    """What is said where a file states no standard deviations; None stands for the default."""
+    mm = DEVIATION_MM if deviation_mm is None else deviation_mm
+    deg = DEVIATION_DEG if deviation_deg is None else deviation_deg
+    return f"a standard deviation of {mm:g} mm and {deg:g} deg per axis, assumed where the file states none"
+
+
+def is_within(deviation: float, limits: tuple[float, float]) -> bool:
+    """Whether a standard deviation, [m] or [rad], is between its limits; a NaN is not."""
+    return limits[0] * (1.0 - _ROUNDING) <= deviation <= limits[1] * (1.0 + _ROUNDING)
+
+
+def is_sensible(covariance: Array) -> bool:
+    """Whether every variance of a body twist, on the diagonal of (6, 6) [m, rad], is that of such a deviation."""
+    deviations = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
+    return all(is_within(float(x), SHIFT_M if i < 3 else TURN_RAD) for i, x in enumerate(deviations))
+
 
 _POSITION = ("x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")

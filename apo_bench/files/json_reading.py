@@ -22,11 +22,11 @@ from apo_bench.assembly import (
     Tails,
     schedule_fault,
 )
-from apo_bench.errors import InputError, unknown
-from apo_bench.files.deviations import ALLOWED_DEVIATIONS, SHIFT_M, TURN_RAD, is_sensible, is_within
+from apo_bench.errors import InputError, require_known
+from apo_bench.files.csv_form import ALLOWED_DEVIATIONS, SHIFT_M, TURN_RAD, is_sensible, is_within
 from apo_bench.files.json_forms import OBSERVATION_SCHEMA, OUTLIER_KEYS, PLAN_SCHEMA, TO_MM_DEG
 from apo_bench.geometry import Array, pose
-from apo_bench.io.documents import JsonNode, read_json
+from apo_bench.io import JsonNode, read_json
 from apo_bench.scenario import Scenario, layout_at
 
 _LEAST_FREEDOM = 0.4
@@ -209,8 +209,7 @@ def _pose(fields: Mapping[str, JsonNode]) -> Array:
 def _poses(node: JsonNode, scenario: Scenario) -> Poses:
     parts = tuple(scenario.assembly.solids)
     for part in node.value if isinstance(node.value, dict) else ():
-        if part not in parts:
-            raise InputError(f"{node.file}, {node.key}: {unknown('part', part, parts)}")
+        require_known("part", part, parts, place=f"{node.file}, {node.key}")
     fields = node.fields(parts)
     return {part: _pose(fields[part].fields(_POSE)) for part in parts}
 

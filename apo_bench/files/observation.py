@@ -8,8 +8,8 @@ import numpy as np
 
 from apo_bench.assembly import Observation
 from apo_bench.errors import require
-from apo_bench.files.csv_form import read_table
-from apo_bench.files.deviations import DEVIATION_DEG, DEVIATION_MM, check_deviations
+from apo_bench.files import json_reading
+from apo_bench.files.csv_form import DEVIATION_DEG, DEVIATION_MM, check_deviations, read_table
 from apo_bench.geometry import FARTHEST_M
 from apo_bench.scenario import Scenario, layout_at
 
@@ -55,7 +55,6 @@ def read_observation_file(
     Args:
         deviation_mm, deviation_deg: As in `read_observation`; None stands for the default.
     """
-    from apo_bench.files import json_reading
     from apo_bench.scenario.file import load_scenario
 
     deviation_mm = DEVIATION_MM if deviation_mm is None else deviation_mm
@@ -80,8 +79,6 @@ def read_stated(path: str | Path, scenario: Scenario) -> Observation:
         InputError: Anything that is not as described, or a standard deviation is missing.
     """
     if Path(path).suffix.lower() != ".csv":
-        from apo_bench.files import json_reading
-
         observation = json_reading.read_json_observation(path, scenario)
         _check_near(path, observation)
         return observation

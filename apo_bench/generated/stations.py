@@ -64,8 +64,7 @@ def pile(
     for k in range(count):
         name = f"{stem}_{LETTERS[k]}"
         height = between(rng, 28, 36)
-        is_last = k == count - 1
-        is_loose = loose and is_last
+        is_loose = loose and (k == count - 1)
         pins = [PIN] if k < count - 1 - loose else []
         holes = [] if is_loose else [PIN._replace(name="bore")]
         parts[name] = block(between(rng, 30, 36), between(rng, 28, 32), height, pins, holes)

@@ -32,8 +32,7 @@ def _now(assembly: Assembly, arrival: Arrival, i: int, poses: Poses) -> Array:
     contact = arrival.touched[i].contact
     rests = arrival.touched[i].rests
     place = sum(each.contact == contact for each in arrival.touched[:i])
-    moves = [of.part for of in contact if of.part != rests]
-    return touched_contacts(assembly, [contact], moves, poses)[place].normal
+    return touched_contacts(assembly, [contact], [of.part for of in contact if of.part != rests], poses)[place].normal
 
 
 def _walls(arrival: Arrival) -> tuple[Contact, ...]:
@@ -61,8 +60,7 @@ def _reach(assembly: Assembly, contact: Contact, poses: Poses, way: Array) -> fl
 
 def mouths(assembly: Assembly, arrival: Arrival, poses: Poses, way: Array) -> tuple[float, ...]:
     """How far before the goal the part comes to where walls begin that it goes between, [m], the first one first."""
-    ends = {mouth(assembly, *contact, poses, way) for contact in _walls(arrival)}
-    return tuple(sorted(ends, reverse=True))
+    return tuple(sorted({mouth(assembly, *contact, poses, way) for contact in _walls(arrival)}, reverse=True))
 
 
 def later_walls(assembly: Assembly, k: int, part: str) -> list[Array]:

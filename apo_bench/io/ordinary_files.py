@@ -86,10 +86,10 @@ def each_line(path: str | Path, kind: str) -> Iterator[tuple[int, bytes]]:
         number = 0
         while line := file.readline(_LONGEST_LINE + 1):
             number += 1
-            if len(line) > _LONGEST_LINE:
-                raise InputError(
-                    f"{path}, line {number}: at most {_LONGEST_LINE:,} bytes are allowed in a line; remove it."
-                )
+            require(
+                len(line) <= _LONGEST_LINE,
+                f"{path}, line {number}: at most {_LONGEST_LINE:,} bytes are allowed in a line; remove it.",
+            )
             if line.endswith(b"\n"):
                 yield number, line
 
@@ -105,8 +105,7 @@ def decoded(raw: bytes, file: str, kind: str) -> str:
 
 
 def _check_ordinary(path: str | Path, kind: str, mode: int) -> None:
-    if not stat.S_ISREG(mode):
-        raise InputError(f"{path}: {_kind(mode)} was given; give a {kind}.")
+    require(stat.S_ISREG(mode), f"{path}: {_kind(mode)} was given; give a {kind}.")
 
 
 def _is_no_path(path: str | Path) -> bool:

@@ -129,10 +129,9 @@ def _free(twist: Array, held: Array, at: Array) -> Array:
     # The points move by K xi; |K xi|^2 = xi^t L L^t xi, so in y = L^t xi the least motion is the shortest y.
     K = np.concatenate([np.broadcast_to(np.eye(3), (len(at), 3, 3)), -pose.hat(at)], axis=2).reshape(-1, 6)
     L = np.linalg.cholesky(K.T @ K / len(at))
-    rows = np.linalg.solve(L, held.T).T
     # Rows of which a unit motion opens contacts span what is held; the twist is projected onto what is left.
     # R of rows = Q R has their singular values and right vectors, and at most six rows.
-    _, sizes, ways = np.linalg.svd(np.linalg.qr(rows, mode="r"), full_matrices=True)
+    _, sizes, ways = np.linalg.svd(np.linalg.qr(np.linalg.solve(L, held.T).T, mode="r"), full_matrices=True)
     loose = ways[int((sizes > _HELD).sum()) :]
     return np.asarray(np.linalg.solve(L.T, loose.T @ (loose @ (L.T @ twist))))
 

@@ -14,9 +14,8 @@ from apo_bench.assembly import Assembly, Demonstration, Observation
 from apo_bench.errors import InputError, failed, require, unknown
 from apo_bench.geometry import Array
 from apo_bench.names import resolve
-from apo_bench.observation.models.isotropic import floored
-from apo_bench.observation.models.level import Level
-from apo_bench.observation.presets import noise_path, presets
+from apo_bench.observation.models import Level, floored
+from apo_bench.observation.noise_file import noise_path, presets
 from apo_bench.records import FAILURES
 
 __all__ = ["FAILURES", "NOISES", "Level", "Noise", "make_noise"]
@@ -27,11 +26,11 @@ Noise = Callable[[Assembly, Demonstration, np.random.Generator], Observation]
 NOISES = MappingProxyType(
     {
         "isotropic": "apo_bench.observation.models.isotropic:Isotropic",
-        "anisotropic": "apo_bench.observation.models.anisotropic:Anisotropic",
+        "anisotropic": "apo_bench.observation.models.camera:Anisotropic",
         "per-part": "apo_bench.observation.models.isotropic:PerPart",
-        "camera": "apo_bench.observation.models.anisotropic:Sighted",
+        "camera": "apo_bench.observation.models.camera:Sighted",
         "heavy-tailed": "apo_bench.observation.models.isotropic:HeavyTailed",
-        "outliers": "apo_bench.observation.models.outliers:Outliers",
+        "outliers": "apo_bench.observation.models.failures:Outliers",
         "bias": "apo_bench.observation.models.shared:Bias",
         "bias-view": "apo_bench.observation.models.shared:BiasView",
         "correlated": "apo_bench.observation.models.shared:Correlated",
@@ -65,8 +64,10 @@ def make_noise(given: Any, level: Level) -> Noise:
             level is negative or not finite.
     """
     for value, unit in zip(level, ("mm", "degrees"), strict=True):
-        if not (math.isfinite(value) and value >= 0.0):
-            raise InputError(f"the noise level {value} {unit} is not possible; give a finite number, 0 or more.")
+        require(
+            math.isfinite(value) and value >= 0.0,
+            f"the noise level {value} {unit} is not possible; give a finite number, 0 or more.",
+        )
     if isinstance(given, str):
         if noise_path(given) is not None:
             from apo_bench.observation.noise_file import noise_of_file
@@ -136,8 +137,7 @@ def _takes(model: Any, arguments: int) -> bool:
 
 
 def _check(model: Any, arguments: int, complaint: str) -> None:
-    if not _takes(model, arguments):
-        raise InputError(f"{complaint}; give a function (assembly, shown, rng) -> Observation.")
+    require(_takes(model, arguments), f"{complaint}; give a function (assembly, shown, rng) -> Observation.")
 
 
 @final
@@ -154,11 +154,11 @@ class Plain:
         for field, largest in _LIMITS.items():
             value = getattr(self, field)
             number = isinstance(value, int | float | np.floating | np.integer) and not isinstance(value, bool)
-            if not number or not math.isfinite(value) or not 0.0 <= value <= largest:
-                raise InputError(
-                    f"the noise model '{self.__name__}' declares {field} {value!r}; a number from 0 to {largest:g} is "
-                    "allowed."
-                )
+            require(
+                number and math.isfinite(value) and 0.0 <= value <= largest,
+                f"the noise model '{self.__name__}' declares {field} {value!r}; a number from 0 to {largest:g} is "
+                "allowed.",
+            )
 
     @property
     def __name__(self) -> str:
@@ -178,9 +178,9 @@ def declared(function: Any, name: str) -> Plain:
         InputError: It declares none, or what makes no sense.
     """
     missing = [field for field in _LIMITS if not hasattr(function, field)]
-    if missing:
-        raise InputError(
-            f"the noise model '{name}' is a function (goals, rng) that does not say how large its errors are; set "
-            f"{' and '.join(f'{name}.{field}' for field in missing)}, or give (assembly, shown, rng) -> Observation."
-        )
+    require(
+        not missing,
+        f"the noise model '{name}' is a function (goals, rng) that does not say how large its errors are; set "
+        f"{' and '.join(f'{name}.{field}' for field in missing)}, or give (assembly, shown, rng) -> Observation.",
+    )
     return Plain(function, function.deviation_mm, function.deviation_deg)

@@ -1,27 +1,51 @@
-"""Noise files: what was measured of a pose estimator, as TOML."""
+"""Noise files: what was measured of a pose estimator, as TOML.
+
+The files behind the names of noise models.
+"""
 
 import math
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 
 from apo_bench.geometry import Array, pose
-from apo_bench.io.documents import JsonNode, read_toml
-from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.empirical import Empirical, empirical_noise
-from apo_bench.observation.models.fitted import (
+from apo_bench.io import JsonNode, read_toml
+from apo_bench.observation.models import (
     LEAST_FREEDOM,
     SMALLEST_SCALE,
+    Camera,
     ConstantError,
+    Empirical,
     Fitted,
+    Level,
     MeasuredNoise,
+    Split,
+    Tail,
     ViewNoise,
+    empirical_noise,
 )
-from apo_bench.observation.models.level import Level
-from apo_bench.observation.models.tails import Split, Tail
-from apo_bench.observation.presets import noise_path
 from apo_bench.records import RESIDUALS
-from apo_bench.scenario.keys import read_pose
+from apo_bench.resources import folder
+from apo_bench.scenario.contacts import read_pose
+
+
+def presets() -> Mapping[str, Path]:
+    """The noise files that come with the package, by the names they go by."""
+    return {path.stem: path for path in sorted(folder("assets").glob("noise/*.toml"))}
+
+
+def noise_path(name: str) -> Path | None:
+    """The file behind the name of a noise model, None if there is none.
+
+    A path that ends in .toml, a name that comes with the package, or `empirical:` and the path of a file of residuals.
+    """
+    if name.startswith(RESIDUALS):
+        return Path(name.removeprefix(RESIDUALS))
+    if name.endswith(".toml"):
+        return Path(name)
+    return presets().get(name)
+
 
 _SCHEMA = "apo-bench/noise/2"
 """Without errors of the whole view."""

@@ -30,7 +30,7 @@ from apo_bench.assembly import (
     relation_graph,
     round_pairs,
 )
-from apo_bench.errors import InputError, failed
+from apo_bench.errors import InputError, failed, require
 from apo_bench.geometry import Array, Face, RoundFace, Solid, overlap
 from apo_bench.names import resolve
 from apo_bench.records import GIVEN, SHIFT_MM, WRONG_RELATIONS, relations_name
@@ -89,8 +89,7 @@ def with_relations(
         raise
     except Exception as error:
         raise failed(f"the relations '{name}'", error) from error
-    if complaint:
-        raise InputError(f"the relations '{name}' {complaint}.")
+    require(not complaint, f"the relations '{name}' {complaint}.")
     return replace(observation, assembly=wrong)
 
 
@@ -111,10 +110,8 @@ def _complaint(right: Assembly, wrong: Any) -> str:
 
 def culprit(right: Assembly, wrong: Assembly) -> str | None:
     """The relation (R1, R2, ... of the wrong graph) with a contact that is not a right one; None if there is none."""
-    for arc in relation_graph(wrong).arcs:
-        if not set(arc.contacts) <= set(right.operations[arc.made].contacts):
-            return arc.name
-    return None
+    arcs = relation_graph(wrong).arcs
+    return next((arc.name for arc in arcs if not set(arc.contacts) <= set(right.operations[arc.made].contacts)), None)
 
 
 def missed(assembly: Assembly, start: Poses, goals: Array, rng: np.random.Generator) -> Assembly:
@@ -175,8 +172,7 @@ class _Pair(NamedTuple):
 def _any(assembly: Assembly, rng: np.random.Generator) -> tuple[int, Contact]:
     """One of all contacts ever made, each as likely, and the operation that made it."""
     relations = assembly.relations()
-    if not relations:
-        raise InputError("wrong relations were asked for, but the assembly has no contact; use `given`.")
+    require(relations, "wrong relations were asked for, but the assembly has no contact; use `given`.")
     chosen = relations[int(rng.integers(len(relations)))]
     return chosen.made, chosen.contact
 
@@ -241,6 +237,8 @@ def _acts(assembly: Assembly) -> list[Operation]:
 
 
 def _callable(given: Any, name: str) -> Relations:
-    if not callable(given) or isinstance(given, type):
-        raise InputError(f"the relations '{name}' are no function; give (assembly, start, goals, rng) -> Assembly.")
+    require(
+        callable(given) and not isinstance(given, type),
+        f"the relations '{name}' are no function; give (assembly, start, goals, rng) -> Assembly.",
+    )
     return given

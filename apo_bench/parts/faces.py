@@ -138,6 +138,5 @@ def _surfaces(full: NDArray[np.bool_], grid: Sequence[Array]) -> Iterator[Surfac
             beyond = k + 1 if forward else k - 1
             bare = layer & ~layers[beyond] if 0 <= beyond < len(layers) else layer
             row, begin, end = _runs(bare)
-            joined = shapely.unary_union(shapely.box(u[row], v[begin], u[row + 1], v[end]))
-            for piece in polygons_of(joined):
+            for piece in polygons_of(shapely.unary_union(shapely.box(u[row], v[begin], u[row + 1], v[end]))):
                 yield Surface(side, float(grid[axis][k + forward]), piece)

@@ -8,7 +8,7 @@ import numpy as np
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, Hull
-from apo_bench.io.ordinary_files import read_bytes
+from apo_bench.io import read_bytes
 
 _SAME_M = 1e-7
 """Corners nearer to each other are one; a corner this far inside of the piece is none."""

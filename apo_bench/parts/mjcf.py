@@ -12,10 +12,9 @@ import numpy as np
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, Box, Cylinder, Piece, all_boxes, cylinder_hull
-from apo_bench.parts.allowed import MOST_BOXES, MOST_CORNERS_IN_ALL, WIDEST_M
+from apo_bench.parts.allowed import MOST_BOXES, MOST_CORNERS_IN_ALL, WIDEST_M, read_tree
 from apo_bench.parts.meshes import checked_hull, dress_picture, is_picture
 from apo_bench.parts.stated import USUAL_DENSITY, StatedPart, read_stated_part
-from apo_bench.parts.tree import read_tree
 
 _FIT_CLASS = "fit"
 _SHORTEST_AXIS = 1e-3

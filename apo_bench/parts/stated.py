@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.errors import require
 from apo_bench.geometry import WHOLE_TURN, Array, Face, RoundFace, flat_area, plane_across
-from apo_bench.io.documents import JsonNode, read_toml
+from apo_bench.io import JsonNode, read_toml
 from apo_bench.parts.allowed import FACE_OR_PART_NAME, FRICTION, LONGEST_FACE_NAME, MOST_FACES
 
 PART_SCHEMA = "apo-bench/part/1"

@@ -10,9 +10,8 @@ from types import MappingProxyType
 from typing import Literal, final
 
 from apo_bench.assembly import Plan
-from apo_bench.insertion.line import Attach
-from apo_bench.prediction.arm import ArmMove
-from apo_bench.prediction.measures import MeasureCode, measures
+from apo_bench.insertion.arrival import Attach
+from apo_bench.prediction.measures import ArmMove, MeasureCode, measures
 from apo_bench.records import Thresholds
 
 ARM_CODES = ("unreachable_start", "unreachable", "gripper_room", "tip_error")

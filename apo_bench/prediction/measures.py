@@ -8,14 +8,14 @@ lies below alone: it leans as far as clearances let it. Parts that are planned i
 meant, at the goal or on the way in; of those that touch in the same operation the contacts have told, except where a
 level way in begins: there a part comes down beside all others.
 
-Where it is known what an arm makes of the plan (`prediction/arm.py`): whether its open gripper has room, and whether
-contacts that would be near enough still are with the error of its tip.
+Where it is known what an arm makes of the plan, as plain numbers that somebody who knows the arm works out: whether
+its open gripper has room, and whether contacts that would be near enough still are with the error of its tip.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, final
 
 import numpy as np
 
@@ -31,12 +31,45 @@ from apo_bench.assembly import (
     placements,
 )
 from apo_bench.geometry import Array
-from apo_bench.insertion.line import Attach
-from apo_bench.prediction.arm import ArmMove
-from apo_bench.prediction.interference import depths_from_above, depths_on_way, physical_solids
-from apo_bench.prediction.resting import between, enters, is_support, residual, resting_poses
+from apo_bench.insertion.arrival import Attach
+from apo_bench.prediction.resting import (
+    between,
+    depths_from_above,
+    depths_on_way,
+    enters,
+    is_support,
+    physical_solids,
+    residual,
+    resting_poses,
+)
 from apo_bench.prediction.stability import BALANCED, imbalance
 from apo_bench.records import Thresholds
+
+Refused = Literal["unreachable_start", "unreachable"]
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ArmMove:
+    """One operation of a plan that is done, or undone, by an arm."""
+
+    operation: int
+    """Counted from 0."""
+    undo: bool = False
+    refused: Refused | None = None
+    """Why it is not begun: there are no joint angles where the part is taken, or where it is put."""
+    at_limit: str = ""
+    """The joint that stands at its limit there; empty where the arm is too short, or nothing is refused."""
+    struck: str = ""
+    """The part that the open gripper is deepest in, where it takes hold or lets go."""
+    struck_mm: float = 0.0
+    sag: Array = field(default_factory=lambda: np.eye(4))
+    """Where the weight of what is held takes it, a displacement of the world, (4, 4), [m]."""
+    beside_mm: float = 0.0
+    """How far the tip goes beside its line, moving, at most."""
+    margin_deg: float | None = None
+    """The least distance of a joint from its limits where the tip turns or stops; None where nothing is known of it."""
+
 
 MeasureKind = Literal["falls", "fit", "side", "leans", "on_way", "from_above", "gripper", "own", "tip"]
 MeasureCode = Literal["residual", "interference", "unstable_goal", "gripper_room", "tip_error"]
@@ -134,8 +167,7 @@ def measures(
     """
     acts = tuple(_acts(plan, iter(brought)))
     for act in acts if not brought else ():
-        size = imbalance(act.alone, act.operation, act.planned, 1e-3 * room_mm)
-        yield Measure(act.number, "falls", size, BALANCED)
+        yield Measure(act.number, "falls", imbalance(act.alone, act.operation, act.planned, 1e-3 * room_mm), BALANCED)
     physical = physical_solids(plan.assembly, clearance_mm)
     for act in acts:
         k, _, planned, _ = act
@@ -203,8 +235,7 @@ def _tip(
     if as_planned or not any(enters(act.alone, contact) for contact in act.operation.contacts):
         return
     moved = {part: move.sag @ act.planned[part] for part in act.operation.moves}
-    sagging = act._replace(planned=MappingProxyType({**act.planned, **moved}))
-    off = _fit(sagging, how, clearance_mm, thresholds)
+    off = _fit(act._replace(planned=MappingProxyType({**act.planned, **moved})), how, clearance_mm, thresholds)
     own = max(0.0, off.size - planned.size) + move.beside_mm
     yield Measure(act.number, "own", own, max(off.allowed - thresholds.fit_margin_mm, 0.0))
     yield Measure(act.number, "tip", off.size + move.beside_mm, off.allowed)

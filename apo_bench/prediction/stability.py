@@ -125,8 +125,7 @@ def _unbalanced(points: Array, signs: Array, centroid: Array) -> float:
         return 1.0
     arms = (points - centroid)[:, :2] / 0.01
     # Vertical forces f >= 0 at arms (x, y): sum f s = 1, sum f s x = 0, sum f s y = 0.
-    balance = np.vstack([signs, signs * arms[:, 0], signs * arms[:, 1]])
-    return float(nnls(balance, np.array([1.0, 0.0, 0.0]))[1])
+    return float(nnls(np.vstack([signs, signs * arms[:, 0], signs * arms[:, 1]]), np.array([1.0, 0.0, 0.0]))[1])
 
 
 class Pushes(NamedTuple):

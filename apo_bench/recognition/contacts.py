@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Contact, Facing, Observation, placements
-from apo_bench.assembly.facing import facing
+from apo_bench.assembly.touching import facing
 from apo_bench.geometry import Array
 from apo_bench.recognition.situation import Belief, Candidate, PartBeliefs, initial_belief, judged
 from apo_bench.recognition.thresholds import (

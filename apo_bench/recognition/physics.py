@@ -9,6 +9,7 @@ from collections.abc import Collection
 from math import exp, hypot, log, sqrt
 
 import numpy as np
+from scipy.special import log_ndtr, ndtr
 
 from apo_bench.geometry import Array, Overlap, face_area, overlap, pose, ways_out
 from apo_bench.recognition.situation import Candidate, Situation
@@ -54,8 +55,6 @@ def refusal(c: Candidate, near: Collection[Candidate]) -> float:
         near: Pairs of faces that were not taken; of those between the same parts that look the other way none touches
             either where there is no room between.
     """
-    from scipy.special import ndtr
-
     worst = _unlikely(c.pair.gap_m, _soft(c))
     for other in near:
         if other.parts == c.parts and other.normal @ c.normal < _OPPOSITE:
@@ -148,6 +147,4 @@ def _soft(c: Candidate) -> float:
 
 def _unlikely(apart: float, deviation: float) -> float:
     """-2 log of the chance that a Gaussian with this mean is above zero."""
-    from scipy.special import log_ndtr
-
     return min(-2.0 * float(log_ndtr(apart / deviation)), IMPOSSIBLE)

@@ -14,7 +14,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Facing, Observation, PartFace, Poses, joint_covariance
-from apo_bench.assembly.facing import facing
+from apo_bench.assembly.touching import facing
 from apo_bench.geometry import Array, pose
 from apo_bench.recognition.estimate import GoalEstimate
 from apo_bench.recognition.thresholds import PairThresholds, Rules, pair_thresholds, reality, slack
@@ -207,8 +207,7 @@ class Situation:
         C = J @ self.estimate.covariance @ J.T
         candidate = judged(self.seen, rules, a, b, self.now.poses[b], pair, J, C)
         if candidate is not None:
-            flat = np.diag([_FLAT_M**2] * pair.lengths + [_FLAT_RAD**2] * (len(C) - pair.lengths))
-            soft = candidate.noise + flat
+            soft = candidate.noise + np.diag([_FLAT_M**2] * pair.lengths + [_FLAT_RAD**2] * (len(C) - pair.lengths))
             room = J @ self.estimate.room @ J.T
             gain = float(np.linalg.slogdet(room + soft)[1] - np.linalg.slogdet(C + soft)[1])
             yield candidate._replace(gain=gain)

@@ -8,7 +8,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly import Assembly, Poses
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import require, unknown
 from apo_bench.geometry import Array, extent, frozen, pose
 from apo_bench.recording.averaging import Mean
 from apo_bench.recording.ordering import (
@@ -123,18 +123,16 @@ def camera_pose(stays: Stays, camera: CameraFile, planned: Poses, fixed: Collect
         InputError: Neither is stated, or a known part that may move is not tracked.
     """
     for part in camera.known:
-        if part not in stays and part not in fixed:
-            raise InputError(f"the camera file, known: {unknown('tracked part', part, stays)}")
+        require(part in stays or part in fixed, f"the camera file, known: {unknown('tracked part', part, stays)}")
     if camera.T_world_camera is not None:
         return CameraPose(camera.T_world_camera)
-    if not camera.known:
-        raise InputError(
-            "the camera file states neither where the camera stands nor a part on a known place; add a table [pose], "
-            'or [known] with parts such as castle1 = "start".'
-        )
+    require(
+        camera.known,
+        "the camera file states neither where the camera stands nor a part on a known place; add a table [pose], "
+        'or [known] with parts such as castle1 = "start".',
+    )
     places = {part: T for part, T in camera.places(planned).items() if part in stays}
-    if not places:
-        raise InputError("the camera file states no place of a part that is tracked; add one, or a table [pose].")
+    require(places, "the camera file states no place of a part that is tracked; add one, or a table [pose].")
     return solved_camera(stays, camera, places)
 
 

@@ -6,7 +6,7 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, pose
 from apo_bench.recording.setup_files import ANGLE_UNITS, LENGTH_UNITS, TIME_UNITS, Conventions
 
@@ -65,8 +65,7 @@ def row_times(
         return cells["t"] * TIME_UNITS[units["t"] or how.time]
     if how.rate_hz is not None:
         return (cells["frame"] if "frame" in cells else counted_images(ids)) / how.rate_hz
-    if "frame" in cells:
-        raise InputError(f"{file}: images are numbered and have no time; state `rate_hz` in the camera file.")
+    require("frame" not in cells, f"{file}: images are numbered and have no time; state `rate_hz` in the camera file.")
     raise InputError(
         f"{file}: the column of the time is missing, such as t_s; name it in `columns` of the camera file, or state "
         "`rate_hz` there if every image has one row of each id."
@@ -99,8 +98,7 @@ def poses(
         places: Where each row stands, for messages.
     """
     for name in _POSITION:
-        if name not in cells:
-            raise InputError(f"{file}: the column '{name}_mm' is missing; name it in `columns` of the camera file.")
+        require(name in cells, f"{file}: the column '{name}_mm' is missing; name it in `columns` of the camera file.")
     T = np.tile(np.eye(4), (len(cells["x"]), 1, 1))
     unit = _one_unit(_POSITION, units, how.length, "length", file)
     T[:, :3, 3] = np.column_stack([cells[name] for name in _POSITION]) * LENGTH_UNITS[unit]
@@ -132,18 +130,17 @@ def _one_unit(
     }[kind]
     different = {name: units.get(name, "") or stated for name in names}
     for name, unit in different.items():
-        if unit is None:
-            raise InputError(
-                f"{file}: the unit of the column '{name}' is not known; name it "
-                f"{' or '.join(f'{name}_{example}' for example in examples)}, or state `{kind}` in the camera file."
-            )
-        if unit not in allowed:
-            raise InputError(
-                f"{file}: the unit of '{name}_{unit}' is none of a {kind}; {', '.join(allowed)} are allowed."
-            )
+        require(
+            unit is not None,
+            f"{file}: the unit of the column '{name}' is not known; name it "
+            f"{' or '.join(f'{name}_{example}' for example in examples)}, or state `{kind}` in the camera file.",
+        )
+        require(
+            unit in allowed,
+            f"{file}: the unit of '{name}_{unit}' is none of a {kind}; {', '.join(allowed)} are allowed.",
+        )
     first, *others = sorted({str(unit) for unit in different.values()})
-    if others:
-        raise InputError(f"{file}: {are.format(' and '.join([first, *others]))}.")
+    require(not others, f"{file}: {are.format(' and '.join([first, *others]))}.")
     return first
 
 
@@ -167,10 +164,10 @@ def _rotations(
     numbers = np.column_stack([cells[name] for name in _ROTATIONS[kind]])
     if kind.startswith("quaternion"):
         order = "wxyz" if kind == "quaternion" else how.quaternion
-        if order is None:
-            raise InputError(
-                f'{file}: q0 to q3 do not say their order; state `quaternion = "wxyz"` or "xyzw" in the camera file.'
-            )
+        require(
+            order is not None,
+            f'{file}: q0 to q3 do not say their order; state `quaternion = "wxyz"` or "xyzw" in the camera file.',
+        )
         check_length(numbers, "a quaternion", places)
         by = "by the names of the columns" if kind == "quaternion" else f"in the order {order}, as stated"
         return Rotation.from_quat(numbers, scalar_first=order == "wxyz").as_matrix(), f"quaternions {by}"

@@ -12,11 +12,10 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import Array
 from apo_bench.recording.arranging import Arrange, Arrangement
 from apo_bench.recording.averaging import per_axis
-from apo_bench.recording.mistakes import mistakes, reversed_in_time
 from apo_bench.recording.operations import SeenOperation
 from apo_bench.recording.ordering import NoOrder, moves_text
 from apo_bench.recording.setup_files import CameraFile
-from apo_bench.recording.stays import Stays
+from apo_bench.recording.stays import Stays, mistakes, reversed_in_time
 
 _FITS_MM = 20.0
 """A contact that is open by more, or a known place that is missed by more, is no noise; degrees count like mm."""
@@ -63,12 +62,11 @@ def check_arrangement(
         if wrong < min(best, _FITS_MM):
             best = wrong
             remedy = f"{sentence}; then all is within {wrong:.1f} mm"
-    fit = arrangement.fit
     pose = arrangement.camera
     missed = f", known places are missed by up to {pose.off_mm:.0f} mm and {pose.off_deg:.0f} deg"
     raise InputError(
-        f"{file}: no contact fits as it is stated (they are open by up to {1e3 * fit.gap_m:.0f} mm and "
-        f"{np.degrees(fit.angle_rad):.0f} deg{missed if pose.residuals else ''}); {remedy}."
+        f"{file}: no contact fits as it is stated (they are open by up to {1e3 * arrangement.fit.gap_m:.0f} mm and "
+        f"{np.degrees(arrangement.fit.angle_rad):.0f} deg{missed if pose.residuals else ''}); {remedy}."
     )
 
 

@@ -1,25 +1,28 @@
-"""From the log of a tracker to an observation: frames, rests, the order of operations, and what stays unclear."""
+"""From the log of a tracker to an observation: frames, rests, the order of operations, and what stays unclear.
+
+A recording without a scenario: which part was put where, in order; nothing is known of contacts.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import final
+from itertools import pairwise
+from typing import NamedTuple, final
 
 import numpy as np
 
 from apo_bench.assembly import Assembly, Observation, Poses, SharedError
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Array
-from apo_bench.observation.models.isotropic import floored, with_shared
-from apo_bench.observation.models.outliers import UNSEEN_DEVIATION, last_seen
-from apo_bench.recording.arranging import CameraPose, arrangement_of, staying
+from apo_bench.observation.models import UNSEEN_DEVIATION, floored, last_seen, with_shared
+from apo_bench.recording.arranging import CameraPose, arrangement_of, solved_camera, staying
+from apo_bench.recording.averaging import per_axis
 from apo_bench.recording.doubts import check_arrangement, check_direction, unclear
-from apo_bench.recording.log import PoseTrack
 from apo_bench.recording.operations import SeenOperation, seen_operation
 from apo_bench.recording.ordering import ContactFit, NoOrder, Stated
-from apo_bench.recording.rests import least_rest_s
-from apo_bench.recording.setup_files import CameraFile
-from apo_bench.recording.stays import Stay, all_stays
+from apo_bench.recording.rests import RestSpan, consecutive, least_rest_s
+from apo_bench.recording.setup_files import CameraFile, PoseTrack
+from apo_bench.recording.stays import Stay, Stays, all_stays
 from apo_bench.scenario import Scenario, layout_at
 
 _SLOW_S = 0.5
@@ -65,14 +68,13 @@ def import_recording(
     """
     assembly = scenario.assembly
     for part in tracks:
-        if part not in assembly.solids:
-            raise InputError(f"{file}: {unknown('part', part, assembly.solids)}")
+        require_known("part", part, assembly.solids, place=file)
     for k, operation in enumerate(assembly.operations):
-        if operation.main not in tracks:
-            raise InputError(
-                f"{file}: '{operation.main}', which operation {k + 1} moves, is not tracked; name its id in the "
-                "objects file."
-            )
+        require(
+            operation.main in tracks,
+            f"{file}: '{operation.main}', which operation {k + 1} moves, is not tracked; name its id in the "
+            "objects file.",
+        )
     stays = all_stays(tracks)
     for part, track in tracks.items():
         if not stays[part]:
@@ -142,3 +144,78 @@ def _adjustments(operations: Sequence[SeenOperation], assembly: Assembly) -> Arr
             if placed:
                 C[placed[-1]] += np.outer(twist, twist)
     return C
+
+
+class Put(NamedTuple):
+    """A part was put somewhere, perhaps with others."""
+
+    part: str
+    carries: tuple[str, ...]
+    stay: Stay
+
+    @property
+    def rest(self) -> RestSpan:
+        return self.stay.rests[-1]
+
+
+class UnplannedRecording(NamedTuple):
+    """What a log says by itself."""
+
+    camera: CameraPose
+    stays: Stays
+    puts: tuple[Put, ...]
+
+
+class _Move(NamedTuple):
+    taken: float
+    stay: Stay
+
+
+def unplanned_recording(tracks: Mapping[str, PoseTrack], camera: CameraFile, file: str) -> UnplannedRecording:
+    """The order of operations, as far as poses alone tell it: parts that move together are one operation.
+
+    Raises:
+        InputError: A known place is not stated by a pose, or nothing moves.
+    """
+    stays = all_stays(tracks)
+    X = _camera_pose(stays, camera)
+    pairs = [pair for known in stays.values() for pair in pairwise(known)]
+    moves = sorted((_Move(before.ends, after) for before, after in pairs), key=lambda move: move.stay.begins)
+    require(moves, f"{file}: no part comes to rest at another place than before, so there is no operation.")
+    groups = consecutive(moves, lambda group, move: any(_together(move, other) for other in group))
+    return UnplannedRecording(X, stays, tuple(map(_put, groups)))
+
+
+def _camera_pose(stays: Stays, camera: CameraFile) -> CameraPose:
+    if camera.T_world_camera is not None:
+        return CameraPose(camera.T_world_camera)
+    places = {part: T for part, T in camera.known.items() if T is not None and stays.get(part)}
+    require(
+        places,
+        "without --scenario the camera file has to state the pose of the camera, or poses of known parts that "
+        'rest; "start" is a place of a scenario.',
+    )
+    return solved_camera(stays, camera, places)
+
+
+def _together(move: _Move, other: _Move) -> bool:
+    """Whether two parts were on their way at the same time, for more than half of the shorter way."""
+    shared = min(move.stay.begins, other.stay.begins) - max(move.taken, other.taken)
+    shorter = min(move.stay.begins - move.taken, other.stay.begins - other.taken)
+    return move.stay.part != other.stay.part and shared > 0.5 * shorter
+
+
+def _put(moves: Sequence[_Move]) -> Put:
+    """What was taken first is taken for what the hand held."""
+    first, *others = sorted(moves, key=lambda move: move.taken)
+    return Put(first.stay.part, tuple(move.stay.part for move in others), first.stay)
+
+
+def deviations(rest: RestSpan, camera: CameraFile) -> tuple[float, float]:
+    """Standard deviations per axis of one rest, [m, rad]: of its mean, and of what stays; else that of one frame."""
+    return per_axis(rest.mean.covariance + staying(camera, rest.mean))
+
+
+def goals_of(recording: UnplannedRecording) -> Array:
+    """Where parts were put, (n, 4, 4), world, [m]."""
+    return np.array([recording.camera.T_world_camera @ put.rest.T for put in recording.puts])

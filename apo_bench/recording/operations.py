@@ -12,9 +12,9 @@ import numpy as np
 
 from apo_bench.assembly import Assembly
 from apo_bench.geometry import Array, pose
-from apo_bench.recording.log import PoseTrack
 from apo_bench.recording.ordering import quiet, taken
 from apo_bench.recording.rests import RestSpan
+from apo_bench.recording.setup_files import PoseTrack
 from apo_bench.recording.stays import Stay, Stays, poses_at
 from apo_bench.scenario import Scenario, nominal_operations
 

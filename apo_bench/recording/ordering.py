@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Poses, height, measure_round
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, RoundFace, beside, face_area
 from apo_bench.recording.stays import Stay, Stays, poses_at
 
@@ -130,8 +130,10 @@ def stated_order(assembly: Assembly, stays: Stays, ends: Sequence[float]) -> Ord
     Raises:
         InputError: Not one for each operation, or a part does not rest there.
     """
-    if len(ends) != len(assembly):
-        raise InputError(f"--ends: {len(assembly)} times are needed, one for each operation, {len(ends)} were given.")
+    require(
+        len(ends) == len(assembly),
+        f"--ends: {len(assembly)} times are needed, one for each operation, {len(ends)} were given.",
+    )
     chosen = list[Stay]()
     for k, (operation, t) in enumerate(zip(assembly.operations, ends, strict=True)):
         there = next((stay for stay in stays[operation.main] if stay.begins <= t <= stay.ends), None)

@@ -3,40 +3,38 @@
 Other rooms import from here; the folder of a sweep is in `run`.
 """
 
-from apo_bench.records.limits import CORRECTOR_LIMIT_S, USUAL_LIMITS, Limits
-from apo_bench.records.method import (
-    as_seen,
-    feels,
-    is_own,
-    knows_relations,
-    knows_truth,
-    may_look,
-    parsed,
-    with_simulated,
-)
 from apo_bench.records.outcomes import CODES, STAGES, sentence, touching_sentence
-from apo_bench.records.relations import GIVEN, RECOGNISED, SHIFT_MM, WRONG, relations_name
 from apo_bench.records.robot_error import (
     NO_ROBOT_ERROR,
+    USUAL_WRENCH,
+    WrenchNoise,
     checked_robot_error,
     checked_stated_error,
+    checked_wrench,
     robot_sigmas,
     told_error,
+    wrench_noise,
 )
 from apo_bench.records.row import (
+    KEY,
     LARGEST_NUMBER,
     LONGEST_SENTENCE,
     REQUIRED,
     ROW_FIELDS,
     FreedSet,
+    Key,
     MovedInHand,
     Predicted,
     Row,
     finite,
+    in_python,
     look_up,
+    row_key,
+    setting_columns,
+    settings_of,
+    trial_key,
 )
 from apo_bench.records.salt import Salt, check_same_salt, one_salt, read_salt, salt_of_sweep, with_salt
-from apo_bench.records.setting_columns import KEY, Key, in_python, row_key, setting_columns, settings_of, trial_key
 from apo_bench.records.setting_info import SettingInfo
 from apo_bench.records.settings import (
     ENV_ID,
@@ -59,14 +57,34 @@ from apo_bench.records.short_names import (
     CORRECTORS,
     FAILURES,
     FOREIGN_ARMS,
+    GIVEN,
     METHODS,
+    RECOGNISED,
     RESIDUALS,
+    SHIFT_MM,
     SIMULATED,
     UNCORRECTED,
+    WRONG,
     WRONG_RELATIONS,
+    as_seen,
+    feels,
+    is_own,
+    knows_relations,
+    knows_truth,
+    may_look,
+    parsed,
+    relations_name,
+    with_simulated,
 )
-from apo_bench.records.thresholds import MEANINGS, Criteria, Meaning, Thresholds
-from apo_bench.records.wrench_sensor import USUAL_WRENCH, WrenchNoise, checked_wrench, wrench_noise
+from apo_bench.records.thresholds import (
+    CORRECTOR_LIMIT_S,
+    MEANINGS,
+    USUAL_LIMITS,
+    Criteria,
+    Limits,
+    Meaning,
+    Thresholds,
+)
 
 __all__ = (
     "CODES",

@@ -11,12 +11,24 @@ Several are joined by `+`. A robot that feels is told how wrong it is (its state
 `drawn`             the standard deviations that its error is drawn with
 `unstated`          nothing; it assumes what is usual
 `none`, `tool:0.5`  as above, whatever is drawn
+
+How noisy the force and torque sensor at the wrist is, by the names that rows use.
+
+`ideal`             no noise
+`external`          0.1 N, 5 mNm: a good sensor between arm and hand, as of a Robotiq FT 300-S
+`external-coarse`   0.2 N, 10 mNm: a less good one, as of an OnRobot HEX-E
+`cobot`             3.5 N, 0.2 Nm: an arm's own, what is given as the precision of a Universal Robots UR5e
+`0.5/0.02`          N and Nm; without the second one, 0.05 Nm to each N, as the external ones have
+
+Each is the standard deviation of the white noise of one reading, per axis, at 1,000 readings a second. What of these
+numbers could be checked is said in docs/guide/real-robot.md.
 """
 
 import math
+from types import MappingProxyType
 from typing import NamedTuple
 
-from apo_bench.errors import InputError, require_text, unknown
+from apo_bench.errors import InputError, require, require_text, unknown
 
 NO_ROBOT_ERROR = "none"
 DRAWN = "drawn"
@@ -51,8 +63,7 @@ def robot_sigmas(name: str, called: str = "robot error") -> Sigmas:
         kind, _, sizes = entry.partition(":")
         if kind not in _UNITS:
             raise InputError(unknown(f"kind of {called}", kind, (NO_ROBOT_ERROR, *_UNITS)))
-        if kind in sigmas:
-            raise InputError(f"the {called} '{name}' was given, which has {kind} twice; say it once.")
+        require(kind not in sigmas, f"the {called} '{name}' was given, which has {kind} twice; say it once.")
         sigmas[kind] = _numbers(f"{called} '{name}'", kind, sizes)
     hand_eye, joints, tool, in_hand = (sigmas.get(kind, (0.0, 0.0)) for kind in _UNITS)
     return Sigmas(hand_eye, joints[0], tool[0], in_hand)
@@ -119,3 +130,60 @@ def _spelled(size: tuple[float, ...]) -> str:
     """`1`, or `1/0.2`: numbers that read back as they are."""
     needed = size[:1] if len(size) > 1 and not size[1] else size
     return "/".join(repr(x).removesuffix(".0") for x in needed)
+
+
+class WrenchNoise(NamedTuple):
+    """Standard deviations of one reading, per axis."""
+
+    force_n: float
+    torque_nm: float
+
+
+USUAL_WRENCH = "external"
+_PRESETS = MappingProxyType(
+    {
+        "ideal": WrenchNoise(0.0, 0.0),
+        "external": WrenchNoise(0.1, 0.005),
+        "external-coarse": WrenchNoise(0.2, 0.01),
+        "cobot": WrenchNoise(3.5, 0.2),
+    }
+)
+_N_PER_NM = 20.0
+_MOST = WrenchNoise(10.0, 5.0)
+"""A touch ends by six standard deviations of what is felt, 13.5 N with such a sensor: with 14 N it was a collision."""
+
+
+def wrench_noise(name: str) -> WrenchNoise:
+    """The noise that a name stands for.
+
+    Raises:
+        InputError: No name, an unknown one, or a number that is not allowed.
+    """
+    require_text("wrench sensor", name)
+    if name in _PRESETS:
+        return _PRESETS[name]
+    if not name[:1].isdigit() and name[:1] not in ("-", "+", ".", "/"):
+        raise InputError(f"{unknown('wrench sensor', name, _PRESETS)} Or give its noise in N and Nm: 0.1/0.005.")
+    try:
+        force, *rest = (float(size) + 0.0 for size in name.split("/"))
+        (torque,) = rest or [force / _N_PER_NM]
+    except ValueError:
+        force = torque = math.nan
+    require(
+        0.0 <= force <= _MOST.force_n and 0.0 <= torque <= _MOST.torque_nm,
+        f"the wrench sensor '{name}' was given; standard deviations from 0 to {_MOST.force_n:g} N and from 0 to "
+        f"{_MOST.torque_nm:g} Nm are allowed (with more N a touch is a collision before it is felt): 0.1/0.005, "
+        f"or a name: {', '.join(_PRESETS)}.",
+    )
+    return WrenchNoise(force, torque)
+
+
+def checked_wrench(name: str) -> str:
+    """A sensor as rows spell it: by its name where it has one, else by numbers that read back as they are.
+
+    Raises:
+        InputError: As in `wrench_noise`.
+    """
+    noise = wrench_noise(name)
+    known = next((preset for preset, its in _PRESETS.items() if its == noise), None)
+    return known or "/".join(repr(x).removesuffix(".0") for x in noise)

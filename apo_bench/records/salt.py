@@ -13,8 +13,8 @@ from typing import Any, final
 
 import numpy as np
 
-from apo_bench.errors import InputError
-from apo_bench.io.ordinary_files import read_bytes, write_whole
+from apo_bench.errors import InputError, require
+from apo_bench.io import read_bytes, write_whole
 
 FEWEST_BYTES = 16
 _MOST_BYTES = 512
@@ -51,8 +51,10 @@ def read_salt(path: str | Path) -> Salt:
     """
     match = _FORM.fullmatch(read_bytes(path, "salt file"))
     secret = bytes.fromhex(match[1].decode()) if match is not None else b""
-    if not FEWEST_BYTES <= len(secret) <= _MOST_BYTES or len(set(secret)) < _FEWEST_DIFFERENT:
-        raise InputError(f"'{path}' is not a salt file; it must hold {_TEXT}.")
+    require(
+        FEWEST_BYTES <= len(secret) <= _MOST_BYTES and len(set(secret)) >= _FEWEST_DIFFERENT,
+        f"'{path}' is not a salt file; it must hold {_TEXT}.",
+    )
     return Salt(secret)
 
 
@@ -65,11 +67,11 @@ def salt_of_sweep(path: str | Path, folder: str | Path) -> Salt:
     if os.path.lexists(path):
         return read_salt(path)
     trials = Path(folder) / "trials.jsonl"
-    if trials.exists() and trials.stat().st_size > 0:
-        raise InputError(
-            f"the salt file '{path}' is not there, and '{folder}' holds trials already; give the salt file that they "
-            "were drawn with, or choose another folder."
-        )
+    require(
+        not trials.exists() or trials.stat().st_size <= 0,
+        f"the salt file '{path}' is not there, and '{folder}' holds trials already; give the salt file that they "
+        "were drawn with, or choose another folder.",
+    )
     try:
         make_salt(Path(path))
     except OSError as error:
@@ -96,10 +98,10 @@ def one_salt(rows: Iterable[Mapping[str, Any]]) -> str | None:
         InputError: They were drawn with several.
     """
     hashes = sorted({row.get("salt") or "" for row in rows})
-    if len(hashes) > 1:
-        raise InputError(
-            f"the rows were drawn {' and '.join(map(with_salt, hashes))}; count trials of one salt at a time."
-        )
+    require(
+        len(hashes) <= 1,
+        f"the rows were drawn {' and '.join(map(with_salt, hashes))}; count trials of one salt at a time.",
+    )
     return hashes[0] or None if hashes else None
 
 
@@ -113,8 +115,7 @@ def check_same_salt(holder: str, at_hand: str | None, drawn: str | None) -> None
     """
     if at_hand == drawn:
         return
-    if drawn is None:
-        raise InputError(f"{holder} holds trials drawn without a salt; leave --salt-file out.")
+    require(drawn is not None, f"{holder} holds trials drawn without a salt; leave --salt-file out.")
     what = "no salt file was given" if at_hand is None else f"the salt file given is that of {at_hand}"
     raise InputError(f"{holder} holds trials drawn with the salt {drawn}, and {what}; give theirs with --salt-file.")
 

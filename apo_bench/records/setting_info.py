@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from numbers import Integral, Real
 from typing import Any, final
 
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import InputError, require, unknown
 
 
 @final
@@ -85,8 +85,10 @@ def check_value(info: SettingInfo, value: object, called: str = "", meaning: str
         low, high = info.range
         name = called or info.called
         number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
-        if info.is_whole and not (isinstance(value, Integral) and low <= number <= high):
-            raise InputError(f"a {name} of {value} was given; whole numbers from {low} to {high} are allowed.")
+        require(
+            not info.is_whole or (isinstance(value, Integral) and low <= number <= high),
+            f"a {name} of {value} was given; whole numbers from {low} to {high} are allowed.",
+        )
         if not low <= number <= high:
             text = repr(value) if math.isnan(number) else f"{number:g}"
             why = meaning or info.meaning

@@ -13,14 +13,18 @@ from typing import Annotated, Literal, Never, final, get_args, get_type_hints
 import numpy as np
 from msgspec import Meta
 
-from apo_bench.errors import InputError
-from apo_bench.records.method import checked_method, feels, is_own, parsed
-from apo_bench.records.relations import checked_relations
-from apo_bench.records.robot_error import DRAWN, NO_ROBOT_ERROR, checked_robot_error, checked_stated_error
+from apo_bench.errors import InputError, require
+from apo_bench.records.robot_error import (
+    DRAWN,
+    NO_ROBOT_ERROR,
+    USUAL_WRENCH,
+    checked_robot_error,
+    checked_stated_error,
+    checked_wrench,
+)
 from apo_bench.records.salt import Salt
 from apo_bench.records.setting_info import SettingInfo, about, check_value
-from apo_bench.records.short_names import CORRECTOR
-from apo_bench.records.wrench_sensor import USUAL_WRENCH, checked_wrench
+from apo_bench.records.short_names import CORRECTOR, checked_method, checked_relations, feels, is_own, parsed
 
 ENV_ID = "APOReplay-v0"
 ROW = "apo-bench/row/9"
@@ -308,31 +312,31 @@ def check(name: str, value: object, eye: str = "noise", called: str = "") -> Non
 
 def check_together(fidelity: str, *grasps: str) -> None:
     """Raise an `InputError` unless the verdicts of a fidelity are known to be those of `full` with these grasps."""
-    if fidelity == "contact" and "weld" in grasps:
-        raise InputError(
-            "the fidelity 'contact' was given together with the grasp 'weld', with which its verdicts differ; "
-            "use the grasp friction, or full."
-        )
+    require(
+        fidelity != "contact" or "weld" not in grasps,
+        "the fidelity 'contact' was given together with the grasp 'weld', with which its verdicts differ; "
+        "use the grasp friction, or full.",
+    )
 
 
 def check_squares(feels: bool, *grasps: str) -> None:
     """Raise an `InputError` if a robot that feels, which squares parts between its pads, has none that close."""
-    if feels and "weld" in grasps:
-        raise InputError(
-            "the grasp 'weld' was given for a robot that feels, which squares parts between pads that close; use the "
-            "grasp friction, or a robot that does not feel."
-        )
+    require(
+        not feels or "weld" not in grasps,
+        "the grasp 'weld' was given for a robot that feels, which squares parts between pads that close; use the "
+        "grasp friction, or a robot that does not feel.",
+    )
 
 
 def check_asks(method: str, looks: int) -> None:
     """Raise an `InputError` if looks are allowed to a corrector that nobody could answer."""
     plan = parsed(method).plan
-    if looks and is_own(plan):
-        raise InputError(
-            f"a number of looks of {looks} was given with the method '{plan}', which runs in a process of its own and "
-            "cannot ask from there; leave it out, or hand the corrector over in Python: apo_bench.correct(observation, "
-            "corrector, look)."
-        )
+    require(
+        not looks or not is_own(plan),
+        f"a number of looks of {looks} was given with the method '{plan}', which runs in a process of its own and "
+        "cannot ask from there; leave it out, or hand the corrector over in Python: apo_bench.correct(observation, "
+        "corrector, look).",
+    )
 
 
 def level_pair(level: float | Sequence[float], eye: str = "noise") -> tuple[float, float]:
@@ -340,10 +344,13 @@ def level_pair(level: float | Sequence[float], eye: str = "noise") -> tuple[floa
     several = tuple(level) if isinstance(level, Iterable) and not isinstance(level, str) else (level,)
     is_numbers = all(isinstance(x, Real) and not isinstance(x, bool | np.bool_) for x in several)
     numbers = tuple(map(float, several)) if is_numbers else ()
-    if eye == RANGE and len(numbers) != 1:
-        raise InputError(f"the level {level!r} was given with the eye 'range'; one number is allowed, mm per ray.")
-    if len(numbers) not in (1, 2):
-        raise InputError(f"the level {level!r} was given; one number is allowed, or a pair of mm and degrees.")
+    require(
+        eye != RANGE or len(numbers) == 1,
+        f"the level {level!r} was given with the eye 'range'; one number is allowed, mm per ray.",
+    )
+    require(
+        len(numbers) in (1, 2), f"the level {level!r} was given; one number is allowed, or a pair of mm and degrees."
+    )
     mm = numbers[0]
     deg = 0.0 if eye == RANGE else numbers[-1]
     check("level_mm", mm, eye)

@@ -1,4 +1,7 @@
-"""What the judge demands: one set of numbers, stated in the scenario and repeated in every row."""
+"""What the judge demands: one set of numbers, stated in the scenario and repeated in every row.
+
+Wall time that things may take [s], where nothing else is said.
+"""
 
 from dataclasses import dataclass
 from typing import Literal, final
@@ -43,3 +46,20 @@ class Criteria:
     clearance_mm: float
     """Per side, of the parts that were used."""
     success_means: Meaning = "assembled"
+
+
+CORRECTOR_LIMIT_S = 120.0
+"""What one correction in a process of its own may take."""
+
+
+@final
+@dataclass(frozen=True)
+class Limits:
+    """Of a sweep; said of a trial whose process, or that of its corrector, died or was ended."""
+
+    trial_s: float | None = 600.0
+    """What one trial may take; None where trials had no process of their own."""
+    corrector_s: float = CORRECTOR_LIMIT_S
+
+
+USUAL_LIMITS = Limits()

@@ -7,7 +7,7 @@ the difference is beyond chance, "as often" only where the interval lies close a
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from apo_bench.io.words import listed_words
+from apo_bench.io import listed_words
 from apo_bench.records import CORRECTOR, Row, knows_relations, knows_truth, look_up
 from apo_bench.statistics import (
     FEWEST_SEEDS,
@@ -20,8 +20,7 @@ from apo_bench.statistics import (
     pooled_rate,
     rank,
 )
-from apo_bench.statistics.levels.half_level import HalfLevel
-from apo_bench.statistics.levels.summary import Summary
+from apo_bench.statistics.levels.half_level import HalfLevel, Summary
 from apo_bench.statistics.rates import PLACE_FIELDS
 
 ALIKE_WITHIN = 0.05

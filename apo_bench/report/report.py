@@ -5,21 +5,27 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from apo_bench.errors import InputError
-from apo_bench.io.ordinary_files import check_folders, check_target, to_write
-from apo_bench.io.tables import write_columns
+from apo_bench.errors import InputError, require
+from apo_bench.io import check_folders, check_target, to_write, write_columns
 from apo_bench.records import Row, check_same_salt, one_salt, read_salt
-from apo_bench.records.run.report_rows import COLUMNS as KEPT
-from apo_bench.records.run.report_rows import report_rows
 from apo_bench.records.run.run_file import read_run
+from apo_bench.records.run.run_folder import COLUMNS as KEPT
+from apo_bench.records.run.run_folder import report_rows
 from apo_bench.report.answer import answer
-from apo_bench.report.figures.every import figures
+from apo_bench.report.figures.other_axes import figures
 from apo_bench.report.page.report_page import report_page
-from apo_bench.report.run.facts import scenario_files
-from apo_bench.report.run.trials import Draw, draw_failures
+from apo_bench.report.run.trials import Draw, draw_failures, scenario_files
 from apo_bench.report.tables.cells import cell_table, felt_table, gap_table, pair_table
-from apo_bench.report.tables.forecasts import calibration_table, confusion_table, recognition_table
-from apo_bench.report.tables.methods import area_table, effort_table, half_table, time_table, work_table
+from apo_bench.report.tables.methods import (
+    area_table,
+    calibration_table,
+    confusion_table,
+    effort_table,
+    half_table,
+    recognition_table,
+    time_table,
+    work_table,
+)
 from apo_bench.statistics import (
     Cell,
     Confusion,
@@ -34,7 +40,7 @@ from apo_bench.statistics import (
     trial_times,
     work,
 )
-from apo_bench.statistics.levels.summary import Summary, summary
+from apo_bench.statistics.levels.half_level import Summary, summary
 from apo_bench.statistics.settings import settings
 
 MOST_PANELS = 16
@@ -93,16 +99,14 @@ def report(
     """
     folder = Path(folder)
     rows = report_rows(folder)
-    if not rows:
-        raise InputError(f"'{folder}' holds no finished trial yet; run the sweep before its report.")
+    require(rows, f"'{folder}' holds no finished trial yet; run the sweep before its report.")
     salt = None if salt_file is None else read_salt(salt_file)
     if salt is not None:
         check_same_salt(f"'{folder}'", salt.hash, one_salt(rows))
     numbers = summary(rows)
-    if not numbers.cells:
-        raise InputError(
-            f"'{folder}' holds replays of measured demonstrations alone, which belong to no cell of a sweep."
-        )
+    require(
+        numbers.cells, f"'{folder}' holds replays of measured demonstrations alone, which belong to no cell of a sweep."
+    )
     try:
         check_target(folder / PAGE)
         check_folders(folder / name for name in (TABLES, FIGURES))

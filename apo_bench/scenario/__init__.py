@@ -2,10 +2,17 @@
 
 from apo_bench.scenario.checks import check_clearance
 from apo_bench.scenario.file import is_named, load_scenario, scenario_names, scenario_path
-from apo_bench.scenario.human_error import NOTHING_M, careless_covariance, spread_error
 from apo_bench.scenario.layout import draw_layout, layout_at, nominal_operations, nominal_start
 from apo_bench.scenario.order import in_the_air
-from apo_bench.scenario.scenario import Carelessness, Grasp, Scenario, Turn
+from apo_bench.scenario.scenario import (
+    NOTHING_M,
+    Carelessness,
+    Grasp,
+    Scenario,
+    Turn,
+    careless_covariance,
+    spread_error,
+)
 
 __all__ = (
     "NOTHING_M",

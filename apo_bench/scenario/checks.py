@@ -211,8 +211,9 @@ def _check_intrusions(scenario: Scenario, file: str, case: _Case, stages: tuple[
     for a, b in combinations(scenario.assembly.solids, 2):
         _check_pair(scenario, file, case, f"parts, {b}, start", "at the start", (a, b), stages[0], apart)
     for k, operation in enumerate(scenario.assembly.operations):
-        others = [part for part in scenario.assembly.solids if part not in operation.moves]
-        for pair in product(operation.moves, others):
+        for pair in product(
+            operation.moves, [part for part in scenario.assembly.solids if part not in operation.moves]
+        ):
             place = f"after operation {k + 1}"
             _check_pair(scenario, file, case, f"operation {k + 1}, goal", place, pair, stages[k + 1], apart)
 

@@ -10,15 +10,16 @@ import numpy as np
 from apo_bench.assembly import Operation
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Solid, pose
-from apo_bench.insertion.line import Preference
-from apo_bench.io.documents import JsonNode
+from apo_bench.insertion.arrival import Preference
+from apo_bench.io import JsonNode
 from apo_bench.parts import load_part, part_path
+from apo_bench.parts.agreement import with_fit
 from apo_bench.parts.allowed import FACE_OR_PART_NAME
-from apo_bench.parts.receding import with_fit
-from apo_bench.scenario.contacts import ContactGaps, check_kinds, read_contacts
-from apo_bench.scenario.grasps import read_grasp
-from apo_bench.scenario.keys import (
+from apo_bench.scenario.contacts import (
     LARGEST_LENGTH_MM,
+    ContactGaps,
+    check_kinds,
+    read_contacts,
     read_point,
     read_pose,
     read_span,
@@ -26,6 +27,7 @@ from apo_bench.scenario.keys import (
     refuse_name,
     refuse_unless,
 )
+from apo_bench.scenario.grasps import read_grasp
 from apo_bench.scenario.scenario import Grasp, Shift, Turn
 
 _MOST_PARTS = 50

@@ -11,16 +11,15 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.assembly import Assembly, Gap
-from apo_bench.errors import InputError, require, unknown
+from apo_bench.errors import require, require_known
 from apo_bench.generated import generated_file, is_generated, whole_name
-from apo_bench.insertion.line import Preference
-from apo_bench.io.documents import JsonNode, read_toml
-from apo_bench.io.plain_text import UNSHOWN
+from apo_bench.insertion.arrival import Preference
+from apo_bench.io import UNSHOWN, JsonNode, read_toml
 from apo_bench.records import MEANINGS, Meaning, Thresholds
 from apo_bench.resources import folder
 from apo_bench.scenario.checks import check_scenario
+from apo_bench.scenario.contacts import LARGEST_LENGTH_MM, read_span, read_unit_axis, refuse_unless
 from apo_bench.scenario.entries import OperationEntry, read_operations, read_parts
-from apo_bench.scenario.keys import LARGEST_LENGTH_MM, read_span, read_unit_axis, refuse_unless
 from apo_bench.scenario.layout import with_attach_lines
 from apo_bench.scenario.scenario import Carelessness, Scenario, Shift, Site, Turn
 
@@ -95,10 +94,7 @@ def scenario_path(given: str | Path) -> Path:
         return generated_file(given)
     if isinstance(given, Path) or given.endswith(".toml") or "/" in given or "\\" in given:
         return Path(given)
-    if given not in scenario_names():
-        raise InputError(
-            unknown("scenario", given, scenario_names()) + " Or give the path of a .toml file, or generated:SEED."
-        )
+    require_known("scenario", given, scenario_names(), rest=" Or give the path of a .toml file, or generated:SEED.")
     return folder("scenarios") / f"{given}.toml"
 
 

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from apo_bench.geometry import FINGER_ROOM_M, PAD_M, Array, Solid, all_boxes, angle_between, extent, holds, holds_whole
-from apo_bench.io.documents import JsonNode
-from apo_bench.scenario.keys import read_unit_axis, refuse
+from apo_bench.io import JsonNode
+from apo_bench.scenario.contacts import read_unit_axis, refuse
 from apo_bench.scenario.scenario import Grasp
 
 _RAISED = 0.15

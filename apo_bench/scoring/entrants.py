@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.errors import InputError, require
-from apo_bench.io.ordinary_files import check_target, read_bytes
+from apo_bench.io import check_target, read_bytes
 from apo_bench.names import own_modules_in
 from apo_bench.scoring.score import score
 from apo_bench.scoring.track import Track

@@ -10,7 +10,7 @@ import msgspec
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
-from apo_bench.io.ordinary_files import read_bytes, to_write
+from apo_bench.io import read_bytes, to_write
 
 SCHEMA = "apo-bench/entry/1"
 _LARGEST_BYTES = 16_000_000

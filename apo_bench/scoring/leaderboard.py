@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.errors import require
-from apo_bench.io.figures import default_looks, save_figure
-from apo_bench.io.plain_text import clean
+from apo_bench.io import clean, default_looks, save_figure
 from apo_bench.report.tables.table import Column, Table
 from apo_bench.scoring.entry import EXCLUDED, RIGHT, Entry, TrackScore, read_entry
 from apo_bench.statistics import Results, contrast, points

@@ -20,8 +20,7 @@ from apo_bench.assembly import Observation
 from apo_bench.errors import InputError, require
 from apo_bench.files.json_forms import observation_form
 from apo_bench.geometry import Array, Face, RoundFace, pose
-from apo_bench.io.documents import JsonNode, parse_json
-from apo_bench.io.ordinary_files import decoded, read_text
+from apo_bench.io import JsonNode, decoded, parse_json, read_text
 
 REQUEST = "apo-bench/request/1"
 _HEX = 32

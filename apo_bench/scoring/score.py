@@ -9,7 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from apo_bench.io.grouping import grouped
+from apo_bench.io import grouped
 from apo_bench.records import SETTINGS, Row
 from apo_bench.records.run.run_file import read_run
 from apo_bench.scoring.entry import EXCLUDED, RIGHT, SCHEMA, WRONG, Entry, TrackScore, mean_of

@@ -10,14 +10,12 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly import Plan
-from apo_bench.files.json_forms import TO_MM_DEG
-from apo_bench.files.robot_frames import RobotFrames
+from apo_bench.files.json_forms import TO_MM_DEG, RobotFrames
 from apo_bench.geometry import Array, pose
 from apo_bench.records import WrenchNoise, wrench_noise
 from apo_bench.show.robot_form import pose_form, tip_form
-from apo_bench.simulation.execution import search, spiral
-from apo_bench.simulation.execution.beside import STAND_OFF_M
-from apo_bench.simulation.execution.feel import laying, touching
+from apo_bench.simulation.execution import OPEN_TO_PICK_M, STAND_OFF_M, Grip, Move, Transfer, moves, search
+from apo_bench.simulation.execution.feel import touching
 from apo_bench.simulation.execution.feel.feeling import ACTS, FOOT_SIGMA_M, SQUARED, TOUCH_SIGMA_M, touch_guard
 from apo_bench.simulation.execution.feel.places import (
     OPENING_M,
@@ -26,11 +24,8 @@ from apo_bench.simulation.execution.feel.places import (
     opposite_places,
     wall_places,
 )
-from apo_bench.simulation.execution.fingers import OPEN_TO_PICK_M
-from apo_bench.simulation.execution.prepare import Move, moves
-from apo_bench.simulation.execution.transfer import Grip, Transfer
-from apo_bench.simulation.robot.wrist import felt_noise, low_pass_part
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.robot import felt_noise, low_pass_part
+from apo_bench.simulation.scene import Scene
 
 
 def acts_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> dict[str, Any]:
@@ -58,22 +53,22 @@ def acts_form(plan: Plan, scene: Scene, frames: RobotFrames, sensor: str) -> dic
             **{name: [_touch(place, frames) for place in places(plan, scene)] for name, places in touches.items()},
         },
         "lay_flat": {
-            "press_n": laying.PRESS_N,
-            "from_above_mm": _mm(laying.NEAR_M),
-            "yield_mm_s_per_n": _mm(laying.YIELD_M),
-            "fastest_mm_s": _mm(laying.FASTEST),
-            "fastest_deg_s": _deg(laying.FASTEST_RAD),
+            "press_n": touching.PRESS_N,
+            "from_above_mm": _mm(touching.NEAR_M),
+            "yield_mm_s_per_n": _mm(touching.YIELD_M),
+            "fastest_mm_s": _mm(touching.FASTEST),
+            "fastest_deg_s": _deg(touching.FASTEST_RAD),
             "lies_when": {
-                "press_within_n": round(laying.CALM * laying.PRESS_N, 6),
-                "turns_slower_than_deg_s": _deg(laying.CALM_RAD),
-                "for_s": laying.CALM_S,
+                "press_within_n": round(touching.CALM * touching.PRESS_N, 6),
+                "turns_slower_than_deg_s": _deg(touching.CALM_RAD),
+                "for_s": touching.CALM_S,
             },
-            "gives_up": {"after_s": laying.MOST_S, "below_begin_mm": _mm(laying.DEEPEST_M)},
+            "gives_up": {"after_s": touching.MOST_S, "below_begin_mm": _mm(touching.DEEPEST_M)},
             "sigma_mm": _mm(FOOT_SIGMA_M),
         },
         "search": {
-            "radius_mm": _mm(spiral.RADIUS_M),
-            "pitch_mm": _mm(spiral.PITCH_M),
+            "radius_mm": _mm(search.RADIUS_M),
+            "pitch_mm": _mm(search.PITCH_M),
             "then_turned_deg": list(search.YAWS_DEG),
             "radius_turned_mm": _mm(search.YAWED_RADIUS_M),
             "at_most_times": search.SEARCHES,
@@ -119,8 +114,8 @@ def _grip(grip: Grip, T: Array, scene: Scene, frames: RobotFrames) -> dict[str, 
 
 def _laid(t: Transfer, frames: RobotFrames, felt: WrenchNoise) -> dict[str, Any] | None:
     """None where the sensor could not tell lying."""
-    averaged = laying.averaged_s(t.flush, felt)
-    if averaged > laying.LONGEST_S:
+    averaged = touching.averaged_s(t.flush, felt)
+    if averaged > touching.LONGEST_S:
         return None
     grip = t.grips[0 if t.out.left is None else 1]  # changed once already, if it is on the way out
     foot = pose.apply(t.flush.T, t.flush.feet[:1])[0]
@@ -130,7 +125,7 @@ def _laid(t: Transfer, frames: RobotFrames, felt: WrenchNoise) -> dict[str, Any]
         "part_in_tip": pose_form(pose.inverse(grip.T_part_tip), frames),
         "feet_in_part_mm": [_mms(foot) for foot in t.flush.feet],
         **_plane(t.flush.normal, float(t.flush.normal @ foot), frames),
-        "yield_deg_s_per_nm": _deg(laying.turn_yield(t.flush)),
+        "yield_deg_s_per_nm": _deg(touching.turn_yield(t.flush)),
         "averaged_over_s": round(averaged, 6),
         "then_walls": [
             {

@@ -68,8 +68,7 @@ def _direction(points: list[Array], axis: Array) -> Array:
 
 
 def _whole(points: list[Array]) -> AxisEnds:
-    far = max(points, key=lambda p: float(np.linalg.norm(p - points[0])))
-    line = far - points[0]
+    line = max(points, key=lambda p: float(np.linalg.norm(p - points[0]))) - points[0]
     line = line / max(float(np.linalg.norm(line)), 1e-12)
     # where each point lies along the line: from the first to the last one, and a little beyond both
     at = [float((p - points[0]) @ line) for p in points]

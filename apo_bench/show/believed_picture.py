@@ -9,11 +9,11 @@ import numpy as np
 
 from apo_bench.assembly import Observation, Operation, Poses, arc_residuals, placements, relation_graph
 from apo_bench.geometry import Array, world_bounds
-from apo_bench.io.figures import default_looks, save_figure
-from apo_bench.io.words import listed_words
+from apo_bench.io import default_looks, listed_words, save_figure
 from apo_bench.judging.contacts import face_overlap
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.axes import axis_marks
+from apo_bench.simulation.scene import camera_view, picture
 
 _WIDTH = 620
 _HEIGHT = 480
@@ -78,7 +78,6 @@ def draw_beliefs(scenario: Scenario, step: int, beliefs: Sequence[BeliefPanel], 
     from matplotlib.figure import Figure
 
     from apo_bench.simulation.scene.marks import Marks
-    from apo_bench.simulation.scene.render import picture
     from apo_bench.simulation.scene.scene import build_scene
 
     scene = build_scene(scenario)
@@ -115,8 +114,6 @@ def _below(belief: BeliefPanel) -> list[str]:
 
 def _camera(scenario: Scenario, poses: Poses, last: Operation) -> Any:
     """One that sees what the last operation was about, obliquely to the assembly."""
-    from apo_bench.simulation.scene.render import camera_view
-
     near = {*last.moves, *(c.environment.part for c in last.contacts)} - set(scenario.assembly.fixed)
     low, high = world_bounds((scenario.assembly.solids[part], poses[part]) for part in near)
     first = poses[scenario.assembly.operations[0].main]

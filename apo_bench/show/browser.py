@@ -13,9 +13,19 @@ from apo_bench.errors import InputError
 from apo_bench.geometry import pose
 from apo_bench.show.stepping import COLOR_NAMES, COLORS, FACES, Cursor
 from apo_bench.simulation.film.film import FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG, framing
-from apo_bench.simulation.film.meshes import BodyMesh, body_meshes, body_poses, part_meshes
-from apo_bench.simulation.film.still import GHOST_OPACITY, HAND_COLOR, HAND_M, Ghost, label_place, show_moment
-from apo_bench.simulation.scene.world import initial_state
+from apo_bench.simulation.film.still import (
+    GHOST_OPACITY,
+    HAND_COLOR,
+    HAND_M,
+    BodyMesh,
+    Ghost,
+    body_meshes,
+    body_poses,
+    label_place,
+    part_meshes,
+    show_moment,
+)
+from apo_bench.simulation.scene import initial_state
 from apo_bench.trial.story import Story
 
 HOST = "127.0.0.1"
@@ -119,12 +129,11 @@ class Page:
     def _set_up(self, story: Story) -> None:
         server = self._server
         world = story.scene.work
-        assembly = story.scene.scenario.assembly
         server.gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
         server.gui.set_panel_label("apo-bench view")
         server.scene.set_up_direction("+z")
         server.scene.configure_default_lights(cast_shadow=False)
-        look_at, far = framing(assembly, [story.assembled])
+        look_at, far = framing(story.scene.scenario.assembly, [story.assembled])
         azimuth, elevation = np.radians([FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG])
         # where the camera looks, as a unit vector
         forwards = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]

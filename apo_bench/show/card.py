@@ -9,8 +9,8 @@ import numpy as np
 from apo_bench.assembly import Arc, Graph, Layout, joint_play_mm, placements, relation_graph, touched_contacts
 from apo_bench.geometry import Array
 from apo_bench.insertion.states import classify
-from apo_bench.io.words import listed_words
-from apo_bench.judging.rules import fixtures
+from apo_bench.io import listed_words
+from apo_bench.judging.verdict import fixtures
 from apo_bench.scenario import NOTHING_M, Carelessness, Scenario, Turn, spread_error
 from apo_bench.show.axes import holds_axis
 

@@ -3,6 +3,7 @@
 from typing import Any
 
 import numpy as np
+from rich.table import Column, Table
 
 from apo_bench.assembly import Consistency, Correction, Observation
 from apo_bench.correction.explanation import Explanation
@@ -41,8 +42,6 @@ def correction_lines(
 
 def pose_table(observation: Observation, correction: Correction) -> Any:
     """Corrected poses in mm and wxyz, and how far they were moved, as a table of `rich`."""
-    from rich.table import Column, Table
-
     numbers = ("x mm", "y mm", "z mm", "qw", "qx", "qy", "qz", "moved mm", "turned deg")
     table = Table("", "part", *(Column(name, justify="right") for name in numbers), box=None, pad_edge=False)
     moved = _moved(observation, correction)
@@ -55,8 +54,6 @@ def pose_table(observation: Observation, correction: Correction) -> Any:
 
 def suspect_table(test: Consistency) -> Any:
     """Every relation, and how well the rest fits without it, as a table of `rich`."""
-    from rich.table import Column, Table
-
     numbers = (Column(name, justify="right") for name in ("chi-square", "of", "p"))
     table = Table("without", "made", "contacts", *numbers, "", box=None, pad_edge=False)
     for suspect in test.suspects:

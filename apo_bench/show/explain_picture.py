@@ -9,12 +9,11 @@ from apo_bench.assembly import Observation
 from apo_bench.correction.directions import Direction
 from apo_bench.correction.explanation import Explanation, OperationExplanation
 from apo_bench.geometry import Array, Solid, extent, world_bounds
-from apo_bench.io.figures import default_looks, save_figure
-from apo_bench.io.grouping import grouped
-from apo_bench.io.words import listed_words, with_article
+from apo_bench.io import default_looks, grouped, listed_words, save_figure, with_article
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.show.axes import axis_marks
 from apo_bench.show.explain_text import size
+from apo_bench.simulation.scene import Marks, ShiftArrows, TurnRing, pixels
 
 _WIDTH = 900
 _HEIGHT = 540
@@ -50,7 +49,6 @@ def draw_explanation(scenario: Scenario, observation: Observation, explanation: 
     """
     from matplotlib.patheffects import withStroke
 
-    from apo_bench.simulation.scene.marks import Marks, pixels
     from apo_bench.simulation.scene.render import camera_view, picture
     from apo_bench.simulation.scene.scene import build_scene
 
@@ -78,8 +76,7 @@ def draw_explanation(scenario: Scenario, observation: Observation, explanation: 
     fovy = float(scene.shown.model.vis.global_.fovy)
     figure = _captioned(image, scenario, explanation, drawn)
     for mark in marks:
-        tips = pixels(mark.tips, camera, fovy, _WIDTH, _HEIGHT)
-        x, y = max(tips, key=lambda tip: (round(tip[1]), tip[0]))
+        x, y = max(pixels(mark.tips, camera, fovy, _WIDTH, _HEIGHT), key=lambda tip: (round(tip[1]), tip[0]))
         figure.axes[0].text(
             x, y, mark.name, color=tuple(0.75 * c for c in mark.color), fontsize=13, weight="bold", ha="center",
             va="center", path_effects=[withStroke(linewidth=3.5, foreground="white")],
@@ -89,8 +86,6 @@ def draw_explanation(scenario: Scenario, observation: Observation, explanation: 
 
 def _mark(part: _DrawnPart, direction: Direction, toward: Array) -> Any:
     """Arrows outside the part; a ring about the point that a turn is about, or the middle where any point will do."""
-    from apo_bench.simulation.scene.marks import ShiftArrows, TurnRing
-
     R = part.pose[:3, :3]
     middle = part.solid.bounds.mean(axis=0)
     r, g, b = (_SHADE * c for c in part.color)

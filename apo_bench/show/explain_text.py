@@ -8,12 +8,10 @@ import numpy as np
 from apo_bench.assembly import Hypothesis, spelled
 from apo_bench.correction.directions import SHIFT_NAMES, TURN_NAMES, Direction
 from apo_bench.correction.explanation import Explanation, FreeDirection, OperationExplanation, PartExplanation
-from apo_bench.correction.relation_equations import RelationHold
-from apo_bench.correction.shared_estimate import SharedEstimate
+from apo_bench.correction.relation_equations import RelationHold, SharedEstimate
 from apo_bench.files.json_forms import covariance_form, pose_form
 from apo_bench.geometry import Array, RoundFace
-from apo_bench.io.grouping import grouped
-from apo_bench.io.words import listed_words, with_article
+from apo_bench.io import grouped, listed_words, with_article
 
 _EXPLANATION = "apo-bench/explanation/1"
 _TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
@@ -176,9 +174,8 @@ def _is_on(direction: Direction, face: RoundFace) -> bool:
 
 def _about(free: FreeDirection) -> str:
     """The point of a turn, if it is not the origin of the part."""
-    point = free.direction.point
-    is_off = free.direction.turns and np.abs(point).max() >= _OFF_M
-    return f" about ({', '.join(f'{x * 1e3:.0f}' for x in point)}) mm" if is_off else ""
+    is_off = free.direction.turns and np.abs(free.direction.point).max() >= _OFF_M
+    return f" about ({', '.join(f'{x * 1e3:.0f}' for x in free.direction.point)}) mm" if is_off else ""
 
 
 def _free(free: FreeDirection) -> str:

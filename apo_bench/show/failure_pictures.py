@@ -14,12 +14,11 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly import Contact, Poses, outline_points
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import pose, world_bounds
-from apo_bench.io.ordinary_files import each_line
+from apo_bench.io import each_line
 from apo_bench.records import Row, Salt, TrialSettings, row_key, settings_of
-from apo_bench.records.run.own_code import left_out, own_code
-from apo_bench.records.run.replay_command import Files
+from apo_bench.records.run.replay_command import Files, left_out, own_code
 from apo_bench.records.run.validation import row_of
 from apo_bench.report.run.trials import FailurePicture
 from apo_bench.show.axes import axis_marks
@@ -79,8 +78,10 @@ def _picture_of(
     from apo_bench.trial.fingerprint import content_hash, spec_hash
     from apo_bench.trial.stages import scene_key, scene_of
 
-    if row["scenario"] not in files and not is_named(row["scenario"]):
-        raise InputError(f"run.json says no file of the scenario '{row['scenario']}'")
+    require(
+        row["scenario"] in files or is_named(row["scenario"]),
+        f"run.json says no file of the scenario '{row['scenario']}'",
+    )
     spec = replace(settings_of(row, files.get(row["scenario"], row["scenario"])), salt=salt)
     key = scene_key(spec)
     if key not in scenes:

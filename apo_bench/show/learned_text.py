@@ -5,8 +5,8 @@ from typing import Any
 import numpy as np
 
 from apo_bench.correction.learning.likelihood import EstimatedNumber
-from apo_bench.io.words import columns
-from apo_bench.observation.fitting.components import COMPONENTS
+from apo_bench.io import columns
+from apo_bench.observation.fitting.fit import COMPONENTS
 from apo_bench.trial.learned_noise import Learned
 
 _SCHEMA = "apo-bench/noise-learned/1"

@@ -11,14 +11,12 @@ import numpy as np
 
 from apo_bench.assembly import Demonstration, placements
 from apo_bench.geometry import Array, pose
-from apo_bench.io.figures import default_looks
+from apo_bench.io import default_looks
 from apo_bench.names import resolve
-from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.level import Facts
+from apo_bench.observation.looking import observe
+from apo_bench.observation.models import Camera, Facts
 from apo_bench.observation.noise import FAILURES, NOISES, Level, make_noise
-from apo_bench.observation.noise_file import read_noise
-from apo_bench.observation.observing import observe
-from apo_bench.observation.presets import noise_path, presets
+from apo_bench.observation.noise_file import noise_path, presets, read_noise
 from apo_bench.scenario.file import load_scenario
 
 SCENARIO = "stick_in_tower"
@@ -78,8 +76,7 @@ def draw_errors(model: Any, level: Level, draws: int = _DRAWS) -> Drawn:
     for _ in range(draws):
         observation = observe(demonstration, noise, rng)
         # error xi of T Exp(xi), turned from the part's own frame into that of the ray: R_ray^T R_part, for both halves
-        R = np.swapaxes(camera.frames(observation.goals), 1, 2) @ observation.goals[:, :3, :3]
-        Q = np.kron(np.eye(2), R)
+        Q = np.kron(np.eye(2), np.swapaxes(camera.frames(observation.goals), 1, 2) @ observation.goals[:, :3, :3])
         xi = (Q @ pose.log(pose.inverse(demonstration.goals) @ observation.goals)[..., None])[..., 0]
         errors.append(xi[observation.seen])
         covariance = Q @ observation.covariance @ np.swapaxes(Q, 1, 2)

@@ -38,9 +38,8 @@ def evidence_table(recognised: Recognised, right: Assembly) -> Any:
 
 def difference_lines(observation: Observation, recognised: Recognised) -> list[str]:
     """`all 9 contacts of the scenario were recognised, and no other`, or what differs."""
-    right = observation.assembly
-    count = count_contacts(right, recognised.assembly)
-    missed = [f"missed: {k + 1}: {contact}" for k, contact in _missed(right, recognised)]
+    count = count_contacts(observation.assembly, recognised.assembly)
+    missed = [f"missed: {k + 1}: {contact}" for k, contact in _missed(observation.assembly, recognised)]
     total = count["contacts_right"] + count["contacts_missed"]
     if not missed and not count["contacts_false"]:
         return [f"all {total} contacts of the scenario were recognised, and no other"]

@@ -12,12 +12,12 @@ from apo_bench.assembly import Assembly
 from apo_bench.depth_camera.distance import strike_distances
 from apo_bench.depth_camera.follow import Event
 from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
-from apo_bench.io.figures import default_looks, save_figure
+from apo_bench.io import default_looks, save_figure
 from apo_bench.records import RANGE, check
 from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.scene.scene import build_scene
+from apo_bench.simulation.scene import build_scene
 from apo_bench.simulation.sensor.watch import DemonstrationImages
 from apo_bench.trial.stages import (
     OBSERVATION,
@@ -82,8 +82,7 @@ def checked_view(view: int) -> int:
         InputError: The range finder has no such view.
     """
     views = len(RangeFinder().views)
-    if not 1 <= view <= views:
-        raise InputError(f"--view {view} was given; the range finder has views 1 to {views}.")
+    require(1 <= view <= views, f"--view {view} was given; the range finder has views 1 to {views}.")
     return view - 1
 
 
@@ -149,7 +148,6 @@ def draw_sensor(run: SensorRun, out: Path, view: int = 0) -> None:
     from matplotlib.figure import Figure
 
     events = run.events
-    assembly = run.simulated.demonstration.assembly
     figure = Figure(figsize=(15.0, 2.55 * max(1, len(events)) + 0.3), layout="constrained")
     rows = figure.subplots(max(1, len(events)), len(_TITLES), squeeze=False)
     for axes, title in zip(rows[0], _TITLES, strict=True):
@@ -157,7 +155,7 @@ def draw_sensor(run: SensorRun, out: Path, view: int = 0) -> None:
     for axes in rows.ravel():
         axes.set(xticks=[], yticks=[])
     for row, event in zip(rows, events, strict=False):
-        row[0].set_ylabel(_label(assembly, event), fontsize=9)
+        row[0].set_ylabel(_label(run.simulated.demonstration.assembly, event), fontsize=9)
         _draw_row(row, run.watched, run.images, event, view)
     # only where anything ever changed is shown
     changed = [event.regions[view].appeared | event.regions[view].vanished for event in events]

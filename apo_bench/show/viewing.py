@@ -6,13 +6,13 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
-from apo_bench.errors import InputError
-from apo_bench.io.ordinary_files import each_line
+from apo_bench.errors import InputError, require
+from apo_bench.io import each_line
 from apo_bench.records import Row, read_salt, settings_of
-from apo_bench.records.run.own_code import own_code
+from apo_bench.records.run.replay_command import own_code
 from apo_bench.records.run.run_file import read_run
 from apo_bench.records.run.validation import row_of
-from apo_bench.report.run.facts import scenario_files
+from apo_bench.report.run.trials import scenario_files
 from apo_bench.show.browser import PORT, no_browser, serve_story
 from apo_bench.show.stepping import Cursor
 from apo_bench.simulation.film.still import FilmTrack
@@ -34,8 +34,7 @@ def choose_display(port: int | None) -> Display:
     Raises:
         InputError: Neither is possible.
     """
-    if port is not None and not 1 <= port <= 65535:
-        raise InputError(f"--port {port} was given; a whole number from 1 to 65535 is allowed.")
+    require(port is None or 1 <= port <= 65535, f"--port {port} was given; a whole number from 1 to 65535 is allowed.")
     if port is None and not no_window():
         return "window"
     missing = no_browser()

@@ -5,9 +5,9 @@ the other), `execution/prepare.py` (a step becomes a `Transfer`: grips, lines, g
 operation, as motions of the tip; gripping and letting go are in `execution/fingers.py`, pressing into a hole and
 searching for it in `execution/search.py`), `robot/robot.py` (a line of the tip becomes joint targets: `follow` calls
 `_run`, that `_tick`, and there is `mj_step`, once for each target; a search steps in `servo`).
-Hands that demonstrate: `human/demonstration.py`, `human/perform.py`, `human/hands.py`.
+Hands that demonstrate: `human/demonstration.py`, `human/hands.py`.
 """
 
-from apo_bench.simulation.scene.graphics import import_mujoco
+from apo_bench.simulation.graphics import import_mujoco
 
 import_mujoco()

@@ -12,7 +12,7 @@ from typing import Any, final
 
 import mujoco
 
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 
 
 @final
@@ -38,11 +38,11 @@ def physics(timestep_s: float = 0.001) -> Physics:
     Raises:
         InputError: A step for which the settings were not checked.
     """
-    if not 0.0001 <= timestep_s <= 0.001:
-        raise InputError(
-            f"a time step of {timestep_s * 1e3:g} ms was given; 0.1 to 1 ms are allowed, "
-            "since a longer step lets misaligned parts slip into each other; use 1 (tables) or 0.5 (check)."
-        )
+    require(
+        0.0001 <= timestep_s <= 0.001,
+        f"a time step of {timestep_s * 1e3:g} ms was given; 0.1 to 1 ms are allowed, "
+        "since a longer step lets misaligned parts slip into each other; use 1 (tables) or 0.5 (check).",
+    )
     return Physics(timestep_s=timestep_s, solref=(4 * timestep_s, 2.0))
 
 

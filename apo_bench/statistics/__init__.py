@@ -1,9 +1,28 @@
 """Rates, paired comparisons, curves, power: numbers out of rows."""
 
-from apo_bench.statistics.contacts import GapSummary, Quantiles, Recognition, gaps, recognitions
-from apo_bench.statistics.effort import Effort, TrialTimes, Work, efforts, read_timing, trial_times, work
-from apo_bench.statistics.felt import FeltSummary, felt
-from apo_bench.statistics.forecasts import ALL, Calibration, Confusion, calibrations, confusions
+from apo_bench.statistics.effort import (
+    Effort,
+    FeltSummary,
+    TrialTimes,
+    Work,
+    efforts,
+    felt,
+    read_timing,
+    trial_times,
+    work,
+)
+from apo_bench.statistics.forecasts import (
+    ALL,
+    Calibration,
+    Confusion,
+    GapSummary,
+    Quantiles,
+    Recognition,
+    calibrations,
+    confusions,
+    gaps,
+    recognitions,
+)
 from apo_bench.statistics.over_seeds import (
     FEWEST_SEEDS,
     Contrast,
@@ -26,7 +45,6 @@ from apo_bench.statistics.power import (
     shares,
     wilson_half_width,
 )
-from apo_bench.statistics.rate_text import failures, level_label, percent, percents, points, share, signed
 from apo_bench.statistics.rates import (
     NOT_EXECUTED,
     Cell,
@@ -43,12 +61,19 @@ from apo_bench.statistics.rates import (
 from apo_bench.statistics.settings import (
     Setting,
     cell_place,
+    failures,
+    level_label,
     level_of,
     level_unit,
     level_words,
     levels_of,
     members,
+    percent,
+    percents,
+    points,
     setting_of,
+    share,
+    signed,
 )
 
 __all__ = (

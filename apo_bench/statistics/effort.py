@@ -1,8 +1,12 @@
 """What replays take, and what a sweep took: operations beyond doing each once, simulated time, how far finished parts
-were pushed; wall times of trials, and what workers did, out of `timing.jsonl`."""
+were pushed; wall times of trials, and what workers did, out of `timing.jsonl`.
 
+What robots that feel found out about themselves, beside what their errors were drawn with.
+"""
+
+import math
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import fmean, median
@@ -10,11 +14,10 @@ from typing import Any, final
 
 import numpy as np
 
-from apo_bench.io.grouping import grouped
-from apo_bench.io.ordinary_files import each_line
-from apo_bench.records import Row
+from apo_bench.io import each_line, grouped
+from apo_bench.records import Row, look_up, robot_sigmas, told_error
 from apo_bench.records.run.validation import timing_of
-from apo_bench.statistics.rates import by_method
+from apo_bench.statistics.rates import Place, by_method, order, place_of
 
 _PARTS = ("compile_s", "demonstrate_s", "trial_s")
 
@@ -112,3 +115,58 @@ def work(lines: Iterable[Mapping[str, Any]]) -> tuple[Work, ...]:
         for line in lines
     )
     return tuple(Work(host, worker, len(own), sum(own)) for (host, worker), own in sorted(busy.items()))
+
+
+@final
+@dataclass(frozen=True)
+class FeltSummary:
+    """Of the trials of a cell in which a robot felt; lengths are root mean squares of vectors, angles alike."""
+
+    place: Place
+    trials: int
+    touches: float
+    """Mean."""
+    refused: int
+    """Touches that were not believed, all together."""
+    felt_mm: float
+    felt_deg: float
+    """How far the base was believed to be off in the end."""
+    sure_mm: float
+    sure_deg: float
+    """How far that may be wrong, as the robot says itself."""
+
+    @property
+    def drawn(self) -> tuple[float, float]:
+        """What the true error was drawn with, [mm] and [deg]."""
+        return _as_vector(self.place.robot_error)
+
+    @property
+    def told(self) -> tuple[float, float] | None:
+        """What the robot was told, [mm] and [deg]; None if nothing."""
+        said = told_error(self.place.stated_error, self.place.robot_error)
+        return None if said is None else _as_vector(said)
+
+
+def felt(rows: Iterable[Row]) -> tuple[FeltSummary, ...]:
+    """One per cell of a method that feels, sorted as `tally` sorts."""
+    groups = grouped((place, row) for row in rows if row.get("touches") is not None and (place := place_of(row)))
+    return tuple(_summary(place, groups[place]) for place in sorted(groups, key=order))
+
+
+def _summary(place: Place, rows: Sequence[Row]) -> FeltSummary:
+    def column(name: str) -> list[float]:
+        return [float(look_up(row, name)) for row in rows]
+
+    sizes = (_root_mean_square(column(name)) for name in ("felt_mm", "felt_deg", "felt_sure_mm", "felt_sure_deg"))
+    touches = math.fsum(column("touches")) / len(rows)
+    return FeltSummary(place, len(rows), touches, int(sum(column("touches_refused"))), *sizes)
+
+
+def _root_mean_square(sizes: Sequence[float]) -> float:
+    return math.sqrt(math.fsum(x * x for x in sizes) / len(sizes))
+
+
+def _as_vector(name: str) -> tuple[float, float]:
+    """Root mean squares of vectors of three axes, of where hand and eye believe each other."""
+    mm, deg = robot_sigmas(name).hand_eye
+    return math.sqrt(3.0) * mm, math.sqrt(3.0) * deg

@@ -19,7 +19,7 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
-from apo_bench.io.grouping import grouped
+from apo_bench.io import grouped
 from apo_bench.statistics.paired import mcnemar, tango
 from apo_bench.statistics.power import ERROR, least_discordant, paired_trials
 from apo_bench.statistics.rates import CONFIDENCE, Interval, wilson

@@ -12,7 +12,7 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
 from apo_bench.statistics.paired import normal_quantile, score
 from apo_bench.statistics.rates import Interval, wilson
@@ -72,11 +72,11 @@ def shares(rate: float, reference: float, agree: float | None = None) -> tuple[f
         return rate * (1 - reference), reference * (1 - rate)
     least = abs(1.0 - rate - reference)
     most = 1.0 - abs(rate - reference)
-    if not least - 1e-9 <= agree <= most + 1e-9:
-        raise InputError(
-            f"an agreement of {agree:g} was given; success rates of {rate:g} and {reference:g} allow {least:g} to "
-            f"{most:g} of the pairs to end alike."
-        )
+    require(
+        least - 1e-9 <= agree <= most + 1e-9,
+        f"an agreement of {agree:g} was given; success rates of {rate:g} and {reference:g} allow {least:g} to "
+        f"{most:g} of the pairs to end alike.",
+    )
     apart = 1.0 - agree
     # win + lose = apart, and win - lose = rate - reference
     return max(0.0, 0.5 * (apart + (rate - reference))), max(0.0, 0.5 * (apart - (rate - reference)))
@@ -153,8 +153,7 @@ def evidence(trials: int, power: float = _POWER, comparisons: int = 1) -> PowerE
     """What so many trials can show; see `PowerEvidence`."""
     from scipy.optimize import brentq
 
-    if not 1 <= trials <= _MOST:
-        raise InputError(f"{trials} trials were given; a whole number from 1 to {_MOST} is allowed.")
+    require(1 <= trials <= _MOST, f"{trials} trials were given; a whole number from 1 to {_MOST} is allowed.")
     _inside(power, "power", 0.0, 1.0)
     error = _error(comparisons)
     z2 = normal_quantile() ** 2
@@ -204,8 +203,9 @@ def _likely(n: int, p: float) -> Array:
 
 
 def _error(comparisons: int) -> float:
-    if not 1 <= comparisons <= _MOST:
-        raise InputError(f"{comparisons} comparisons were given; a whole number from 1 to {_MOST} is allowed.")
+    require(
+        1 <= comparisons <= _MOST, f"{comparisons} comparisons were given; a whole number from 1 to {_MOST} is allowed."
+    )
     return ERROR / comparisons
 
 

@@ -10,7 +10,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple, TypeVar, final
 
 from apo_bench.errors import InputError
-from apo_bench.io.grouping import grouped
+from apo_bench.io import grouped
 from apo_bench.records import Row, TrialSettings, one_salt, parsed
 
 CONFIDENCE = 0.95

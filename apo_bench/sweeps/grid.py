@@ -7,14 +7,14 @@ from itertools import product
 from numbers import Real
 from typing import Any, final
 
-from apo_bench.errors import InputError
-from apo_bench.io.grouping import grouped
-from apo_bench.io.plain_text import UNSHOWN
+from apo_bench.errors import require
+from apo_bench.io import UNSHOWN, grouped
 from apo_bench.records import (
     LEVEL,
     RANGE,
     SETTINGS,
     Salt,
+    SettingInfo,
     TrialSettings,
     check,
     check_squares,
@@ -27,15 +27,15 @@ from apo_bench.records import (
     refuse_noise,
 )
 from apo_bench.scenario import Scenario, load_scenario
-from apo_bench.sweeps.work.messages import Unit
+from apo_bench.sweeps.work.environment_lock import Unit
 
 LARGEST_TRIALS = 1_000_000
 _MOST_TRIALS = 1_000_000
 """Of all cells of a sweep together: their specifications are held in memory, half a kilobyte each."""
-AXES = tuple(info for info in (*SETTINGS.values(), LEVEL) if info.axis)
+AXES: tuple[SettingInfo, ...] = tuple(info for info in (*SETTINGS.values(), LEVEL) if info.axis)
 """What a sweep has several of."""
 _MAY_BE_EMPTY = ("clearance_mm", "noise")
-SHARED = tuple(info.name for info in SETTINGS.values() if info.shared)
+SHARED: tuple[str, ...] = tuple(info.name for info in SETTINGS.values() if info.shared)
 """What all grids of a sweep have in common, so that no key tells trials apart by it."""
 _BY_RULE = (
     *("scenario", "careless", "clearance_mm", "eye", "noise"),
@@ -86,11 +86,15 @@ class SweepSettings:
         for info in AXES:
             entries = map(_whole if info.is_whole else _plain, getattr(self, info.axis))
             values = tuple(dict.fromkeys(map(info.spelled, entries) if info.spelled else entries))
-            if not values and info.name not in _MAY_BE_EMPTY:
-                raise InputError(f"no {info.axis} were given for the sweep; at least one is needed.")
+            require(
+                values or info.name in _MAY_BE_EMPTY,
+                f"no {info.axis} were given for the sweep; at least one is needed.",
+            )
             object.__setattr__(self, info.axis, values)
-        if not 1 <= self.trials <= LARGEST_TRIALS:
-            raise InputError(f"{self.trials} trials were given; a whole number from 1 to {LARGEST_TRIALS} is allowed.")
+        require(
+            1 <= self.trials <= LARGEST_TRIALS,
+            f"{self.trials} trials were given; a whole number from 1 to {LARGEST_TRIALS} is allowed.",
+        )
         check("seed", self.seed)
         check("seed", self.seed + self.trials - 1)
         for eye in self.eyes:
@@ -110,10 +114,10 @@ class SweepSettings:
         ).items():
             for value in values:
                 check(name, value)
-                if SETTINGS[name].is_text and name != "scenario" and UNSHOWN.search(value):
-                    raise InputError(
-                        f"the name {value!r} was given, which has control characters or half letters; use another one."
-                    )
+                require(
+                    not SETTINGS[name].is_text or name == "scenario" or not UNSHOWN.search(value),
+                    f"the name {value!r} was given, which has control characters or half letters; use another one.",
+                )
         check_together(self.fidelity, *self.grasps)
         check_squares(any(map(feels, self.methods)), *self.grasps)
 
@@ -121,18 +125,16 @@ class SweepSettings:
 def check_grids(grids: Sequence[SweepSettings]) -> None:
     """Raise an `InputError` unless there is a grid, all have the same arm, time step and fidelity, and they are not
     larger than can be held."""
-    if not grids:
-        raise InputError("no grid was given for the sweep; at least one is needed.")
+    require(grids, "no grid was given for the sweep; at least one is needed.")
     for name in SHARED:
         values = {getattr(grid, name): None for grid in grids}
-        if len(values) > 1:
-            raise InputError(f"{name} of a sweep is {' and '.join(map(str, values))}; run a sweep for each.")
+        require(len(values) <= 1, f"{name} of a sweep is {' and '.join(map(str, values))}; run a sweep for each.")
     most = sum(grid.trials * _per_seed(grid) for grid in grids)
-    if most > _MOST_TRIALS:
-        raise InputError(
-            f"the sweep has up to {most:,} trials, and at most {_MOST_TRIALS:,} are allowed in one folder; share them "
-            "out over several: other seeds, or other scenarios, in each."
-        )
+    require(
+        most <= _MOST_TRIALS,
+        f"the sweep has up to {most:,} trials, and at most {_MOST_TRIALS:,} are allowed in one folder; share them "
+        "out over several: other seeds, or other scenarios, in each.",
+    )
 
 
 def load_all(grids: Sequence[SweepSettings]) -> Mapping[str, Scenario]:
@@ -144,10 +146,14 @@ def load_all(grids: Sequence[SweepSettings]) -> Mapping[str, Scenario]:
     loaded = {source: load_scenario(source) for grid in grids for source in grid.scenarios}
     names = [scenario.name for scenario in loaded.values()]
     for name in names:
-        if UNSHOWN.search(name):
-            raise InputError(f"the scenario name {name!r} has control characters or half letters; rename its file.")
-        if names.count(name) > 1:
-            raise InputError(f"two scenarios called '{name}' were given; rows name them, so rename one of the files.")
+        require(
+            not UNSHOWN.search(name),
+            f"the scenario name {name!r} has control characters or half letters; rename its file.",
+        )
+        require(
+            names.count(name) <= 1,
+            f"two scenarios called '{name}' were given; rows name them, so rename one of the files.",
+        )
     return loaded
 
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any, final
 
-from apo_bench.io.plain_text import clean
+from apo_bench.io import clean
 from apo_bench.records import KEY, Row, look_up
 
 Count = Callable[[Row], None]

@@ -1,25 +1,50 @@
-"""Many trials: spread over processes or machines, each row written as its trial ends, resumed where it was left."""
+"""Many trials: spread over processes or machines, each row written as its trial ends, resumed where it was left.
+
+Sweep files: grids as TOML; every complaint names file, key and remedy.
+
+    scenarios = ["stick_in_tower", "carried_bridge"]
+    levels = [0.5, 1, 2]
+    methods = ["none", "paper", "contact"]
+    trials = 40
+
+    [[also]]                  # a further grid: what it does not say is as above
+    methods = ["oracle"]
+    levels = [0]
+
+Lengths in mm, angles in degrees; paths as on the command line, from the current folder.
+"""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
-from apo_bench.errors import InputError, unknown
-from apo_bench.io.grouping import grouped
-from apo_bench.records import CORRECTOR, CORRECTOR_LIMIT_S, Limits, Row, level_pair, salt_of_sweep, trial_key
+from apo_bench.errors import InputError, require, require_known
+from apo_bench.io import JsonNode, grouped, read_toml
+from apo_bench.records import (
+    CORRECTOR,
+    CORRECTOR_LIMIT_S,
+    LEVEL,
+    SETTINGS,
+    Limits,
+    Row,
+    in_python,
+    level_pair,
+    salt_of_sweep,
+    trial_key,
+)
 from apo_bench.records.run.run_file import run_record
 from apo_bench.records.run.run_folder import RunFolder
 from apo_bench.scenario import Scenario, is_named
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.physics import physics
-from apo_bench.sweeps.grid import SweepSettings, check_grids, described, load_all, units
+from apo_bench.sweeps.grid import AXES, LARGEST_TRIALS, SHARED, SweepSettings, check_grids, described, load_all, units
 from apo_bench.sweeps.local.pool import run_locally
 from apo_bench.sweeps.progress import progress
 from apo_bench.sweeps.work.dispatch import Executor, check_limit
-from apo_bench.sweeps.work.environment_lock import EnvironmentLock, Names, environment_lock
-from apo_bench.sweeps.work.messages import Check, Unit, listening
+from apo_bench.sweeps.work.environment_lock import Check, EnvironmentLock, Names, Unit, environment_lock, listening
 from apo_bench.sweeps.work.worker import Timing, row_within_limit
 from apo_bench.trial.fingerprint import code_files, content_pieces, spec_hash
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations
@@ -133,23 +158,26 @@ def _left(
             cell = replace(trial, method=CORRECTOR, seed=0)
             if row_hash is not None and cell not in hashes:
                 hashes[cell] = spec_hash(trial, lock.content[trial.scenario])
-            if row_hash is not None and row_hash != hashes[cell]:
-                raise InputError(
-                    f"'{store.folder}' holds a row of {loaded[trial.scenario].name}, method {trial.method}, seed "
-                    f"{trial.seed}, that was made with other code or settings; choose another folder."
-                )
+            require(
+                row_hash is None or row_hash == hashes[cell],
+                f"'{store.folder}' holds a row of {loaded[trial.scenario].name}, method {trial.method}, seed "
+                f"{trial.seed}, that was made with other code or settings; choose another folder.",
+            )
         left.append(Unit(tuple(trial for trial, row_hash in row_hashes.items() if row_hash is None)))
     return [unit for unit in left if unit.trials]
 
 
 def _check_executor(workers: int | None, limit_s: float, backend: str, address: str | None) -> None:
-    if workers is not None and not 1 <= workers <= _LARGEST_WORKERS:
-        raise InputError(f"{workers} workers were given; a whole number from 1 to {_LARGEST_WORKERS} is allowed.")
+    require(
+        workers is None or 1 <= workers <= _LARGEST_WORKERS,
+        f"{workers} workers were given; a whole number from 1 to {_LARGEST_WORKERS} is allowed.",
+    )
     check_limit(limit_s)
-    if backend not in _BACKENDS:
-        raise InputError(unknown("backend", backend, _BACKENDS))
-    if address is not None and backend != "ray":
-        raise InputError(f"the address '{address}' was given, but the backend {backend} has none; say --backend ray.")
+    require_known("backend", backend, _BACKENDS)
+    require(
+        address is None or backend == "ray",
+        f"the address '{address}' was given, but the backend {backend} has none; say --backend ray.",
+    )
     if backend == "ray":
         from apo_bench.sweeps.ray.backend import check_ray
 
@@ -164,3 +192,106 @@ def _content(lock: EnvironmentLock, loaded: Mapping[str, Scenario], arm: Arm) ->
         for piece, hashed in content_pieces(scenario, source, arm.files).items()
     }
     return {**pieces, **lock.hashes}
+
+
+_SEVERAL = {info.axis: info for info in AXES}
+"""Keys whose values are lists."""
+_COUNTS = {"trials": (1, LARGEST_TRIALS), "seed": SETTINGS["seed"].range}
+_ALONE = {SETTINGS[name].keyword: SETTINGS[name] for name in SHARED}
+"""One for the whole sweep: they stand at the top of the file only."""
+_MOST_ENTRIES = 1000
+SWEEP_KEYS = (*_SEVERAL, *_COUNTS)
+
+
+def is_sweep_file(text: str) -> bool:
+    """Whether what was given in place of scenarios is a sweep file: TOML that is no scenario file.
+
+    Raises:
+        InputError: It is TOML that cannot be read.
+    """
+    if not text.lower().endswith(".toml"):
+        return False
+    keys = read_toml(text, "sweep or scenario file").value
+    return "scenarios" in keys or not {"parts", "operations"} & set(keys)
+
+
+def read_sweep(
+    path: str | Path, overrides: Mapping[str, Any] | None = None, besides: Sequence[str] = ()
+) -> tuple[SweepSettings, ...]:
+    """The grids of a sweep file: the top one, and one for each `[[also]]`.
+
+    Args:
+        overrides: Key of the file -> what to take instead, in every grid.
+        besides: Keys of the file that are read elsewhere.
+
+    Raises:
+        InputError: Anything in the file that is not as described.
+    """
+    top = read_toml(path, "sweep file").fields(("scenarios",), (*SWEEP_KEYS[1:], *_ALONE, *besides, "also"))
+    tables = [entry.fields((), SWEEP_KEYS) for entry in _tables(top["also"])] if "also" in top else []
+    first = {key: _value(key, node) for key, node in top.items() if key not in ("also", *besides)}
+    grids = {str(path): first} | {
+        f"{path}, also {i}": first | {key: _value(key, node) for key, node in table.items()}
+        for i, table in enumerate(tables, start=1)
+    }
+    return tuple(_grid(name, {**values, **(overrides or {})}) for name, values in grids.items())
+
+
+def _tables(node: JsonNode) -> Sequence[JsonNode]:
+    require(
+        isinstance(node.value, list) and all(isinstance(entry, dict) for entry in node.value),
+        f"{node.file}, also: further grids are tables; write [[also]] above the keys of each.",
+    )
+    return _few(node.items("also"), node)
+
+
+def _grid(name: str, values: Mapping[str, Any]) -> SweepSettings:
+    try:
+        return SweepSettings(**in_python(values))
+    except InputError as error:
+        raise InputError(f"{name}: {error}") from error
+
+
+def _value(key: str, node: JsonNode) -> Any:
+    if key in _COUNTS:
+        return _count(node, *_COUNTS[key])
+    if key in _ALONE:
+        return node.text() if _ALONE[key].is_text else node.number(0.0, above=True)
+    if _SEVERAL[key].is_text:
+        return tuple(entry.text() for entry in _entries(node, key, "texts in quotes"))
+    low, high = _SEVERAL[key].range
+    if _SEVERAL[key].is_whole:
+        return tuple(_count(entry, low, high) for entry in _entries(node, key, "whole numbers"))
+    read = _level if key == LEVEL.axis else partial(JsonNode.number, low=low, high=high)
+    return tuple(read(entry) for entry in _entries(node, key, "numbers"))
+
+
+def _entries(node: JsonNode, key: str, of: str) -> Sequence[JsonNode]:
+    if not isinstance(node.value, list) or not node.value:
+        empty = "an empty grid has no trials, so name at least one or leave the key out"
+        node.fail(f"a list of {of} is needed", empty if node.value == [] else f"write {key} = [...]")
+    return _few(
+        [JsonNode(entry, node.file, f"{node.key}, entry {i}") for i, entry in enumerate(node.value, start=1)], node
+    )
+
+
+def _few(entries: Sequence[JsonNode], node: JsonNode) -> Sequence[JsonNode]:
+    require(
+        len(entries) <= _MOST_ENTRIES,
+        f"{node.file}, {node.key}: at most {_MOST_ENTRIES} entries are allowed, {len(entries)} were given.",
+    )
+    return entries
+
+
+def _level(node: JsonNode) -> float | tuple[float, float]:
+    """A number, or a pair of mm and degrees."""
+    if not isinstance(node.value, list):
+        return node.number(*LEVEL.range)
+    mm, deg = map(float, node.numbers(2))
+    return mm, deg
+
+
+def _count(node: JsonNode, low: int, high: int) -> int:
+    if not isinstance(node.value, int) or isinstance(node.value, bool) or not low <= node.value <= high:
+        node.fail(f"a whole number from {low} to {high} is needed")
+    return int(node.value)

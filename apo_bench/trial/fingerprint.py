@@ -20,11 +20,11 @@ import numpy as np
 
 from apo_bench import __version__
 from apo_bench.files.json_forms import OBSERVATION_SCHEMA, PLAN_SCHEMA
-from apo_bench.io.ordinary_files import read_bytes
+from apo_bench.io import read_bytes
 from apo_bench.names import admit
-from apo_bench.observation.presets import noise_path
+from apo_bench.observation.noise_file import noise_path
 from apo_bench.records import ROW, TrialSettings
-from apo_bench.records.run.own_code import DATA_PREFIXES, is_own_code
+from apo_bench.records.run.replay_command import DATA_PREFIXES, is_own_code
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario, scenario_path
 
@@ -80,8 +80,7 @@ def content_pieces(
 @cache
 def code_files() -> Mapping[str, str]:
     """Source file, relative to the package -> 16 hexadecimal digits over its lines; read once per process."""
-    texts = sorted(sources(files("apo_bench")))
-    return MappingProxyType({path: _hash(text) for path, text in texts if counts(path)})
+    return MappingProxyType({path: _hash(text) for path, text in sorted(sources(files("apo_bench"))) if counts(path)})
 
 
 def counts(path: str) -> bool:

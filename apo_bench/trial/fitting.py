@@ -17,8 +17,8 @@ from apo_bench.geometry import Array, pose
 from apo_bench.prediction.failure import predict
 from apo_bench.prediction.measures import Measure, measures
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.simulation.execution.prepare import in_reach
-from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.simulation.execution import in_reach
+from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.trial.free_directions import free_space, nearest_fitting
 
 ROOMS_MM = (2.0, 0.5)
@@ -102,8 +102,7 @@ def fitting_plan(
 
 def _fault(scene: Scene, plan: Plan) -> str | None:
     """What is foretold to fail, or out of reach; empty where contacts are off, None if nothing is wrong."""
-    scenario = scene.scenario
-    prediction = predict(plan, scene.clearance_mm, scenario.thresholds, scenario.attach)
+    prediction = predict(plan, scene.clearance_mm, scene.scenario.thresholds, scene.scenario.attach)
     if prediction.fails:
         return prediction.sentence if prediction.mendable else ""
     return None if in_reach(plan, scene) else "the arm would not reach all of it"
@@ -111,8 +110,7 @@ def _fault(scene: Scene, plan: Plan) -> str | None:
 
 def _measured(scene: Scene, plan: Plan, room_mm: float = 0.0) -> tuple[Measure, ...]:
     """Everything that a plan is measured by, as `predict` does it."""
-    scenario = scene.scenario
-    return tuple(measures(plan, scene.clearance_mm, scenario.thresholds, scenario.attach, room_mm))
+    return tuple(measures(plan, scene.clearance_mm, scene.scenario.thresholds, scene.scenario.attach, room_mm))
 
 
 def _goals_that_fit(plan: Plan, believed: Observation, scene: Scene) -> Array | None:
@@ -158,9 +156,8 @@ def _limits(before: tuple[Measure, ...], with_room: tuple[Measure, ...], room_mm
 
 def _earlier_gaps(plan: Plan) -> list[Array]:
     """The largest |e| of each contact each time before work is taken apart, [m]."""
-    assembly = plan.assembly
     return [
-        equations(assembly.first(upto), plan.start, goals[:upto]).gaps(goals[:upto])
+        equations(plan.assembly.first(upto), plan.start, goals[:upto]).gaps(goals[:upto])
         for upto, goals in goals_in_force(plan)[:-1]
     ]
 

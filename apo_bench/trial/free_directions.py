@@ -17,11 +17,17 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Equations, Observation
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.robust.hypotheses import UNKNOWN
-from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
-from apo_bench.correction.solvers.gauss_newton import nearest_goals
-from apo_bench.correction.solvers.inequalities import Inequalities, demanded, violations
-from apo_bench.correction.solvers.posterior import freedom_of
-from apo_bench.correction.solvers.whitened import noise_factor, twists_of
+from apo_bench.correction.solvers import (
+    CompactEquations,
+    Inequalities,
+    compact_equations,
+    demanded,
+    freedom_of,
+    nearest_goals,
+    noise_factor,
+    twists_of,
+    violations,
+)
 from apo_bench.geometry import Array, pose
 
 _TRIED = 32
@@ -201,11 +207,10 @@ def shortest_above(G: Array, h: Array) -> Array | None:
 def _held(observation: Observation, goals: Array) -> _Held:
     """The contacts that hold as they are demanded of `contact`, or as equations where some do not hold so."""
     assembly = observation.assembly
-    tolerance = observation.gap_m
     plain = equations(assembly, observation.start, goals)
     system, exact, inequalities = demanded(plain, assembly, observation.play_m)
     off = violations(system, exact, inequalities, goals)
-    if (off > tolerance).any():
+    if (off > observation.gap_m).any():
         none = np.zeros(0)
         system = plain
         exact = np.ones_like(exact)
@@ -218,7 +223,7 @@ def _held(observation: Observation, goals: Array) -> _Held:
         compact,
         exact,
         inequalities,
-        off <= tolerance,
+        off <= observation.gap_m,
         limits,
         _factor(observation),
     )

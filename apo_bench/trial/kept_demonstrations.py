@@ -20,11 +20,10 @@ import numpy as np
 
 from apo_bench import __version__
 from apo_bench.assembly import Demonstration, Layout
-from apo_bench.errors import InputError
-from apo_bench.io.documents import parse_json
-from apo_bench.io.ordinary_files import read_text, write_whole
+from apo_bench.errors import InputError, require
+from apo_bench.io import parse_json, read_text, write_whole
 from apo_bench.records import RANGE, TrialSettings
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene import Scene
 from apo_bench.trial.fingerprint import code_files, content_pieces
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 
@@ -58,8 +57,10 @@ class KeptDemonstrations:
             raise InputError(
                 f"the cache '{folder}' cannot be made ({why}); name a folder that can be written."
             ) from error
-        if not os.access(self.folder, os.R_OK | os.W_OK | os.X_OK):
-            raise InputError(f"the cache '{folder}' cannot be written; name a folder that can be.")
+        require(
+            os.access(self.folder, os.R_OK | os.W_OK | os.X_OK),
+            f"the cache '{folder}' cannot be written; name a folder that can be.",
+        )
 
     def simulated(self, settings: TrialSettings, scene: Scene) -> SimulatedDemonstration:
         """The demonstration of a trial: read, or simulated and kept.
@@ -124,10 +125,9 @@ def _made_with() -> str:
 
 def _written(key: str, simulated: SimulatedDemonstration) -> str:
     human = simulated.demonstration
-    layout = simulated.layout
     content = {
-        "truth": layout.goals.tolist(),
-        "start": {part: T.tolist() for part, T in layout.start.items()},
+        "truth": simulated.layout.goals.tolist(),
+        "start": {part: T.tolist() for part, T in simulated.layout.start.items()},
         "goals": human.goals.tolist(),
         "final": {part: T.tolist() for part, T in human.final.items()},
         "careless": human.careless.tolist(),
@@ -152,8 +152,7 @@ def _read(path: Path, key: str, scene: Scene) -> SimulatedDemonstration:
         ("key", key, "this is another demonstration, renamed"),
         ("digest", _hash(json.dumps(content)), "the file is damaged"),
     ):
-        if root[name].text() != wanted:
-            raise InputError(f"{path}: {why}.")
+        require(root[name].text() == wanted, f"{path}: {why}.")
     start, final = ({part: np.array(T) for part, T in content[name].items()} for name in ("start", "final"))
     layout = Layout(np.array(content["truth"]), start)
     human = Demonstration(

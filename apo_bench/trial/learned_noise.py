@@ -2,25 +2,111 @@
 
 Every observation is corrected by `contact-robust`; the errors in the directions that contacts fix are then known, and
 the noise that makes them most likely is looked for.
+
+How often a camera repeats what was false when it looks again, counted where there are several looks at one scene.
+
+Looks are at one scene if they state the same parts and start, and if what is seen well in both leads to the same goals.
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from apo_bench.assembly import Observation
 from apo_bench.correction.correctors import correct
-from apo_bench.correction.learning.evidence import UNITS, readings
-from apo_bench.correction.learning.likelihood import LearnedNoise, ObservedErrors, learn_noise
-from apo_bench.errors import InputError
+from apo_bench.correction.learning.likelihood import (
+    UNITS,
+    EstimatedNumber,
+    LearnedNoise,
+    ObservedErrors,
+    learn_noise,
+    readings,
+)
+from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
-from apo_bench.observation.fitting.components import COMPONENTS, component_factors, view_ways
-from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.fitted import ConstantError, MeasuredNoise, ViewNoise, view_frame
-from apo_bench.observation.models.residuals import INLIER_MM, TURNED_DEG
-from apo_bench.observation.models.tails import Split, Tail
-from apo_bench.trial.repeats import JudgedLook, Repeats, repeats
+from apo_bench.io import grouped
+from apo_bench.observation.fitting.fit import COMPONENTS, component_factors, view_ways
+from apo_bench.observation.models import (
+    INLIER_MM,
+    TURNED_DEG,
+    Camera,
+    ConstantError,
+    MeasuredNoise,
+    Split,
+    Tail,
+    ViewNoise,
+    view_frame,
+)
+
+_AS_FAR = 10.0
+"""[mm] and [deg]: goals of one scene, each corrected by itself, are no farther apart per axis."""
+_PRIOR = 0.5
+"""Of either kind, as if it had been counted before (Jeffreys): nothing is certain."""
+
+
+class JudgedLook(NamedTuple):
+    """An observation, what it was corrected to, and what of it is false."""
+
+    seen: Observation
+    goals: Array
+    """(n, 4, 4), corrected, world frame, [m]."""
+    false: frozenset[int]
+    """Operations, counted from 0, that were seen, and seen where their part is not."""
+
+
+class Repeats(NamedTuple):
+    """Views that were false and were looked at again."""
+
+    repeated: int
+    looked: int
+
+    @property
+    def rate(self) -> EstimatedNumber | None:
+        """How often the next look repeats what was false, with its 95 % interval; None where none was looked at."""
+        from scipy.special import betaincinv
+
+        if not self.looked:
+            return None
+        yes, no = self.repeated + _PRIOR, self.looked - self.repeated + _PRIOR
+        low, high = betaincinv(yes, no, [0.025, 0.975])
+        return EstimatedNumber(yes / (yes + no), float(low), float(high))
+
+
+def repeats(looks: Sequence[JudgedLook], near: Array) -> Repeats:
+    """Count what the next look at a scene repeats, in the order that looks are given.
+
+    Args:
+        near: (2,), [mm] and [deg] per axis: views that differ by less are the same but for noise.
+    """
+    again = [
+        bool((_sizes(one.seen.goals[k], other.seen.goals[k]) < near).all())
+        for alike in grouped((_scene(look.seen), look) for look in looks).values()
+        for one, other in pairwise(alike)
+        if _is_same(one, other)
+        for k in sorted(one.false)
+        if other.seen.seen[k]
+    ]
+    return Repeats(sum(again), len(again))
+
+
+def _scene(seen: Observation) -> tuple[tuple[str, bytes], ...]:
+    return tuple((part, T.tobytes()) for part, T in seen.start.items())
+
+
+def _is_same(one: JudgedLook, other: JudgedLook) -> bool:
+    """Whether what is seen well in both looks leads to the same goals."""
+    both = one.seen.seen & other.seen.seen
+    well = [k for k in np.flatnonzero(both) if k not in one.false | other.false]
+    return bool(well) and all((_sizes(one.goals[k], other.goals[k]) < _AS_FAR).all() for k in well)
+
+
+def _sizes(T: Array, other: Array) -> Array:
+    """How far two poses are apart, root mean square per axis, (2,), [mm] and [deg]."""
+    xi = pose.log((pose.inverse(T) @ other)[None])[0] / UNITS
+    return np.asarray(np.sqrt(np.square(xi.reshape(2, 3)).mean(axis=1)))
+
 
 FEWEST_OBSERVATIONS = 5
 """Observations below which nothing is learned."""
@@ -59,11 +145,11 @@ def learn(observations: Sequence[Observation], camera: Camera, source: str, *, c
     """
     corrections = [(observation, correct(observation, "contact-robust")) for observation in observations]
     usable = [(observation, correction) for observation, correction in corrections if correction.ok]
-    if len(usable) < FEWEST_OBSERVATIONS:
-        raise InputError(
-            f"{len(observations)} observations were given, of which {len(usable)} can be corrected; at least "
-            f"{FEWEST_OBSERVATIONS} are needed to learn a camera's noise."
-        )
+    require(
+        len(usable) >= FEWEST_OBSERVATIONS,
+        f"{len(observations)} observations were given, of which {len(usable)} can be corrected; at least "
+        f"{FEWEST_OBSERVATIONS} are needed to learn a camera's noise.",
+    )
     P = view_frame(camera, [correction.goals for _, correction in usable])
     # errors that the correction took away, log(T_corrected^-1 T_seen); of each the size in mm and in degrees, (n, 2)
     errors = [pose.log(pose.inverse(c.goals) @ observation.goals) / UNITS for observation, c in usable]

@@ -1,16 +1,109 @@
-"""Columns of a row on what came out: what a method did, what its correction says of itself, where parts ended."""
+"""Columns of a row on what came out: what a method did, what its correction says of itself, where parts ended.
+
+How far planned or reached poses are from the truth, split into what the contacts fix and what they leave free.
+
+A row: what was asked for, and how it ended; what only a replay can say is filled in by `trial`.
+
+A trial always has one: where its corrector misbehaves, its process dies or its time is over, a failed one.
+"""
 
 import math
+import re
 from collections.abc import Iterable
+from dataclasses import asdict
+from itertools import dropwhile
+from typing import cast
 
-from apo_bench.assembly import Correction, Felt, InHand, Observation, Plan, Snapshot
+import numpy as np
+
+from apo_bench.assembly import Assembly, Correction, Felt, InHand, Observation, Outcome, Plan, Poses, Reached, Snapshot
+from apo_bench.assembly.equations import equations
 from apo_bench.correction.region import contains_truth
-from apo_bench.geometry import Array, pose
+from apo_bench.correction.solvers import LENGTH_M
+from apo_bench.geometry import Array, pose, turned_alike
+from apo_bench.io import clean
 from apo_bench.observation.relations import culprit
-from apo_bench.records import MovedInHand, Row, finite
+from apo_bench.records import (
+    ENV_ID,
+    LONGEST_SENTENCE,
+    ROW,
+    ROW_FIELDS,
+    MovedInHand,
+    Row,
+    TrialSettings,
+    finite,
+    sentence,
+    setting_columns,
+)
+from apo_bench.scenario import Scenario, load_scenario
+from apo_bench.trial.fingerprint import spec_hash
 from apo_bench.trial.planning import MethodResult
-from apo_bench.trial.pose_error import goal_errors, pose_errors
 from apo_bench.trial.stages import Attempt
+
+_RANK_CUT_OFF = 1e-7
+"""At consistent goals the singular values of free directions are rounding; those of fixed ones are far above this."""
+
+
+def pose_errors(
+    assembly: Assembly, start: Poses, truth_goals: Array, reached: Reached
+) -> tuple[float | None, float | None]:
+    """The pose errors of main parts when their operations were over, as `goal_errors` has them.
+
+    Returns:
+        (fixed, free), [mm]; (None, None) if an operation was not finished.
+    """
+    if any(snapshot is None for snapshot in reached.after):
+        return None, None
+    at = [s.poses[operation.main] for operation, s in zip(assembly.operations, reached.after, strict=True) if s]
+    return goal_errors(assembly, start, truth_goals, np.array(at).reshape(-1, 4, 4))
+
+
+def goal_errors(assembly: Assembly, start: Poses, truth_goals: Array, goals: Array) -> tuple[float, float]:
+    """Root mean square per operation of the error of goals, in fixed and in free directions, [mm].
+
+    The error of an operation is the body twist from the true goal to the other one, rotations as the way of a point
+    40 mm off the origin. How far a part of revolution is turned about its axis is no error, unless it carries others.
+    The row space of the Jacobian of the contact equations at the truth is what the contacts
+    fix, its null space what they leave free.
+
+    Args:
+        assembly: With the right relations.
+        truth_goals: (n, 4, 4), consistent, world frame, [m].
+        goals: (n, 4, 4), world frame, [m].
+
+    Returns:
+        (fixed, free).
+    """
+    # rotations count as ways of a point at LENGTH_M, so that all coordinates are lengths
+    unit = np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], len(assembly))
+    goals = _turned_back(assembly, truth_goals, goals)
+    error = pose.log(pose.inverse(truth_goals) @ goals).ravel() * unit
+    _, J = equations(assembly, start, truth_goals).linearised(truth_goals)
+    # de = (J / unit) (unit dxi): the rows of J / unit span what contacts see, and B^t B projects onto that span
+    basis = _row_space(J / unit)
+    fixed = basis.T @ (basis @ error)
+    return _rms_mm(fixed, len(assembly)), _rms_mm(error - fixed, len(assembly))
+
+
+def _turned_back(assembly: Assembly, truth_goals: Array, goals: Array) -> Array:
+    """Goals whose parts of revolution are turned about their axes as near to the truth as can be."""
+    alone = [None if operation.carries else assembly.solids[operation.main] for operation in assembly.operations]
+    pairs = zip(alone, goals, truth_goals, strict=True)
+    return np.array([T if solid is None else turned_alike(solid, T, true) for solid, T, true in pairs]).reshape(
+        -1, 4, 4
+    )
+
+
+def _rms_mm(error: Array, operations: int) -> float:
+    return float(np.linalg.norm(error) / np.sqrt(operations)) * 1e3
+
+
+def _row_space(J: Array) -> Array:
+    """An orthonormal basis of the row space, (rank, columns)."""
+    if not J.size:
+        return np.zeros((0, J.shape[1]))
+    _, w, Vt = np.linalg.svd(J, full_matrices=False)
+    return Vt[w > _RANK_CUT_OFF * w[0]]
 
 
 def confidence_columns(
@@ -136,3 +229,60 @@ def _poses(final: Snapshot | None) -> dict[str, list[float]] | None:
 
 def _mm(metres: float) -> float | None:
     return finite(metres * 1e3)
+
+
+_OUTCOME_COLUMNS = tuple(dropwhile(lambda column: column != "success", ROW_FIELDS))
+"""Columns of what came out."""
+_ADDRESS = re.compile(r"\b0x[0-9a-fA-F]+")
+
+
+def head(spec: TrialSettings, scenario: Scenario, hashed: str) -> Row:
+    """What was asked for.
+
+    Args:
+        hashed: From `spec_hash`.
+    """
+    versions = {"schema": ROW, "env_id": ENV_ID, "spec_hash": hashed}
+    return cast(Row, versions | setting_columns(spec, scenario.name) | {"thresholds": asdict(scenario.thresholds)})
+
+
+def result(end: Outcome, *, success: bool | None) -> Row:
+    """The rest of a row of which nothing but its ending is known."""
+    known: Row = {
+        "success": success,
+        "as_demonstrated": success,
+        "loose_success": success,
+        "failure_stage": end.stage if end.failed else None,
+        "failure_code": end.code if end.failed else None,
+        "failure_operation": None if end.operation is None else end.operation + 1,
+        "sentence": clean(end.sentence)[:LONGEST_SENTENCE],
+    }
+    return cast(Row, dict.fromkeys(_OUTCOME_COLUMNS)) | known
+
+
+def lost(spec: TrialSettings, content: str, code: str, what: str = "trial") -> Row:
+    """The failed row of a trial whose process, or that of its corrector, died (`worker_died`) or took too long.
+
+    Nothing is compiled for it, and it says nothing of wall times, so that it is the same wherever it happens.
+
+    Args:
+        content: From the lock of the sweep: `lock.content[spec.scenario]`.
+        code: `worker_died` or `time_limit`.
+        what: Whose process died or whose limit it was: `trial` or `corrector`.
+    """
+    return _failed(spec, content, None, Outcome("worker", code, None, sentence(code, what=what)))
+
+
+def misbehaved(spec: TrialSettings, content: str, demonstration: str, why: str) -> Row:
+    """The failed row of a trial whose corrector raised an error or returned what it must not.
+
+    Args:
+        why: What it did; addresses of objects, which differ from run to run, are left out.
+    """
+    why = _ADDRESS.sub("0x...", why.encode(errors="replace").decode())
+    return _failed(spec, content, demonstration, Outcome("correct", "raised", None, why))
+
+
+def _failed(spec: TrialSettings, content: str, demonstration: str | None, end: Outcome) -> Row:
+    settings = head(spec, load_scenario(spec.scenario), spec_hash(spec, content))
+    return settings | {"demonstration": demonstration} | result(end, success=False)

@@ -18,13 +18,13 @@ from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
+from scipy.special import ndtr, ndtri
 
 from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Poses, placements
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
-from apo_bench.judging.rules import least_overlaps
-from apo_bench.prediction.arm import ArmMove
-from apo_bench.prediction.measures import Measure, measures
+from apo_bench.judging.verdict import least_overlaps
+from apo_bench.prediction.measures import ArmMove, Measure, measures
 from apo_bench.records import NO_ROBOT_ERROR, robot_sigmas, sentence
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.free_directions import FreeSpace, free_space
@@ -203,8 +203,6 @@ def _widths(space: FreeSpace) -> Array:
 
 def _spread(rng: np.random.Generator, count: int, shape: tuple[int, ...]) -> Array:
     """Standard normal numbers, (count, *shape), of each place one in every part of equal probability (McKay, 1979)."""
-    from scipy.special import ndtri
-
     parts = rng.permuted(np.tile(np.arange(count), (math.prod(shape), 1)), axis=1).T
     return np.asarray(ndtri((parts + rng.uniform(size=parts.shape)) / count).reshape(count, *shape))
 
@@ -232,9 +230,8 @@ def _fit_share(plan: Plan, where: Scene | Scenario, arm: Sequence[ArmMove], ends
         ends: Where robots bring the parts, one with each of the errors that were drawn; none: as planned.
     """
     scenario = where if isinstance(where, Scenario) else where.scenario
-    margin_mm = scenario.thresholds.fit_margin_mm
     ways = [abs(float(T[2, :3] @ how.direction)) for how, T in zip(scenario.attach, plan.goals, strict=True)]
-    less_mm = [margin_mm if rise < _LEVEL else 0.0 for rise in ways]
+    less_mm = [scenario.thresholds.fit_margin_mm if rise < _LEVEL else 0.0 for rise in ways]
     every = partial(measures, plan, where.clearance_mm, scenario.thresholds, scenario.attach, arm=arm)
     stands = np.prod([_within(each, less_mm) for each in every() if each.kind in _WEIGHED or not ends])
     near = [np.prod([_within(each, less_mm) for each in every(brought=end)]) for end in ends]
@@ -247,8 +244,6 @@ def _within(measure: Measure, less_mm: Sequence[float]) -> float:
     Args:
         less_mm: By how much less than the judge what goes in allows, of each operation.
     """
-    from scipy.special import ndtr
-
     if measure.kind in _WEIGHED:
         return _FALLS if measure.exceeded else 1.0
     allowed = measure.allowed - (less_mm[measure.operation] if measure.kind in ("fit", "tip") else 0.0)
@@ -257,11 +252,8 @@ def _within(measure: Measure, less_mm: Sequence[float]) -> float:
 
 def _cover_share(plan: Plan, truths: Array, where: Scene | Scenario) -> float:
     """How surely faces overlap as the judge asks, were the plan carried out to the letter and the truth among these."""
-    from scipy.special import ndtr
-
     scenario = where if isinstance(where, Scenario) else where.scenario
-    final = placements(plan.assembly, plan.start, plan.goals)[-1]
-    overlaps = least_overlaps(plan.assembly, final, truths)
+    overlaps = least_overlaps(plan.assembly, placements(plan.assembly, plan.start, plan.goals)[-1], truths)
     possible = overlaps[np.isfinite(overlaps)]
     if not len(possible):
         return _UNKNOWN

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 from apo_bench.assembly import Assembly, Contact, Observation
 from apo_bench.correction.correctors import correct
-from apo_bench.observation.models.isotropic import floored
+from apo_bench.observation.models import floored
 from apo_bench.recognition.contacts import recognise
 from apo_bench.recognition.jointly import recognise_jointly
 from apo_bench.recognition.thresholds import FIXED_RULES, Recognised

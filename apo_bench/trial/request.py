@@ -10,8 +10,8 @@ from typing import Any, final
 
 from apo_bench.assembly import Observation
 from apo_bench.correction.own_code.own import OwnCorrectors
-from apo_bench.errors import InputError
-from apo_bench.io.ordinary_files import read_text
+from apo_bench.errors import InputError, require
+from apo_bench.io import read_text
 from apo_bench.records import (
     CORRECTOR_LIMIT_S,
     LEVEL,
@@ -27,11 +27,11 @@ from apo_bench.scenario import Scenario, in_the_air, load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.film.film import write_film
 from apo_bench.simulation.film.still import FilmTrack
-from apo_bench.simulation.scene.graphics import renderer
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.graphics import renderer
+from apo_bench.simulation.scene import Scene
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations, demonstration_of
-from apo_bench.trial.row import lost
+from apo_bench.trial.outcome_columns import lost
 from apo_bench.trial.stages import (
     SimulatedDemonstration,
     demonstration_failure,
@@ -83,11 +83,11 @@ def requested_settings(request: Request, clearance_mm: float) -> TrialSettings:
     if request.observation:
         _refuse_contradictions(request, options)
     for name in ("noise", "level_deg"):
-        if options.get("eye") == RANGE and name in options:
-            raise InputError(
-                f"{_option(name)} was given together with --eye range, which draws no pose noise; "
-                "--level is the noise of its rays in mm."
-            )
+        require(
+            options.get("eye") != RANGE or name not in options,
+            f"{_option(name)} was given together with --eye range, which draws no pose noise; "
+            "--level is the noise of its rays in mm.",
+        )
     usual: dict[str, Any] = {"scenario": request.scenario, "clearance_mm": clearance_mm}
     if "level" in options:
         usual |= dict.fromkeys(("level_mm", "level_deg"), options.pop("level"))

@@ -13,11 +13,10 @@ import numpy as np
 from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, pose
 from apo_bench.prediction.resting import resting_poses
+from apo_bench.simulation.execution import Grip, after_transfer, key_angles, moves
 from apo_bench.simulation.execution.feel.feeling import ACTS, TOUCH_SIGMA_M
-from apo_bench.simulation.execution.prepare import key_angles, moves
-from apo_bench.simulation.execution.transfer import Grip, after_transfer
-from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.robot import RobotError
+from apo_bench.simulation.scene import Scene
 
 _CENTRED = np.array([0.0, 1.0, 1.0, 1.0, 0.0, 0.0])
 """Of a twist in the frame of the tip, whose first axis the pads close along: what is left once they have closed."""
@@ -40,8 +39,7 @@ def brought(plan: Plan, scene: Scene, error: RobotError, searches: bool = False)
         t = move.transfer
         k = move.step.operation
         operation = plan.assembly.operations[k]
-        leant = [error.hand_eye @ _leant(scene, key_angles(t, scene).reached[i], error) for i in (_PICK, -1)]
-        taken, let_go = leant
+        taken, let_go = [error.hand_eye @ _leant(scene, key_angles(t, scene).reached[i], error) for i in (_PICK, -1)]
         last = t.grips[-1].T_part_tip
         held = _held(t.grips[0], taken @ t.T_world_start @ t.grips[0].T_part_tip @ error.tool, resting[t.part])
         put = let_go @ t.T_world_goal @ last @ error.tool @ error.in_hand[k] @ held @ pose.inverse(last)

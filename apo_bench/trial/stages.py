@@ -15,19 +15,17 @@ import numpy as np
 from apo_bench.assembly import Assembly, Demonstration, Layout, Observation, Outcome, Plan, ReplayResult
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import Verdict, judge
-from apo_bench.observation.looking import Looks
+from apo_bench.observation.looking import Looks, observe
 from apo_bench.observation.noise import Noise
-from apo_bench.observation.observing import observe
 from apo_bench.prediction.failure import ARM_CODES, predict
 from apo_bench.records import NO_ROBOT_ERROR, RANGE, SETTINGS, Predicted, Salt, TrialSettings, robot_sigmas, sentence
 from apo_bench.scenario import Scenario, draw_layout, load_scenario
 from apo_bench.simulation.arm_checks.plan_check import arm_moves
-from apo_bench.simulation.execution.controller import replay
+from apo_bench.simulation.execution import ReplayCache, replay
 from apo_bench.simulation.execution.feel.feeling import Feels
-from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.human.demonstration import demonstrate
-from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.simulation.robot import RobotError
+from apo_bench.simulation.scene import Scene, build_scene
 
 if TYPE_CHECKING:
     from apo_bench.depth_camera.follow import RangeSensor
@@ -145,8 +143,7 @@ def predicted_outcome(plan: Plan, scene: Scene, searches: bool = False) -> Predi
         searches: As in `replay_and_judge`.
     """
     arm = arm_moves(plan, scene, searches)
-    scenario = scene.scenario
-    prediction = predict(plan, scene.clearance_mm, scenario.thresholds, scenario.attach, arm)
+    prediction = predict(plan, scene.clearance_mm, scene.scenario.thresholds, scene.scenario.attach, arm)
     operation = None if prediction.operation is None else prediction.operation + 1
     predicted: Predicted = {
         "fails": prediction.fails,
@@ -234,13 +231,11 @@ def replay_and_judge(
 
 def trial_outcome(attempt: Attempt) -> Outcome:
     """Physics decides: what is right is done, and of what is wrong the robot's own word comes first."""
-    outcome = attempt.result.outcome
-    verdict = attempt.verdict
-    if verdict.success:
+    if attempt.verdict.success:
         return Outcome("done", "ok", None, sentence("ok"))
-    if outcome.failed:
-        return outcome
-    conditions = verdict.rests_on
+    if attempt.result.outcome.failed:
+        return attempt.result.outcome
+    conditions = attempt.verdict.rests_on
     why = f": {conditions.why}" if conditions.why else ""
     return Outcome("judge", conditions.code, None, sentence(conditions.code) + why)
 

@@ -11,7 +11,7 @@ from apo_bench.geometry import Array
 from apo_bench.records import RANGE, Row, TrialSettings
 from apo_bench.scenario.layout import layout_at
 from apo_bench.simulation.film.still import Chapter, FilmTrack, scenario_chapter
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.scene import Scene
 from apo_bench.trial.stages import SimulatedDemonstration, watch_again
 
 AS_SEEN = "as seen"
@@ -55,7 +55,6 @@ def trial_story(
     """
     plan = track.plan
     assert plan is not None
-    assembly = scene.scenario.assembly
     method = row["method"]
     start = plan.start
     goals = {AS_SEEN: seen.goals, AS_CORRECTED: plan.goals}
@@ -75,7 +74,7 @@ def trial_story(
         good=row["success"],
     )
     true = goals.get(AS_TRUE, plan.goals)
-    return Story(scene, (*chapters, reached), placements(assembly, start, true)[-1], goals)
+    return Story(scene, (*chapters, reached), placements(scene.scenario.assembly, start, true)[-1], goals)
 
 
 def ending(row: Row) -> str:

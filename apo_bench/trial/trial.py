@@ -1,28 +1,48 @@
-"""One trial as one row: demonstrated, observed, planned by a method, replayed, judged."""
+"""One trial as one row: demonstrated, observed, planned by a method, replayed, judged.
+
+How the robot of a trial feels: what it believes of itself before it touches anything, and what its wrist is like.
+"""
 
 from typing import Any, cast
 
 from apo_bench.assembly import Observation, Plan
 from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.correction.own_code.own import CorrectorLost
-from apo_bench.errors import InputError
+from apo_bench.correction.touches import UNSTATED, believe, slip_sigmas
+from apo_bench.errors import require
 from apo_bench.geometry import Array
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.observation.relations import make_relations, with_relations
-from apo_bench.records import RANGE, RECOGNISED, Row, TrialSettings, knows_relations, knows_truth, parsed, told_error
+from apo_bench.records import (
+    RANGE,
+    RECOGNISED,
+    USUAL_WRENCH,
+    Row,
+    TrialSettings,
+    knows_relations,
+    knows_truth,
+    parsed,
+    robot_sigmas,
+    told_error,
+)
 from apo_bench.records.run.validation import unwritable
-from apo_bench.simulation.execution.feel.feeling import Feels
-from apo_bench.simulation.execution.replay_cache import ReplayCache
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.trial.by_heart import nominal_where_seen
-from apo_bench.trial.feeling import feels_of
+from apo_bench.simulation.execution import ReplayCache
+from apo_bench.simulation.execution.feel.feeling import ACTS, Feels
+from apo_bench.simulation.scene import Scene
 from apo_bench.trial.fingerprint import content_hash, spec_hash
-from apo_bench.trial.outcome_columns import confidence_columns, method_columns, replay_columns
-from apo_bench.trial.planning import MethodResult, apply_method
+from apo_bench.trial.outcome_columns import (
+    confidence_columns,
+    head,
+    lost,
+    method_columns,
+    misbehaved,
+    replay_columns,
+    result,
+)
+from apo_bench.trial.planning import MethodResult, apply_method, nominal_where_seen
 from apo_bench.trial.promise import abstained, promised_success
 from apo_bench.trial.recognised_contacts import count_contacts, with_recognised_contacts
-from apo_bench.trial.row import head, lost, misbehaved, result
 from apo_bench.trial.stages import (
     RELATIONS,
     WRENCH,
@@ -40,6 +60,31 @@ from apo_bench.trial.stages import (
     stream_key,
     trial_outcome,
 )
+
+
+def feels_of(
+    plan: Plan,
+    scene: Scene,
+    stated: str | None,
+    seed: tuple[int, ...],
+    wrench: str = USUAL_WRENCH,
+    acts: tuple[str, ...] = ACTS,
+) -> Feels:
+    """A robot that is told how wrong it may be, and finds out how wrong it is.
+
+    Args:
+        stated: Standard deviations of its errors, as in a row; None: nobody says, and what is usual is assumed.
+        seed: Of the noise of the sensor at its wrist.
+        wrench: That sensor, as in a row.
+        acts: What it does besides.
+
+    Raises:
+        InputError: An unknown kind of error, or a number that is not allowed.
+    """
+    sigmas = UNSTATED if stated is None else robot_sigmas(stated)
+    belief = believe(sigmas, len(scene.arm.joints), plan.goals[:, :3, 3].mean(axis=0))
+    return Feels(belief, slip_sigmas(sigmas), seed, wrench, acts)
+
 
 MEASURED: Row = {"level": None, "level_deg": None, "careless": None, "noise": "measured"}
 """What a row says of a trial that was not drawn."""
@@ -138,11 +183,11 @@ def run_measured(
     Raises:
         InputError: The method is `oracle`, which would need the truth.
     """
-    if knows_truth(settings.method):
-        raise InputError(
-            f"the method '{settings.method}' was given for a measured observation, whose truth is not known; use none "
-            "or paper."
-        )
+    require(
+        not knows_truth(settings.method),
+        f"the method '{settings.method}' was given for a measured observation, whose truth is not known; use none "
+        "or paper.",
+    )
     content = content_hash(scene.scenario, settings.scenario, scene.arm.files)
     first = head(settings, scene.scenario, spec_hash(settings, content, text)) | MEASURED | {"demonstration": "ok"}
     reference = nominal_where_seen(scene.scenario.goals, observation)

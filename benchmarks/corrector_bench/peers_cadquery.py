@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly import Assembly, Correction, Observation, PartFace, Poses, Relation, largest_gap, placements
-from apo_bench.correction.baselines.measured import as_it_ends
+from apo_bench.correction.checks.status import as_it_ends
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, all_boxes
 from apo_bench.records import outcomes

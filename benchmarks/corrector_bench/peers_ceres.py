@@ -13,7 +13,7 @@ import numpy as np
 
 from apo_bench.assembly import Observation
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.baselines.least_squares import CONTACT_M, EVALUATIONS
+from apo_bench.correction.baselines.penalty import CONTACT_M, EVALUATIONS
 from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.geometry import Array
 

@@ -19,8 +19,8 @@ import numpy as np
 
 from apo_bench.assembly import Correction, Equations, Observation
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.baselines.least_squares import CONTACT_M
-from apo_bench.correction.baselines.measured import as_it_ends
+from apo_bench.correction.baselines.penalty import CONTACT_M
+from apo_bench.correction.checks.status import as_it_ends
 from apo_bench.correction.solvers.whitened import whitened
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array

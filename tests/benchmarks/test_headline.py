@@ -16,7 +16,7 @@ from apo_bench import SweepSettings
 from apo_bench.records import ROW
 from apo_bench.statistics import Cell, tally
 from apo_bench.sweeps.grid import load_all, units
-from apo_bench.sweeps.sweep_file import read_sweep
+from apo_bench.sweeps.sweep import read_sweep
 from benchmarks import headline
 from benchmarks.headline import BEGIN, BLOCKS, END, KEPT, PAGE
 from benchmarks.headline_figure import NAME_HEIGHT, apart

@@ -11,7 +11,7 @@ import pytest
 from apo_bench import Criteria, judge, load_scenario
 from apo_bench.assembly import Reached, Snapshot, placements
 from apo_bench.geometry import pose
-from apo_bench.judging.judgement import FAULTS
+from apo_bench.judging.contacts import FAULTS
 from benchmarks import verdicts
 from tests.scenes import mm
 

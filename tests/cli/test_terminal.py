@@ -9,7 +9,7 @@ import pytest
 from apo_bench.assembly import Outcome
 from apo_bench.cli.terminal import print_cells, print_row
 from apo_bench.statistics import tally
-from apo_bench.trial.row import result
+from apo_bench.trial.outcome_columns import result
 from tests.statistics.test_rates import row
 
 REACHED = {"worst_gap_mm": 7.0, "least_overlap": 1.0}

@@ -14,9 +14,9 @@ from apo_bench.assembly import Gap
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.contact.contact import contact
-from apo_bench.correction.many import BATCH
+from apo_bench.correction.correctors import BATCH
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
-from apo_bench.correction.solvers.laid_contacts import laid_contacts
+from apo_bench.correction.solvers.play import laid_contacts
 from apo_bench.geometry import Array, pose
 from tests import scenes
 from tests.assembly.test_equations import random_scene

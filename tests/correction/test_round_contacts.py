@@ -13,7 +13,7 @@ from apo_bench import Assembly, ContactCorrector, InputError, Observation, corre
 from apo_bench.assembly import Gap, PartFace, SharedError, largest_gap, lowered
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.contact.contact import contact
-from apo_bench.correction.learning.evidence import readings
+from apo_bench.correction.learning.likelihood import readings
 from apo_bench.correction.own_code.forms import observation_message, parse_observation
 from apo_bench.correction.region import contains_truth
 from apo_bench.correction.solvers.play import fit_covariance

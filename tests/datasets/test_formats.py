@@ -14,8 +14,8 @@ from gymnasium.envs.registration import EnvSpec
 from pyarrow import parquet
 
 from apo_bench import InputError, TrialSettings
+from apo_bench.datasets.lerobot import write_minari
 from apo_bench.datasets.making import make_dataset
-from apo_bench.datasets.minari import write_minari
 
 REPLAYED = [
     TrialSettings(name, method="contact", seed=1000000, clearance_mm=0.5) for name in ("block_on_block", "dovetail")

@@ -12,13 +12,13 @@ from apo_bench import InputError, load_scenario
 from apo_bench.assembly import Demonstration, Layout
 from apo_bench.assembly.equations import equations
 from apo_bench.datasets import drawing, endless_pairs, pairs
-from apo_bench.datasets.together import by_part, observe_many
+from apo_bench.datasets.drawing import by_part, observe_many
 from apo_bench.geometry import pose
 from apo_bench.observation.models.symmetric import AnyTurn
 from apo_bench.observation.noise import NOISES, Level, make_noise
-from apo_bench.observation.presets import presets
+from apo_bench.observation.noise_file import presets
 from apo_bench.scenario import careless_covariance, scenario_names, spread_error
-from apo_bench.scenario.layouts import draw_layouts
+from apo_bench.scenario.layout import draw_layouts
 from apo_bench.scoring.track import read_tracks
 from apo_bench.trial.stages import stream
 
@@ -69,7 +69,7 @@ def test_many_are_distributed_as_one_by_one(noise: str | type, monkeypatch: pyte
         return np.array([*np.log(quartiles).ravel(), *np.log(stated).ravel(), 3.0 * many.seen.mean(), alike])
 
     together = drawn()
-    monkeypatch.setattr("apo_bench.datasets.together.by_part", lambda noise: False)
+    monkeypatch.setattr("apo_bench.datasets.drawing.by_part", lambda noise: False)
     np.testing.assert_allclose(together, drawn(), atol=0.3)
 
 

@@ -30,8 +30,7 @@ from apo_bench.depth_camera.follow import RangeSensor
 from apo_bench.depth_camera.range_finder import RangeFinder
 from apo_bench.geometry import Array, physical_pieces, pose, symmetries
 from apo_bench.simulation.human.hands import Hands
-from apo_bench.simulation.sensor.rays import Sight
-from apo_bench.simulation.sensor.watch import Change, TvCamera
+from apo_bench.simulation.sensor.watch import Change, Sight, TvCamera
 from apo_bench.sweeps import sweep
 from apo_bench.trial.stages import (
     OBSERVATION,

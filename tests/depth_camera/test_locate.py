@@ -12,8 +12,16 @@ from apo_bench.assembly import Operation
 from apo_bench.depth_camera.distance import Shape, join_shapes, shape_of, signed_distance, strike_distances
 from apo_bench.depth_camera.fit import PRIOR, Points, covariance, distinct, refine, starts
 from apo_bench.depth_camera.follow import Expected, follow_demonstration
-from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder, RangeImage, look_at
-from apo_bench.depth_camera.regions import median_filtered, regions, share_explained, without_small
+from apo_bench.depth_camera.range_finder import (
+    PinholeView,
+    RangeFinder,
+    RangeImage,
+    look_at,
+    median_filtered,
+    regions,
+    share_explained,
+    without_small,
+)
 from apo_bench.geometry import Array, nearest_symmetric_pose, pose, quarter_turns, symmetries
 from tests.scenes import block, castle, cube, mm, stick
 

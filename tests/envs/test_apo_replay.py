@@ -23,9 +23,9 @@ from gymnasium.wrappers import FlattenObservation, RescaleAction, TransformObser
 import apo_bench
 from apo_bench import Correction, InputError, Observation, Scene, TrialSettings, correct, run_trial
 from apo_bench.assembly import Outcome, Step
-from apo_bench.envs import episode, robot
+from apo_bench.envs import episode, starts
 from apo_bench.envs.apo_replay import APOReplay
-from apo_bench.envs.infos import nullable, predicted_info
+from apo_bench.envs.episode import nullable, predicted_info
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.records import outcomes
@@ -33,7 +33,7 @@ from apo_bench.simulation.execution import controller as replays
 from apo_bench.trial.stages import SimulatedDemonstration, looks_at, simulate_demonstration
 
 SEED = 5
-REPLAY = "apo_bench.envs.robot.replay_and_judge"
+REPLAY = "apo_bench.envs.starts.replay_and_judge"
 
 
 @pytest.fixture(scope="module")
@@ -295,7 +295,7 @@ def test_simulated_time_has_a_limit(watched: APOReplay, monkeypatch: pytest.Monk
     info = watched.step(zeros(watched))[4]
     assert [info[key] for key in ("is_success", "stage", "code", "operation")] == [False, "plan", "time_limit", 1]
     monkeypatch.undo()
-    monkeypatch.setattr(robot, "LONGEST_REPLAY_S", 5.0)
+    monkeypatch.setattr(starts, "LONGEST_REPLAY_S", 5.0)
     watched.reset(seed=SEED)
     info = watched.step(zeros(watched))[4]
     assert [info[key] for key in ("is_success", "stage", "code")] == [False, "pick", "time_limit"]
@@ -472,7 +472,7 @@ def test_a_film_of_the_replay() -> None:
 
 def test_the_fidelity_is_that_of_the_replay(monkeypatch: pytest.MonkeyPatch) -> None:
     asked: list[str] = []
-    true = robot.replay_and_judge
+    true = starts.replay_and_judge
 
     def replay_and_judge(*args: Any, **more: Any) -> Any:
         asked.append(args[4])

@@ -13,9 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from apo_bench import InputError
 from apo_bench.cli.app import main
-from apo_bench.files import bop, bop_truth
-from apo_bench.files.bop import read_results
-from apo_bench.files.bop_truth import read_truth
+from apo_bench.files import bop
+from apo_bench.files.bop import read_results, read_truth
 from apo_bench.observation.models import residuals
 from apo_bench.observation.models.residuals import match_residuals
 from tests import bop_made as made_of
@@ -241,7 +240,7 @@ def test_truth_that_is_too_large_or_no_json(tmp_path: Path, monkeypatch: pytest.
     path.write_text('{"7": [\n', encoding="utf-8")
     with pytest.raises(InputError, match=r"scene_gt.json, line 2: this is not JSON"):
         read_truth(path, estimates)
-    monkeypatch.setattr(bop_truth, "LARGEST_TRUTH_BYTES", 3)
+    monkeypatch.setattr(bop, "LARGEST_TRUTH_BYTES", 3)
     with pytest.raises(InputError, match="the file is larger than"):
         read_truth(path, estimates)
 

@@ -10,8 +10,7 @@ import pytest
 from apo_bench import Assembly
 from apo_bench.assembly import Operation
 from apo_bench.geometry import Array, Solid
-from apo_bench.insertion.arrival import Arrival, arrive
-from apo_bench.insertion.line import Preference
+from apo_bench.insertion.arrival import Arrival, Preference, arrive
 from apo_bench.insertion.macros import Chain, Way, chain, departure, peel
 from apo_bench.insertion.states import ContactState
 from tests import scenes

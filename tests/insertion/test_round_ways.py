@@ -11,10 +11,8 @@ import pytest
 from apo_bench import Assembly
 from apo_bench.assembly import Operation, placements
 from apo_bench.geometry import Array, Box, RoundFace, Solid
-from apo_bench.insertion.arrival import Arrival, arrive, turning_state
-from apo_bench.insertion.line import Preference
+from apo_bench.insertion.arrival import Arrival, OperationMacros, Preference, arrive, turning_state, understand
 from apo_bench.insertion.macros import Way, chain
-from apo_bench.insertion.operations import OperationMacros, understand
 from apo_bench.insertion.surroundings import later_walls, mouths, slide_directions, slow_before
 from tests import rounds
 from tests.brackets import on_pins, under_roof

@@ -8,10 +8,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench import Demonstration, InputError, draw_layout, load_scenario
 from apo_bench.geometry import approximate_symmetries, pose
-from apo_bench.observation.looking import Looks
+from apo_bench.observation.looking import Looks, observe
 from apo_bench.observation.models.failures import AlongRay, DisplacedView, Flipped, Stale, Swapped
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.observation.observing import observe
 
 KINDS = (Flipped, Stale, Swapped, AlongRay, DisplacedView)
 LEVEL = Level(1.0, 1.0)

@@ -14,18 +14,15 @@ from scipy.stats import kstest
 
 from apo_bench import InputError
 from apo_bench.cli.app import main
-from apo_bench.files.bop import read_results
-from apo_bench.files.bop_truth import read_truth
+from apo_bench.files.bop import read_results, read_truth
 from apo_bench.observation.fitting.fit import fit_noise, fit_split, goodness_of_fit, outliers_by_score
 from apo_bench.observation.fitting.quantiles import LOWER_QUARTILE_OF_THREE, round_split, split_of_quantiles
 from apo_bench.observation.models.empirical import residuals_text
 from apo_bench.observation.models.fitted import MeasuredNoise
 from apo_bench.observation.models.residuals import Residuals, match_residuals
 from apo_bench.observation.models.tails import Split, Tail
-from apo_bench.observation.noise_file import noise_text, read_noise
-from apo_bench.observation.presets import presets
-from apo_bench.show.fit_picture import draw_fit
-from apo_bench.show.fit_text import fit_form, fit_lines, fit_notes
+from apo_bench.observation.noise_file import noise_text, presets, read_noise
+from apo_bench.show.fit_text import draw_fit, fit_form, fit_lines, fit_notes
 from tests import bop_made as made_of
 from tests.bop_made import Known
 

@@ -15,18 +15,16 @@ from scipy.stats import chi2
 from apo_bench import InputError, Observation, TrialSettings, observe
 from apo_bench.cli.app import main
 from apo_bench.envs.spaces import LARGEST_DEVIATION
-from apo_bench.files.bop import read_results
-from apo_bench.files.bop_truth import read_truth
+from apo_bench.files.bop import read_results, read_truth
 from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.empirical import Empirical, read_residuals, residuals_text
+from apo_bench.observation.models.failures import UNSEEN_DEVIATION
 from apo_bench.observation.models.fitted import Fitted
 from apo_bench.observation.models.isotropic import COVARIANCE_FLOOR
-from apo_bench.observation.models.outliers import UNSEEN_DEVIATION
 from apo_bench.observation.models.residuals import Residuals, match_residuals
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.observation.noise_file import noise_text, read_noise
-from apo_bench.observation.presets import presets
+from apo_bench.observation.noise_file import noise_text, presets, read_noise
 from apo_bench.trial.fingerprint import noise_content, spec_hash
 from apo_bench.trial.planning import apply_method
 from tests import bop_made as made_of

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench import Observation, observe
 from apo_bench.geometry import Array, pose
-from apo_bench.observation.models.anisotropic import (
+from apo_bench.observation.models.camera import (
     ACROSS_SIGHT,
     ALONG_SIGHT,
     IN_IMAGE,

@@ -15,7 +15,7 @@ from apo_bench.cli.app import main
 from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.isotropic import COVARIANCE_FLOOR
 from apo_bench.observation.noise import NOISES, Level, Plain, make_noise
-from apo_bench.observation.presets import presets
+from apo_bench.observation.noise_file import presets
 from apo_bench.show.noise_card import draw_errors, facts, listed_models, model_description, noise_card
 from tests import scenes
 

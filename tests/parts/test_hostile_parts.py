@@ -14,8 +14,8 @@ from apo_bench import InputError, load_scenario
 from apo_bench.geometry import Box
 from apo_bench.parts import load_part, part_names, part_path, read_part
 from apo_bench.parts.allowed import ELEMENT_RULES, LARGEST_PART_BYTES, MOST_FACES, MOST_PIECES, MOST_SITES
-from apo_bench.parts.check import check_solid
 from apo_bench.parts.faces import unite
+from apo_bench.parts.load import check_solid
 from apo_bench.resources import folder
 
 PART = """<mujoco model="thing">

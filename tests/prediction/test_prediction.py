@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from apo_bench import Assembly, Plan, load_scenario
 from apo_bench.assembly import Operation, Step, placements
 from apo_bench.geometry import Array, pose
-from apo_bench.insertion.line import Attach
-from apo_bench.prediction.arm import ArmMove
+from apo_bench.insertion.arrival import Attach
 from apo_bench.prediction.failure import Prediction, predict
+from apo_bench.prediction.measures import ArmMove
 from apo_bench.prediction.resting import is_support, residual, resting_poses
 from apo_bench.records import Thresholds
 from tests import rounds, scenes

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 
 from apo_bench import Assembly, InputError, Observation, correct, draw_layout, load_scenario, recognise
 from apo_bench.assembly import Contact, Facing, Gap, Operation, placements
-from apo_bench.assembly.facing import facing
+from apo_bench.assembly.touching import facing
 from apo_bench.geometry import Solid, pose
 from apo_bench.observation.models.isotropic import floored
 from apo_bench.recognition.situation import Belief, initial_belief

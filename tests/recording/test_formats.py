@@ -130,7 +130,7 @@ def test_a_pipe_is_not_waited_for(form: str, tmp_path: Path) -> None:
 
 
 def test_a_huge_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("apo_bench.recording.csv_log.LARGEST_LOG_BYTES", 1000)
+    monkeypatch.setattr("apo_bench.recording.formats.LARGEST_LOG_BYTES", 1000)
     (tmp_path / "log.csv").write_text(HEAD + "".join(f"{i},a,0,0,900,1,0,0,0\n" for i in range(100)), encoding="utf-8")
     with pytest.raises(InputError, match=r"larger than 0\.001 MB; cut the log"):
         read_log(tmp_path / "log.csv", "csv", Conventions())

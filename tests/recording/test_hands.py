@@ -7,9 +7,8 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.geometry import pose
-from apo_bench.recording.hands import hands_of
-from apo_bench.recording.log import Log, PoseTrack
-from apo_bench.recording.setup_files import ObjectsFile, TrackedPart, part_tracks
+from apo_bench.recording.setup_files import Log, ObjectsFile, PoseTrack, TrackedPart, part_tracks
+from apo_bench.recording.stays import hands_of
 from tests.recorded import CAMERA, motion, seen
 
 HELD = pose.at((0.0, 0.0, 0.09), (180.0, 0.0, 20.0))

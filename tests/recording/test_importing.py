@@ -11,12 +11,10 @@ from scipy.spatial.transform import Rotation
 from apo_bench import InputError, load_scenario
 from apo_bench.geometry import pose
 from apo_bench.recording.averaging import average
-from apo_bench.recording.importing import ImportedRecording, import_recording
-from apo_bench.recording.log import PoseTrack
+from apo_bench.recording.importing import ImportedRecording, import_recording, unplanned_recording
 from apo_bench.recording.operations import last_straight
 from apo_bench.recording.ordering import Stated
-from apo_bench.recording.setup_files import CameraFile, Conventions
-from apo_bench.recording.without_scenario import unplanned_recording
+from apo_bench.recording.setup_files import CameraFile, Conventions, PoseTrack
 from apo_bench.scenario.layout import layout_at
 from tests.recorded import CAMERA, RATE_HZ, motion, seen
 

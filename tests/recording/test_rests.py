@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from apo_bench.geometry import Array, pose
-from apo_bench.recording.log import PoseTrack
 from apo_bench.recording.rests import LEAST_REST_S, rests_of
+from apo_bench.recording.setup_files import PoseTrack
 from apo_bench.recording.stays import poses_at, stays_of
 from tests.recorded import RATE_HZ, seen
 

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError
-from apo_bench.io.plain_text import clean
-from apo_bench.records.run.report_rows import report_rows
+from apo_bench.io.words import clean
 from apo_bench.records.run.run_file import read_run
+from apo_bench.records.run.run_folder import report_rows
 from apo_bench.report import report as reports
 from apo_bench.report.comparison.compare import compare
 from apo_bench.report.comparison.text import comparison_form

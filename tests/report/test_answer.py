@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from apo_bench.report.answer import ALIKE_WITHIN, answer
 from apo_bench.statistics import FEWEST_SEEDS, contrast, tango, wilson
-from apo_bench.statistics.levels.summary import Summary, summary
+from apo_bench.statistics.levels.half_level import Summary, summary
 from tests.statistics.test_rates import row
 
 METHODS = ("contact", "none", "paper", "snap")

@@ -17,9 +17,8 @@ from pyarrow import parquet
 from apo_bench import InputError
 from apo_bench.cli import app as cli
 from apo_bench.cli.terminal import print_cells, print_report
-from apo_bench.io.plain_text import clean
-from apo_bench.records.run.own_code import own_code
-from apo_bench.records.run.replay_command import replay_command
+from apo_bench.io.words import clean
+from apo_bench.records.run.replay_command import own_code, replay_command
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.report import report as reports
 from apo_bench.report.report import report
@@ -172,7 +171,7 @@ def test_a_terminal_shows_what_it_would_obey(tmp_path: Path, capsys: pytest.Capt
 def test_a_sentence_of_a_row_is_only_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from apo_bench.assembly import Outcome
     from apo_bench.cli.terminal import print_row
-    from apo_bench.trial.row import result
+    from apo_bench.trial.outcome_columns import result
 
     end = result(Outcome("correct", "raised", None, "\x1b[31mraised\nmore"), success=False)
     print_row(row("contact", 0, False, eye="noise") | end)

@@ -10,7 +10,7 @@ import pytest
 
 from apo_bench import InputError, Observation, Scenario, correct, load_scenario
 from apo_bench.assembly import Contact, Gap, PartFace, relation_graph
-from apo_bench.correction.baselines.no_history import no_history
+from apo_bench.correction.baselines.track import no_history
 from apo_bench.observation.relations import Shifted, false, missed
 from apo_bench.resources import folder
 from apo_bench.scenario.file import scenario_names

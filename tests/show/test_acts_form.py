@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError, Plan, Scene, build_scene, load_scenario
-from apo_bench.files.robot_frames import RobotFrames
+from apo_bench.files.json_forms import RobotFrames
 from apo_bench.geometry import Array, pose
 from apo_bench.scenario.layout import layout_at
 from apo_bench.show.acts_form import acts_form
 from apo_bench.simulation.execution.beside import STAND_OFF_M
 from apo_bench.simulation.execution.feel.feeling import ACTS, touch_guard
-from apo_bench.simulation.execution.feel.laying import averaged_s
 from apo_bench.simulation.execution.feel.places import floor_places, opposite_places, wall_places
+from apo_bench.simulation.execution.feel.touching import averaged_s
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.robot.by_wrist import wrist_of
 from apo_bench.simulation.robot.robot import Robot

@@ -12,8 +12,7 @@ import pytest
 from apo_bench import Assembly
 from apo_bench.assembly import Graph, Operation, relation_graph
 from apo_bench.show.graph.drawing import draw_graph
-from apo_bench.show.graph.layers import Links, arrange_layers, links_of
-from apo_bench.show.graph.layout import Rectangle, layout_graph, shared_area
+from apo_bench.show.graph.layout import Links, Rectangle, arrange_layers, layout_graph, links_of, shared_area
 from tests import scenes
 
 CASES = [(name, step) for name in scenes.ALL for step in range(1, len(scenes.ALL[name]().assembly) + 1)]

@@ -16,8 +16,7 @@ from apo_bench import Scene, SweepSettings, run_sweep
 from apo_bench.cli.app import main
 from apo_bench.show.stepping import FACES, Cursor
 from apo_bench.show.viewing import trial_again
-from apo_bench.simulation.film.meshes import body_meshes, body_poses, part_meshes
-from apo_bench.simulation.film.still import draw_over, part_poses, show_moment
+from apo_bench.simulation.film.still import body_meshes, body_poses, draw_over, part_meshes, part_poses, show_moment
 from apo_bench.simulation.film.window import WINDOW_KEYS, step_in_window
 from apo_bench.simulation.scene.world import initial_state
 from apo_bench.trial.story import AS_CORRECTED, AS_SEEN, AS_TRUE, Story, scenario_story

@@ -15,8 +15,7 @@ from apo_bench import Correction, Observation
 from apo_bench.assembly import Consistency, Contact, PartFace, relation_graph
 from apo_bench.correction.learning.likelihood import EstimatedNumber
 from apo_bench.geometry import pose
-from apo_bench.observation.fitting.components import COMPONENTS
-from apo_bench.observation.fitting.fit import fit_noise, goodness_of_fit
+from apo_bench.observation.fitting.fit import COMPONENTS, fit_noise, goodness_of_fit
 from apo_bench.observation.noise import Level
 from apo_bench.recognition.thresholds import Evidence, PairThresholds, Recognised, Rival
 from apo_bench.show.arm_text import list_line
@@ -27,7 +26,7 @@ from apo_bench.show.learned_text import learned_lines
 from apo_bench.show.noise_card import Drawn, noise_card
 from apo_bench.show.recognised_text import confidence_line, difference_lines, evidence_table, recognition_form
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.trial.repeats import Repeats
+from apo_bench.trial.learned_noise import Repeats
 from tests import bop_made, scenes
 
 ON_TABLE = Contact(PartFace("castle1", "bottom"), PartFace("table", "top"))
@@ -170,8 +169,7 @@ def test_the_histogram_of_a_card_counts_what_was_drawn() -> None:
 
 
 def test_estimates_left_over_are_counted_per_image(tmp_path: Path) -> None:
-    from apo_bench.files.bop import read_results
-    from apo_bench.files.bop_truth import read_truth
+    from apo_bench.files.bop import read_results, read_truth
     from apo_bench.observation.models.residuals import match_residuals
 
     drawn = bop_made.draw(600, bop_made.Known(), np.random.default_rng(5))

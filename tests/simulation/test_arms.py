@@ -10,15 +10,14 @@ import pytest
 
 from apo_bench import Arm, InputError, TrialSettings, build_scene, load_scenario, read_arm, run_trial
 from apo_bench.geometry import Array, pose
-from apo_bench.records.run.own_code import own_code
+from apo_bench.records.run.replay_command import own_code
 from apo_bench.resources import folder
 from apo_bench.show.arm_text import check_lines
 from apo_bench.simulation.arm_checks.arm_check import check_arm, unsaid
+from apo_bench.simulation.arms.arm import ArmDescription, GripperDescription
 from apo_bench.simulation.arms.chain import find_flange
-from apo_bench.simulation.arms.description import ArmDescription, GripperDescription
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.simulation.arms.home import tip_down, with_home
-from apo_bench.simulation.arms.kinematics import Kinematics
+from apo_bench.simulation.arms.kinematics import Kinematics, tip_down, with_home
 from apo_bench.simulation.arms.loading import compiled, load_model
 from apo_bench.simulation.robot.paths import smooth
 from apo_bench.simulation.robot.reach import along, led_there, way_there, within_speed

@@ -9,18 +9,17 @@ import pytest
 from apo_bench import Plan, build_scene, load_scenario
 from apo_bench.geometry import extent, pose
 from apo_bench.records import wrench_noise
+from apo_bench.simulation.execution.beside import Flush
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.simulation.execution.feel.feeling import ACTS, Feeling, touch_guard
-from apo_bench.simulation.execution.feel.laying import _Laying, averaged_s
 from apo_bench.simulation.execution.feel.places import floor_places, opposite_places, wall_places
-from apo_bench.simulation.execution.feel.touching import _stand_off, find_out
-from apo_bench.simulation.execution.flush import Flush
+from apo_bench.simulation.execution.feel.touching import _Laying, _stand_off, averaged_s, find_out
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.robot.wrist import felt_noise, low_pass_part
-from apo_bench.trial.feeling import feels_of
 from apo_bench.trial.stages import replay_and_judge, robot_error_of, simulate_demonstration
+from apo_bench.trial.trial import feels_of
 
 STATED = "hand_eye:0.5/0.1+tool:0.5"
 

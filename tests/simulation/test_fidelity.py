@@ -14,10 +14,10 @@ from apo_bench.simulation.execution.controller import LOOK_S, PATIENCE_S, until_
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
 from apo_bench.simulation.robot import obstacles, robot
-from apo_bench.simulation.robot.forces import ForceSensors
 from apo_bench.simulation.robot.in_hand import fast_forward
 from apo_bench.simulation.robot.paths import Trajectory, minimum_jerk, shifted, smooth
 from apo_bench.simulation.robot.robot import Robot
+from apo_bench.simulation.robot.wrist import ForceSensors
 from apo_bench.simulation.scene.world import SLEEP, initial_state, part_pose, sleeping, timestep
 from apo_bench.trial.stages import simulate_demonstration
 

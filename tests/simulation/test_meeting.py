@@ -7,8 +7,8 @@ from scipy.spatial import ConvexHull
 
 from apo_bench import Scene, build_scene, load_scenario
 from apo_bench.geometry import Box, Cylinder, Hull, cylinder_hull, pose
+from apo_bench.simulation.scene.geoms import Bits, is_lining, meetings, widest_disc
 from apo_bench.simulation.scene.hulls import joined_across, volume, within
-from apo_bench.simulation.scene.meeting import Bits, is_lining, meetings, widest_disc
 from apo_bench.simulation.scene.walls import COARSE_M, linings, simulated_pieces
 from apo_bench.simulation.scene.world import World, initial_state, place
 

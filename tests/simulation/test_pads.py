@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from apo_bench.simulation.arms.pads import fill_grooves
+from apo_bench.simulation.arms.measuring import fill_grooves
 
 BOX = '<geom type="box" pos="{} 0.002 {}" size="0.003 0.002 0.003"/>'
 FINGER = '<mujoco><worldbody><body><joint name="{}" type="slide"/>{}</body></worldbody></mujoco>'

@@ -12,13 +12,12 @@ from apo_bench.geometry import pose
 from apo_bench.simulation.execution import search
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache
-from apo_bench.simulation.execution.search import press_in
-from apo_bench.simulation.execution.spiral import PITCH_M, RADIUS_M, Easing, Spiral
+from apo_bench.simulation.execution.search import PITCH_M, RADIUS_M, Easing, Spiral, press_in
 from apo_bench.simulation.execution.transfer import Grip
 from apo_bench.simulation.robot.by_wrist import servo
-from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.robot.paths import shifted, steady
 from apo_bench.simulation.robot.robot import Robot
+from apo_bench.simulation.robot.wrist import Guard
 from apo_bench.trial.stages import replay_and_judge, simulate_demonstration
 
 STEP_S = 0.001

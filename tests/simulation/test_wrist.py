@@ -12,9 +12,8 @@ from apo_bench import Scene, build_scene, load_scenario
 from apo_bench.geometry import pose
 from apo_bench.records import WrenchNoise
 from apo_bench.simulation.robot.by_wrist import reading, wrist_of, zero
-from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, OFFSETS, Load, WristSensor, hand_load
+from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, OFFSETS, Guard, Load, WristSensor, hand_load
 from apo_bench.simulation.scene.world import wrist_felt
 
 ARMS = ("six_axis", "ur5e_primitive", "panda_primitive")

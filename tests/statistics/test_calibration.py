@@ -11,7 +11,7 @@ import pytest
 from apo_bench import InputError
 from apo_bench.records import ROW_FIELDS
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.report.tables.forecasts import calibration_table
+from apo_bench.report.tables.methods import calibration_table
 from apo_bench.statistics import calibrations
 from tests.statistics.test_rates import row, write
 

@@ -16,13 +16,12 @@ from statsmodels.stats.proportion import proportion_confint
 from apo_bench import InputError
 from apo_bench.records import ROW
 from apo_bench.report.figures.levels import success_figure
-from apo_bench.report.figures.sheet import draw
-from apo_bench.report.figures.styles import OWN_STYLES, STYLES
+from apo_bench.report.figures.sheet import OWN_STYLES, STYLES, draw
 from apo_bench.report.report import report
 from apo_bench.report.tables.cells import cell_table
-from apo_bench.report.tables.forecasts import prediction_summary
+from apo_bench.report.tables.methods import prediction_summary
 from apo_bench.statistics import Confusion, Effort, Rate, confusions, efforts, members, place_of, tally, wilson
-from apo_bench.statistics.levels.summary import summary
+from apo_bench.statistics.levels.half_level import summary
 from apo_bench.statistics.settings import settings as settings_of_cells
 from tests import pages
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench import InputError
-from apo_bench.statistics.levels.summary import summary
+from apo_bench.statistics.levels.half_level import summary
 from tests.statistics.test_rates import row
 
 METHODS = ("none", "paper", "contact")

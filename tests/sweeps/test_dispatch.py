@@ -7,10 +7,9 @@ import pytest
 from apo_bench import TrialSettings
 from apo_bench.sweeps.work import dispatch
 from apo_bench.sweeps.work.dispatch import STARTING_S, Dispatch, Job
-from apo_bench.sweeps.work.environment_lock import EnvironmentLock, versions
-from apo_bench.sweeps.work.messages import Unit
+from apo_bench.sweeps.work.environment_lock import EnvironmentLock, Unit, versions
 from apo_bench.sweeps.work.worker import row_within_limit, timing
-from apo_bench.trial.row import lost, misbehaved
+from apo_bench.trial.outcome_columns import lost, misbehaved
 
 LIMIT_S = 10.0
 TRIAL = TrialSettings("block_on_block", method="none")

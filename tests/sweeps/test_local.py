@@ -25,16 +25,15 @@ from apo_bench.records import USUAL_LIMITS, Limits
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_file import read_run
 from apo_bench.report.report import report
-from apo_bench.report.run.facts import limits_of
+from apo_bench.report.run.trials import limits_of
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps.grid import load_all, units
 from apo_bench.sweeps.local import pool
 from apo_bench.sweeps.local.pool import FALSE_STARTS, run_locally
-from apo_bench.sweeps.work.environment_lock import EnvironmentLock, versions
-from apo_bench.sweeps.work.messages import Stopped, Unit, listening
+from apo_bench.sweeps.work.environment_lock import EnvironmentLock, Stopped, Unit, listening, versions
 from apo_bench.sweeps.work.worker import Worker
 from apo_bench.trial.fingerprint import content_hash
-from apo_bench.trial.row import lost, misbehaved
+from apo_bench.trial.outcome_columns import lost, misbehaved
 from tests import pages
 
 CODE = """

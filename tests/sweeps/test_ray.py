@@ -33,8 +33,7 @@ from apo_bench.sweeps.ray.driver import runtime_files
 from apo_bench.sweeps.sweep import names_of
 from apo_bench.sweeps.work import dispatch
 from apo_bench.sweeps.work.dispatch import Dispatch
-from apo_bench.sweeps.work.environment_lock import EnvironmentLock, environment_lock
-from apo_bench.sweeps.work.messages import Unit
+from apo_bench.sweeps.work.environment_lock import EnvironmentLock, Unit, environment_lock
 
 SPEC = SweepSettings(("carried_bridge",), levels=(1.0,), careless=(0.0,), methods=("none", "paper"), trials=5)
 NODE = {"num_cpus": 1, "object_store_memory": 80 * 2**20, "include_dashboard": False}

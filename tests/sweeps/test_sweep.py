@@ -28,11 +28,11 @@ from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps import sweep as runner
 from apo_bench.sweeps.grid import load_all, units
 from apo_bench.sweeps.work import worker
-from apo_bench.sweeps.work.messages import Unit
+from apo_bench.sweeps.work.environment_lock import Unit
 from apo_bench.trial import kept_demonstrations, trial
-from apo_bench.trial import row as row_module
+from apo_bench.trial import outcome_columns as row_module
 from apo_bench.trial.fingerprint import spec_hash
-from apo_bench.trial.row import result
+from apo_bench.trial.outcome_columns import result
 
 METHODS = ("oracle", "none", "paper")
 SPEC = SweepSettings(("stick_in_tower",), levels=(0.0, 1.0), careless=(1.0,), methods=METHODS, trials=3, seed=10)

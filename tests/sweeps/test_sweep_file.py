@@ -11,7 +11,7 @@ from apo_bench.cli.app import main
 from apo_bench.records import CORRECTOR, trial_key
 from apo_bench.resources import folder
 from apo_bench.sweeps.grid import load_all, units
-from apo_bench.sweeps.sweep_file import is_sweep_file, read_sweep
+from apo_bench.sweeps.sweep import is_sweep_file, read_sweep
 
 WHOLE = """
 scenarios = ["stick_in_tower", "stick_on_castles"]

@@ -10,8 +10,7 @@ import pytest
 from apo_bench import Observation, Scene, TrialSettings, build_scene, load_scenario, run_trial
 from apo_bench.geometry import Array, pose
 from apo_bench.scenario.layout import layout_at
-from apo_bench.trial.by_heart import goals_by_heart
-from apo_bench.trial.planning import apply_method
+from apo_bench.trial.planning import apply_method, goals_by_heart
 
 SCENARIO = load_scenario("stick_in_tower")
 

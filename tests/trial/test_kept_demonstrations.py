@@ -203,7 +203,7 @@ def test_all_code_that_a_demonstration_runs_through_is_in_the_key() -> None:
         "scenario/file.py",
     )
     run_through = set().union(*(reached(PACKAGE / start, tables=False) for start in starts))
-    assert {"simulation/human/perform.py", "judging/rules.py", "parts/mjcf.py"} <= run_through
+    assert {"simulation/human/demonstration.py", "judging/verdict.py", "parts/mjcf.py"} <= run_through
     assert [file for file in sorted(run_through) if not decides(file)] == []
     assert decides("trial/stages.py")
     assert not decides("correction/contact/contact.py")

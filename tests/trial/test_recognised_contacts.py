@@ -15,7 +15,7 @@ from apo_bench.cli import app as cli
 from apo_bench.records import RECOGNISED
 from apo_bench.report.figures.levels import recognition_figure
 from apo_bench.report.figures.sheet import draw
-from apo_bench.report.tables.forecasts import recognition_table
+from apo_bench.report.tables.methods import recognition_table
 from apo_bench.statistics import ALL, recognitions
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 from tests import pages

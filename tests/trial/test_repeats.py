@@ -5,7 +5,7 @@ import pytest
 
 from apo_bench import Observation, load_scenario
 from apo_bench.geometry import pose
-from apo_bench.trial.repeats import JudgedLook, Repeats, repeats
+from apo_bench.trial.learned_noise import JudgedLook, Repeats, repeats
 
 SCENARIO = load_scenario("stick_in_tower")
 NEAR = np.array([8.0, 8.0])

@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench.cad.meshes.three_mf import read_3mf
 from apo_bench.cad.solids.raw_solid import Mesh
 from apo_bench.errors import InputError
-from apo_bench.io.ordinary_files import read_bytes
+from apo_bench.io import read_bytes
 
 _SUFFIXES = (".stl", ".obj", ".3mf")
 _UNITS_MM = {"um": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4, "ft": 304.8}

@@ -15,7 +15,7 @@ from apo_bench.cad.solids.raw_solid import RawSolid, Region
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Hull
 from apo_bench.parts.allowed import MOST_PIECES
-from apo_bench.parts.check import touching_groups
+from apo_bench.parts.load import touching_groups
 
 _MOST_TRIANGLES = 20_000
 _MOUTH_MM = 1.0

@@ -15,14 +15,23 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Assembly, Observation
 from apo_bench.assembly.equations import equations
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.checks.consistency import TEST_LEVEL, fit_deviation
-from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
-from apo_bench.correction.solvers.gauss_newton import NearestGoals, batch_goals
-from apo_bench.correction.solvers.inequalities import Inequalities, bounded
-from apo_bench.correction.solvers.kernels import Kernels, kernels
-from apo_bench.correction.solvers.laid_contacts import LaidContacts, laid_contacts
-from apo_bench.correction.solvers.play import fit_covariance
-from apo_bench.correction.solvers.whitened import correction_to, noise_factor, scales
+from apo_bench.correction.checks.status import TEST_LEVEL, fit_deviation
+from apo_bench.correction.solvers import (
+    CompactEquations,
+    Inequalities,
+    Kernels,
+    LaidContacts,
+    NearestGoals,
+    batch_goals,
+    bounded,
+    compact_equations,
+    correction_to,
+    fit_covariance,
+    laid_contacts,
+    noise_factor,
+    scales,
+)
+from apo_bench.correction.solvers.kernels import kernels
 from apo_bench.geometry import Array, remembered
 
 

@@ -15,11 +15,15 @@ from apo_bench.assembly.pattern import pattern
 from apo_bench.correction.contact.inferred import inferred_goals
 from apo_bench.correction.contact.problem import Problem, problem_of
 from apo_bench.correction.contact.solved import FAR_DEG, Solved, solve
-from apo_bench.correction.solvers.curved import descended
-from apo_bench.correction.solvers.gauss_newton import LARGEST_DENSE, nearest_goals
-from apo_bench.correction.solvers.laid_contacts import laid_contacts
-from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR
-from apo_bench.correction.solvers.whitened import correction_to, scales
+from apo_bench.correction.solvers import (
+    LARGEST_DENSE,
+    LARGEST_POSTERIOR,
+    correction_to,
+    descended,
+    laid_contacts,
+    nearest_goals,
+    scales,
+)
 from apo_bench.geometry import Array, symmetries
 
 _SHORTER = 1.0 - 1e-6
@@ -77,8 +81,7 @@ def _faces_oppose(problem: Problem, *goals: Array) -> bool:
 
 def _is_flush(problem: Problem, solved: Solved) -> bool:
     """Whether contacts also hold with vertices laid where the goals are: seen edge-on, they lie on one line."""
-    goals = solved.goals
-    return largest(_begun_at(problem, goals).gaps(goals[None])) <= problem.observation.gap_m
+    return largest(_begun_at(problem, solved.goals).gaps(solved.goals[None])) <= problem.observation.gap_m
 
 
 def _begun_at(problem: Problem, goals: Array) -> Problem:
@@ -91,11 +94,10 @@ def _starts(problem: Problem, first: Solved) -> Array:
     observation = problem.observation
     doubted = _doubted(problem, first)
     n = len(observation.goals)
-    solids = observation.assembly.solids
     starts = [inferred_goals(observation, some).goals for some in (*((k,) for k in doubted), tuple(range(n)))]
     turned = [observation.goals]
     for k in doubted:
-        for g in symmetries(solids[observation.assembly.operations[k].main])[1:]:
+        for g in symmetries(observation.assembly.solids[observation.assembly.operations[k].main])[1:]:
             goals = np.array(observation.goals)
             goals[k] = goals[k] @ g
             turned.append(goals)

@@ -11,10 +11,16 @@ from typing import Any, final
 
 from apo_bench.assembly import Correction, Look, Observation
 from apo_bench.correction.correctors import CorrectorMisbehaved, checked_corrector, correct
-from apo_bench.correction.own_code.forms import observation_message, parse_correction
-from apo_bench.correction.own_code.message import Arrays, CorrectorMessage, GarbledMessage, MessageForm
+from apo_bench.correction.own_code.forms import (
+    Arrays,
+    CorrectorMessage,
+    GarbledMessage,
+    MessageForm,
+    observation_message,
+    parse_correction,
+)
 from apo_bench.correction.own_code.process import Server
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.records import CORRECTOR_LIMIT_S, UNCORRECTED, is_own
 
 LEAST_STARTING_S = 30.0
@@ -44,11 +50,10 @@ class OwnCorrectors:
         limit_s: Wall time that a correction may take; importing its module may take the same, or 30 s if that is
                 more.
         """
-        if not (math.isfinite(limit_s) and 0.0 < limit_s <= _LONGEST_S):
-            raise InputError(
-                f"a limit of {limit_s:g} s per correction was given; a number above 0 and up to {_LONGEST_S:g} is "
-                "allowed."
-            )
+        require(
+            math.isfinite(limit_s) and 0.0 < limit_s <= _LONGEST_S,
+            f"a limit of {limit_s:g} s per correction was given; a number above 0 and up to {_LONGEST_S:g} is allowed.",
+        )
         self._limit_s = limit_s
         self._servers: dict[str, Server] = {}
         self._found: dict[str, _OwnCorrector] = {}

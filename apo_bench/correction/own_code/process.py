@@ -11,10 +11,10 @@ from contextlib import suppress
 from multiprocessing import connection
 from typing import final
 
-from apo_bench.correction.own_code.message import Arrays, CorrectorMessage, MessageForm, receive, send
+from apo_bench.correction.own_code.forms import Arrays, CorrectorMessage, MessageForm, receive, send
 from apo_bench.correction.own_code.server import NOTICE
-from apo_bench.errors import InputError
-from apo_bench.io.processes import descendants, end_descendants
+from apo_bench.errors import require
+from apo_bench.io import descendants, end_descendants
 from apo_bench.names import folder_of_own_modules
 
 _NOTICE_S = 2.0
@@ -97,11 +97,11 @@ class Server:
 
     def _start(self) -> None:
         """A new interpreter: nothing of this process is in its memory."""
-        if not hasattr(socket, "send_fds"):
-            raise InputError(
-                f"a corrector out of the module '{self._module}' was named, which this system cannot run in a process "
-                "of its own; use Linux or macOS, or hand the function over in Python (apo_bench.correct)."
-            )
+        require(
+            hasattr(socket, "send_fds"),
+            f"a corrector out of the module '{self._module}' was named, which this system cannot run in a process "
+            "of its own; use Linux or macOS, or hand the function over in Python (apo_bench.correct).",
+        )
         self._control, theirs = _pair()
         where = None if _is_open(2) else subprocess.DEVNULL
         with theirs:

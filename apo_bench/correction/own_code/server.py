@@ -17,10 +17,17 @@ from contextlib import suppress
 from importlib import import_module
 
 from apo_bench.correction.correctors import checked_corrector, correct
-from apo_bench.correction.own_code.forms import correction_message, parse_observation
-from apo_bench.correction.own_code.message import Arrays, CorrectorMessage, MessageForm, receive, send
+from apo_bench.correction.own_code.forms import (
+    Arrays,
+    CorrectorMessage,
+    MessageForm,
+    correction_message,
+    parse_observation,
+    receive,
+    send,
+)
 from apo_bench.errors import InputError
-from apo_bench.io.processes import end_descendants, flush
+from apo_bench.io import end_descendants, flush
 from apo_bench.names import admit, own_modules_in
 
 NOTICE = struct.Struct("!Ii")

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly import Observation
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.checks.consistency import p_value
+from apo_bench.correction.checks.status import p_value
 from apo_bench.correction.contact.problem import seen_system
 from apo_bench.correction.robust.beliefs import ROOM, States
 from apo_bench.correction.robust.hypotheses import (
@@ -20,9 +20,7 @@ from apo_bench.correction.robust.hypotheses import (
     softened,
     unbelieved,
 )
-from apo_bench.correction.solvers.compact import linearised_by
-from apo_bench.correction.solvers.posterior import jacobian_rank
-from apo_bench.correction.solvers.whitened import noise_factor
+from apo_bench.correction.solvers import jacobian_rank, linearised_by, noise_factor
 
 _LEVER_M = 0.1
 """What is turned by an angle is off by its square times about this, beyond what is linear, [m]."""
@@ -37,8 +35,7 @@ def expected_badness(case: Case, states: States, dropped: tuple[str, ...], belie
     left_out = unbelieved(states)
     wide = np.array(believed.covariance)
     wide[list(left_out)] = ROOM
-    L = noise_factor(replace(believed, covariance=wide))
-    e, Jt = linearised_by(seen_system(believed), believed.goals, L)
+    e, Jt = linearised_by(seen_system(believed), believed.goals, noise_factor(replace(believed, covariance=wide)))
     _, soft = softened(believed, dropped)
     # -2 log of the density of e, Gaussian with covariance S = J J^t + soft^2; what is not linear is no contradiction.
     S = Jt.T @ Jt + np.diag(soft * soft)

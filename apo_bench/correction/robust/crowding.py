@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Observation, measure_round, placements
-from apo_bench.correction.solvers.posterior import settled_basis
+from apo_bench.correction.solvers import settled_basis
 from apo_bench.geometry import Array, Face, RoundFace, face_area, intrusion, overlap_area, pose
 
 PLACES_TRIED = 24

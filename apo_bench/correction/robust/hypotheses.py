@@ -17,11 +17,11 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly import Consistency, Correction, Observation, OutlierModel, SharedError, looking_away
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.checks.consistency import CONTRADICTION_M, fit_deviation, p_value
+from apo_bench.correction.checks.status import CONTRADICTION_M, fit_deviation, p_value
 from apo_bench.correction.contact.contact import ContactCorrector, contact_apply
-from apo_bench.correction.contact.heavy_tails import drawn_chi_squares, drawn_p_value
 from apo_bench.correction.contact.inferred import inferred_goals
 from apo_bench.correction.contact.problem import problem_of, seen_system
+from apo_bench.correction.contact.solved import drawn_chi_squares, drawn_p_value
 from apo_bench.correction.robust.beliefs import (
     DISPLACED,
     INLIER,
@@ -41,9 +41,7 @@ from apo_bench.correction.robust.noise_scale import (
     scaled_test,
 )
 from apo_bench.correction.robust.views import Merged, Sightings, exchanged_with, merged
-from apo_bench.correction.solvers.compact import linearised_by
-from apo_bench.correction.solvers.posterior import jacobian_rank
-from apo_bench.correction.solvers.whitened import noise_factor
+from apo_bench.correction.solvers import jacobian_rank, linearised_by, noise_factor
 from apo_bench.geometry import Array, frozen, pose, right_jacobian
 
 as_begun = ContactCorrector("apply", elsewhere=False)
@@ -279,8 +277,7 @@ def believed_observation(case: Case, states: States) -> Observation:
         else:
             goals[k] = every.goal
             covariance[k] = every.covariance
-    seen = np.ones(len(states), dtype=np.bool_)
-    believed = replace(first, goals=goals, covariance=covariance, seen=seen)
+    believed = replace(first, goals=goals, covariance=covariance, seen=np.ones(len(states), dtype=np.bool_))
     if any(len(views) > 1 for views in case.views):
         believed = replace(believed, shared=(), tails=None)
     displaced = tuple(k for k, state in enumerate(states) if state == (DISPLACED,))

@@ -82,8 +82,7 @@ def swaps(case: Case, states: States) -> Iterator[States]:
     for k in sorted(doubted):
         for i in case.views[k][0].others if states[k] else ():
             if states[i] and not (i in doubted and i < k) and (i in doubted or solids[i] is solids[k]):
-                exchanged = (swapped_with(i), *states[k][1:]), (swapped_with(k), *states[i][1:])
-                yield changed(states, (k, i), exchanged)
+                yield changed(states, (k, i), ((swapped_with(i), *states[k][1:]), (swapped_with(k), *states[i][1:])))
 
 
 def continued(views: Sightings, states: States, model: OutlierModel) -> States:
@@ -114,8 +113,7 @@ def displaced_together(states: States) -> Iterator[States]:
     # One operation less at either end of a row.
     displaced = [k for k in doubted if states[k] == (DISPLACED,)]
     if len(displaced) > 2:
-        for k in (displaced[0], displaced[-1]):
-            yield changed(states, (k,), ((INLIER,),))
+        yield from (changed(states, (k,), ((INLIER,),)) for k in (displaced[0], displaced[-1]))
 
 
 def false_together(case: Case, start: States) -> Iterator[States]:

@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from apo_bench.assembly import Consistency, Observation, SharedError
-from apo_bench.correction.checks.consistency import p_value
+from apo_bench.assembly import Consistency, Observation
+from apo_bench.correction.checks.status import p_value
 
 SPREAD = 1.0
 """Standard deviation of the logarithm of s: twice as noisy is nothing special."""
@@ -60,17 +60,13 @@ def scaled_test(test: Consistency, scale: float) -> Consistency:
 
 def noisier(observation: Observation, scale: float) -> Observation:
     """An observation that states so many times its noise."""
-    shared = tuple(_noisier_shared(error, scale) for error in observation.shared)
+    shared = tuple(replace(error, covariance=error.covariance * scale**2) for error in observation.shared)
     tails = observation.tails
     if tails is not None:
         tails = replace(
             tails, scales=tails.scales * scale, variances=tails.variances * scale**2, limits=tails.limits * scale
         )
     return replace(observation, covariance=observation.covariance * scale**2, shared=shared, tails=tails)
-
-
-def _noisier_shared(error: SharedError, scale: float) -> SharedError:
-    return replace(error, covariance=error.covariance * scale**2)
 
 
 def scale_words(scale: float) -> str:

@@ -10,17 +10,25 @@ from typing import final
 import numpy as np
 
 from apo_bench.assembly import Correction, Hypothesis, Look, Observation, OutlierModel, largest_gap, lowered_together
-from apo_bench.correction.checks.consistency import TEST_LEVEL
-from apo_bench.correction.checks.status import refused_correction
+from apo_bench.correction.checks.status import TEST_LEVEL, refused_correction
 from apo_bench.correction.contact.contact import contact_apply
 from apo_bench.correction.contact.inferred import inferred_goals
-from apo_bench.correction.robust.beliefs import BROAD, DISPLACED, FLIPPED, GROSS, INLIER, SHIFTED, STALE, States
+from apo_bench.correction.robust.beliefs import (
+    BROAD,
+    DISPLACED,
+    FLIPPED,
+    GROSS,
+    INLIER,
+    SHIFTED,
+    STALE,
+    States,
+    mode_covariance,
+)
 from apo_bench.correction.robust.crowding import least_crowded
 from apo_bench.correction.robust.hypotheses import Case, SolvedHypothesis, as_begun, as_stated
-from apo_bench.correction.robust.mixture import mode_covariance
 from apo_bench.correction.robust.noise_scale import LEAST, likeliest_scale, noisier, region_scale, scale_words
 from apo_bench.correction.robust.search import Search
-from apo_bench.correction.robust.views import Sightings, looked_again, views_of
+from apo_bench.correction.robust.views import looked_again, views_of
 from apo_bench.geometry import Array
 
 TEMPERATURE = 3.0
@@ -80,9 +88,8 @@ class RobustCorrector:
         first = None
         best = None
         while True:
-            case = Case(observation, views, model)
-            search = Search(case, self.level, self.temperature)
-            baseless = _baseless(observation, views)
+            search = Search(Case(observation, views, model), self.level, self.temperature)
+            baseless = inferred_goals(observation, [k for k, own in enumerate(views) if not own]).baseless
             best = None if baseless else search.likeliest(best)
             first = first or search.first
             doubted = baseless or unsure(search, best)
@@ -149,11 +156,6 @@ def with_room(hypothesis: SolvedHypothesis) -> SolvedHypothesis:
 
     better = least_crowded(hypothesis.observation, hypothesis.correction.goals, covariance, unknown, solve)
     return hypothesis if better is None else hypothesis.at(better, unknown)
-
-
-def _baseless(observation: Observation, views: Sightings) -> tuple[int, ...]:
-    """Operations that were never seen and of which no contact says anything."""
-    return inferred_goals(observation, [k for k, own in enumerate(views) if not own]).baseless
 
 
 def _report(

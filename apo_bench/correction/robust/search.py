@@ -16,7 +16,7 @@ import numpy as np
 
 from apo_bench.assembly import Observation
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.contact.suspects import contacts_of
+from apo_bench.correction.contact.contact import contacts_of
 from apo_bench.correction.robust.agreement import ContactAgreement, expected_badness
 from apo_bench.correction.robust.beliefs import DISPLACED, GROSS, INLIER, State, States, is_false
 from apo_bench.correction.robust.hypotheses import (
@@ -102,8 +102,7 @@ class Search:
 
     def _rescaled(self) -> None:
         """What if noise is larger than stated: all that was seen believed, or what is likeliest."""
-        best = min(self._known(), key=_badness, default=None)
-        for one in (self.first, best):
+        for one in (self.first, min(self._known(), key=_badness, default=None)):
             if one is not None and (noisier := one.noisier()).scale > one.scale:
                 self._solved[noisier.key] = noisier
 
@@ -250,8 +249,7 @@ class Search:
                     continue
                 blank = changed(states, (k,), ((*state[:i], GROSS, *state[i + 1 :]),))
                 yield blank
-                without = self._try(blank, best.dropped)
-                for belief in likely_beliefs(self._case, without, k, views[i]):
+                for belief in likely_beliefs(self._case, self._try(blank, best.dropped), k, views[i]):
                     yield changed(states, (k,), ((*state[:i], belief, *state[i + 1 :]),))
         yield from swaps(self._case, states)
         yield from displaced_together(states)

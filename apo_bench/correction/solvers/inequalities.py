@@ -20,7 +20,7 @@ from apo_bench.correction.solvers.gauss_newton import FALL, NearestGoals, dampin
 from apo_bench.correction.solvers.linear_step import goals_at, shortest_z
 from apo_bench.correction.solvers.posterior import LARGEST_POSTERIOR, jacobian_rank
 from apo_bench.correction.solvers.whitened import pulled
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array
 
 _BLIND = 1e-7
@@ -109,11 +109,11 @@ def nearest_between(
     Raises:
         InputError: Too many operations for a dense program.
     """
-    if 6 * system.n > LARGEST_POSTERIOR:
-        raise InputError(
-            f"walls with {system.n} operations were given, up to {LARGEST_POSTERIOR // 6} are allowed; "
-            'ask for "centred" contacts instead.'
-        )
+    require(
+        6 * system.n <= LARGEST_POSTERIOR,
+        f"walls with {system.n} operations were given, up to {LARGEST_POSTERIOR // 6} are allowed; "
+        'ask for "centred" contacts instead.',
+    )
     known = jacobian_rank(start.Jt)
     before = np.inf
     trace = list(start.trace)

@@ -213,8 +213,7 @@ def _near(where: Incidence, first: NDArray[np.intp], second: NDArray[np.intp]) -
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import reverse_cuthill_mckee
 
-    at = where.contact[first], where.contact[second]
-    meets = csr_array((np.ones(len(first)), at), shape=(where.c, where.c))
+    meets = csr_array((np.ones(len(first)), (where.contact[first], where.contact[second])), shape=(where.c, where.c))
     place = np.empty(where.c, dtype=np.intp)
     place[reverse_cuthill_mckee(meets, symmetric_mode=True)] = np.arange(where.c)
     return place

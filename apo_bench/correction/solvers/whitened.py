@@ -10,7 +10,7 @@ from typing import final
 import numpy as np
 
 from apo_bench.assembly import Observation, joint_covariance
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, pose, right_jacobian
 
 
@@ -113,9 +113,9 @@ def scales(covariance: Array) -> Array:
             L[k] = np.linalg.cholesky(C)
         except np.linalg.LinAlgError:
             L[k] = np.nan
-        if not np.isfinite(L[k]).all():
-            raise InputError(
-                f"the covariance of operation {k + 1} is not positive definite; "
-                "state finite numbers and a variance above zero in every direction."
-            )
+        require(
+            np.isfinite(L[k]).all(),
+            f"the covariance of operation {k + 1} is not positive definite; "
+            "state finite numbers and a variance above zero in every direction.",
+        )
     return L

@@ -8,17 +8,18 @@ from numpy.typing import ArrayLike
 
 from apo_bench.assembly import Felt
 from apo_bench.assembly.touch import Touch, checked_array, checked_pose
-from apo_bench.correction.touches.robot_model import (
+from apo_bench.correction.touches.robust_estimate import (
     HAND_EYE,
     TOOL,
+    NumberedTouch,
     Places,
     grasp_in,
     hand_eye_displacement,
     joints_in,
     part_poses,
+    robust_estimate,
     tip_displacement,
 )
-from apo_bench.correction.touches.robust_estimate import NumberedTouch, robust_estimate
 from apo_bench.errors import kind, require
 from apo_bench.geometry import Array, copyable, freeze, pose
 from apo_bench.records.robot_error import Sigmas

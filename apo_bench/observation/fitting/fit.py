@@ -1,4 +1,7 @@
-"""Fit the noise of a camera to residuals: tails by maximum likelihood, rates of outliers and of misses."""
+"""Fit the noise of a camera to residuals: tails by maximum likelihood, rates of outliers and of misses.
+
+What the noise of a camera consists of: errors in the frames of its rays, and errors that all operations share.
+"""
 
 from collections.abc import Callable
 from typing import NamedTuple
@@ -6,10 +9,21 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry import Array
-from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST_SCALE, MeasuredNoise
-from apo_bench.observation.models.residuals import INLIER_MM, TURNED_DEG, Residuals
-from apo_bench.observation.models.tails import Split, log_density_across, log_density_along, of_numbers
+from apo_bench.geometry import Array, pose
+from apo_bench.observation.models import (
+    INLIER_MM,
+    LEAST_FREEDOM,
+    LEVEL_UNITS,
+    SMALLEST_SCALE,
+    TURNED_DEG,
+    Camera,
+    MeasuredNoise,
+    Residuals,
+    Split,
+    log_density_across,
+    log_density_along,
+    of_numbers,
+)
 
 _FEWEST = 30
 """Four numbers are not fitted to fewer errors."""
@@ -51,7 +65,6 @@ def fit_noise(residuals: Residuals, source: str) -> MeasuredNoise:
         InputError: Too few inliers, or they are all exactly right.
     """
     found = residuals.found
-    inlier = residuals.inlier
     upright = residuals.upright
     known = residuals.turn_known
     near = f"{INLIER_MM:g} mm and {TURNED_DEG:g} deg"
@@ -61,13 +74,13 @@ def fit_noise(residuals: Residuals, source: str) -> MeasuredNoise:
                 f"{int(kept.sum())} of {len(kept)} parts have an estimate within {limit}; at least {_FEWEST} are "
                 "needed for a fit, so give more images, or the truth of the same ones."
             )
-    far = residuals.off_mm[found & ~inlier]
+    far = residuals.off_mm[found & ~residuals.inlier]
     return MeasuredNoise(
         source=source,
         shift_mm=fit_split(residuals.shift_mm[upright], INLIER_MM, "places"),
         turn_deg=fit_split(residuals.turn_deg[known], TURNED_DEG, "rotations"),
         missed=float(1.0 - found.mean()),
-        outliers=float(1.0 - inlier.sum() / found.sum()),
+        outliers=float(1.0 - residuals.inlier.sum() / found.sum()),
         farthest_mm=INLIER_MM * float(np.exp(2.0 * np.log(far / INLIER_MM).mean())) if len(far) else 2.0 * INLIER_MM,
     )
 
@@ -123,16 +136,14 @@ def outliers_by_score(residuals: Residuals) -> tuple[Band, ...]:
 
 def goodness_of_fit(residuals: Residuals, measured: MeasuredNoise) -> tuple[Figures, ...]:
     """Goodness of fit: of the four distributions that were fitted, to what they were fitted to."""
-    upright = residuals.upright
-    known = residuals.turn_known
     shift = measured.shift_mm
     turn = measured.turn_deg
-    turned = residuals.turn_deg[known]
+    turned = residuals.turn_deg[residuals.turn_known]
     tilt = np.linalg.norm(turned[:, :2], axis=1)
     about = np.abs(turned[:, 2])
     return (
-        _figures("across the ray", "mm", residuals.across_mm[upright], shift.cdf_across, shift.limit),
-        _figures("along the ray", "mm", residuals.along_mm[upright], shift.cdf_along, shift.limit),
+        _figures("across the ray", "mm", residuals.across_mm[residuals.upright], shift.cdf_across, shift.limit),
+        _figures("along the ray", "mm", residuals.along_mm[residuals.upright], shift.cdf_along, shift.limit),
         _figures("tilt", "deg", tilt, turn.cdf_across, turn.limit),
         _figures("turn about the ray", "deg", about, turn.cdf_along, turn.limit),
     )
@@ -154,3 +165,44 @@ def _figures(name: str, unit: str, sizes: Array, cdf: Callable[[Array], Array], 
         distance=float(max((step[1:] - at).max(), (at - step[:-1]).max())),
         by_chance=_CHANCE / float(np.sqrt(n)),
     )
+
+
+class NoiseComponent(NamedTuple):
+    """A part of the noise with one unknown deviation."""
+
+    name: str
+    unit: str
+    """mm or deg."""
+
+
+COMPONENTS = (
+    NoiseComponent("across the ray", "mm"),
+    NoiseComponent("along the ray", "mm"),
+    NoiseComponent("tilt, across the ray", "deg"),
+    NoiseComponent("turn about the ray", "deg"),
+    NoiseComponent("shift of the whole view", "mm"),
+    NoiseComponent("turn of the whole view", "deg"),
+)
+
+
+def component_factors(camera: Camera, goals: Array, P: Array) -> tuple[Array, ...]:
+    """F of each of `COMPONENTS`, (6 n, r): the body twists of goals (n, 4, 4), in mm and deg, are F e if it is 1.
+
+    Args:
+        P: (4, 4), the frame in which the whole view errs.
+    """
+    n = len(goals)
+    # Columns of F are the axes of each ray in the frame of its part: two across and one along, of shifts and of turns.
+    turned = np.swapaxes(goals[:, :3, :3], 1, 2) @ camera.frames(goals)
+    own = np.zeros((4, n, 6, n, 3))
+    for i, (row, columns) in enumerate(((0, (0, 1)), (0, (2,)), (3, (0, 1)), (3, (2,)))):
+        for column in columns:
+            own[i, np.arange(n), row : row + 3, np.arange(n), column] = turned[:, :, column]
+    view = view_ways(goals, P)
+    return (*(F.reshape(6 * n, 3 * n) for F in own), view[:, :3], view[:, 3:])
+
+
+def view_ways(goals: Array, P: Array) -> Array:
+    """What a twist of the whole view in the frame P makes of the body twists of goals, (6 n, 6), in mm and deg."""
+    ways = pose.adjoint(pose.inverse(goals) @ P)
+    return np.asarray((ways * LEVEL_UNITS / LEVEL_UNITS[:, None]).reshape(-1, 6))

@@ -6,8 +6,7 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
-from apo_bench.observation.models.fitted import LEAST_FREEDOM, SMALLEST_SCALE
-from apo_bench.observation.models.tails import Split, Tail, of_numbers
+from apo_bench.observation.models import LEAST_FREEDOM, SMALLEST_SCALE, Split, Tail, of_numbers
 
 LOWER_QUARTILE_OF_THREE = 1.10115
 """Lower quartile of the length of a vector of three standard normal numbers (chi with three degrees of freedom)."""

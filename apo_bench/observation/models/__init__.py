@@ -1,1 +1,60 @@
 """Noise models, one a file: what a camera makes of the true poses."""
+
+from apo_bench.observation.models.camera import Anisotropic, Camera, Sighted
+from apo_bench.observation.models.empirical import Empirical, empirical_noise
+from apo_bench.observation.models.failures import UNSEEN_DEVIATION, AlongRay, Flipped, Outliers, Stale, last_seen
+from apo_bench.observation.models.fitted import (
+    LEAST_FREEDOM,
+    LEVEL_UNITS,
+    SMALLEST_SCALE,
+    ConstantError,
+    Fitted,
+    MeasuredNoise,
+    ViewNoise,
+    view_frame,
+)
+from apo_bench.observation.models.isotropic import Facts, HeavyTailed, Isotropic, Level, PerPart, floored, with_shared
+from apo_bench.observation.models.residuals import INLIER_MM, TURNED_DEG, Residuals
+from apo_bench.observation.models.shared import Bias
+from apo_bench.observation.models.symmetric import AnyTurn, Symmetric
+from apo_bench.observation.models.tails import Split, Tail, log_density_across, log_density_along, of_numbers
+
+__all__ = (
+    "INLIER_MM",
+    "LEAST_FREEDOM",
+    "LEVEL_UNITS",
+    "SMALLEST_SCALE",
+    "TURNED_DEG",
+    "UNSEEN_DEVIATION",
+    "AlongRay",
+    "Anisotropic",
+    "AnyTurn",
+    "Bias",
+    "Camera",
+    "ConstantError",
+    "Empirical",
+    "Facts",
+    "Fitted",
+    "Flipped",
+    "HeavyTailed",
+    "Isotropic",
+    "Level",
+    "MeasuredNoise",
+    "Outliers",
+    "PerPart",
+    "Residuals",
+    "Sighted",
+    "Split",
+    "Stale",
+    "Symmetric",
+    "Tail",
+    "ViewNoise",
+    "empirical_noise",
+    "floored",
+    "last_seen",
+    "log_density_across",
+    "log_density_along",
+    "of_numbers",
+    "view_frame",
+    "with_shared",
+)

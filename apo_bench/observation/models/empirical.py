@@ -8,12 +8,12 @@ from typing import ClassVar, final
 import numpy as np
 
 from apo_bench.assembly import Assembly, Demonstration, Observation, measured_rates
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, frozen, pose
-from apo_bench.io.strict_csv import CsvRow, read_csv
+from apo_bench.io import CsvRow, read_csv
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.fitted import LEVEL_UNITS, check_measured_level, observe_in_ray_frames
-from apo_bench.observation.models.level import Facts, Level
+from apo_bench.observation.models.isotropic import Facts, Level
 from apo_bench.observation.models.residuals import Residuals
 
 _INLIER = "inlier"
@@ -143,8 +143,9 @@ def read_residuals(path: str | Path) -> Sample:
         errors[kind].append([] if kind == _MISSED else _error(row))
     count = {kind: len(estimates) for kind, estimates in errors.items()}
     estimates = sum(count.values()) - count[_MISSED]
-    if not count[_INLIER]:
-        raise InputError(f"{path}: no residual of an inlier stands in the file; write one with noise fit --residuals.")
+    require(
+        count[_INLIER], f"{path}: no residual of an inlier stands in the file; write one with noise fit --residuals."
+    )
     return Sample(
         inliers=_acting_where_seen(errors[_INLIER]),
         outliers=_acting_where_seen(errors[_OUTLIER]),

@@ -14,9 +14,8 @@ from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.isotropic import displaced, floored, observe_displaced, with_shared
-from apo_bench.observation.models.level import Facts, Level
-from apo_bench.observation.models.outliers import UNSEEN_DEVIATION, last_seen
+from apo_bench.observation.models.failures import UNSEEN_DEVIATION, last_seen
+from apo_bench.observation.models.isotropic import Facts, Level, displaced, floored, observe_displaced, with_shared
 from apo_bench.observation.models.tails import Split
 
 SMALLEST_SCALE = 1e-4
@@ -216,8 +215,7 @@ def observe_in_ray_frames(
     """
     scale = np.repeat([level.mm, level.deg], 3)
     xi = camera.twists(demonstration.goals, errors * scale)
-    seen_goals = displaced(demonstration.goals, xi)
-    stated = camera.covariance(seen_goals, covariance * np.outer(scale, scale))
+    stated = camera.covariance(displaced(demonstration.goals, xi), covariance * np.outer(scale, scale))
     seen = observe_displaced(assembly, demonstration, xi, stated)
     missed = missed & (max(level) > 0.0)
     goals = seen.goals.copy()
@@ -229,11 +227,10 @@ def observe_in_ray_frames(
 
 def _gross(measured: MeasuredNoise, n: int, rng: np.random.Generator) -> Array:
     """Errors (n, 6) of outliers, [mm, deg]: any direction, any rotation."""
-    limit = measured.shift_mm.limit
     # Gaussian vectors have any direction alike often, Gaussian quaternions any rotation; log-uniform sizes.
     direction = rng.standard_normal((n, 3))
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    size = limit * (measured.farthest_mm / limit) ** rng.random((n, 1))
+    size = measured.shift_mm.limit * (measured.farthest_mm / measured.shift_mm.limit) ** rng.random((n, 1))
     q = rng.standard_normal((n, 4))
     turned = pose.log(pose.unpack(np.concatenate([np.zeros((n, 3)), q], axis=1)))[:, 3:]
     return np.concatenate([direction * size, np.degrees(turned)], axis=1)

@@ -1,19 +1,48 @@
 """Noise that is right on SE(3): the same in every direction, in the frame of the part that was seen.
 
 Gaussian, with a factor of its own for each part, or with heavy tails; and how displaced goals become an observation.
+
+What every noise model has: its level, and facts for its card.
 """
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import inf
-from typing import ClassVar, final
+from typing import ClassVar, NamedTuple, final
 
 import numpy as np
 
 from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError, Tails
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array, frozen, pose
-from apo_bench.observation.models.level import Facts, Level
+
+
+class Level(NamedTuple):
+    """How much noise: standard deviation per axis."""
+
+    mm: float
+    deg: float
+
+    def sigma(self) -> Array:
+        """The standard deviation of each coordinate of a body twist, (6,), [m, rad]."""
+        return np.repeat([self.mm * 1e-3, np.radians(self.deg)], 3)
+
+
+class Facts(NamedTuple):
+    """The attribute `FACTS` of a noise model: what its card prints. Models that bring none have their docstring."""
+
+    title: str
+    formula: tuple[str, ...]
+    """One line each; L is the level, e are independent standard normal numbers, xi is the body twist."""
+    frame: str
+    parameters: tuple[str, ...]
+    """`name = value unit: meaning`, one each; numbers are read from the constants that the model uses."""
+    states: str
+    """Which covariance an observation states, and how that compares with the errors."""
+    notes: tuple[str, ...] = ()
+    measured: bool = False
+    """Whether a level multiplies what was measured, instead of being the deviation in mm and degrees."""
+
 
 COVARIANCE_FLOOR = frozen(np.repeat([0.05e-3, np.radians(0.05)], 3), 6)
 """Smallest standard deviation that is ever stated, [m, rad]: no camera is perfect, and a covariance has an inverse."""
@@ -105,11 +134,11 @@ class HeavyTailed:
     )
 
     def __post_init__(self) -> None:
-        if not 2.0 < self.freedom < inf:
-            raise InputError(
-                f"a Student t with {self.freedom:g} degrees of freedom was given; give a finite number above 2, below "
-                "which it has no covariance."
-            )
+        require(
+            2.0 < self.freedom < inf,
+            f"a Student t with {self.freedom:g} degrees of freedom was given; give a finite number above 2, below "
+            "which it has no covariance.",
+        )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         sigma = self.level.sigma()

@@ -157,8 +157,7 @@ def match_rows(estimates: PoseRows, truth: PoseRows) -> NDArray[np.int64]:
     for there, seen in _groups(truth.where, estimates.where):
         if len(there) * len(seen) > MOST_PAIRS:
             raise InputError(f"{estimates.spot(int(seen[0]))}: {_MOST_IN_ONE_IMAGE}, {len(seen)} were given.")
-        off = np.linalg.norm(truth.t_mm[there][:, None] - estimates.t_mm[seen][None], axis=2)
-        i, j = linear_sum_assignment(off)
+        i, j = linear_sum_assignment(np.linalg.norm(truth.t_mm[there][:, None] - estimates.t_mm[seen][None], axis=2))
         partner[there[i]] = seen[j]
     return partner
 
@@ -167,8 +166,7 @@ def _groups(truth: Any, estimates: Any) -> Iterator[tuple[Any, Any]]:
     """Rows of the truth and of the estimates that are of one object in one image, where there are both."""
     _, key = np.unique(np.concatenate([truth, estimates]), axis=0, return_inverse=True)
     there, seen = (_rows_by_key(keys) for keys in np.split(key.reshape(-1), [len(truth)]))
-    for each in sorted(there.keys() & seen.keys()):
-        yield there[each], seen[each]
+    yield from ((there[each], seen[each]) for each in sorted(there.keys() & seen.keys()))
 
 
 def _rows_by_key(keys: Any) -> dict[int, Any]:

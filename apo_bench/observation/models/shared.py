@@ -6,12 +6,11 @@ from typing import ClassVar, final
 import numpy as np
 
 from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError, first_order
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.fitted import view_error, view_frame
-from apo_bench.observation.models.isotropic import OWN, OWN_FACT, observe_displaced, observe_shared
-from apo_bench.observation.models.level import Facts, Level
+from apo_bench.observation.models.isotropic import OWN, OWN_FACT, Facts, Level, observe_displaced, observe_shared
 
 CORRELATION = 0.9
 """Between the errors of an operation and the next."""
@@ -111,8 +110,10 @@ class Correlated:
     )
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.correlation <= 1.0:
-            raise InputError(f"a correlation of {self.correlation:g} was given; give a number from 0 to 1.")
+        require(
+            0.0 <= self.correlation <= 1.0,
+            f"a correlation of {self.correlation:g} was given; give a number from 0 to 1.",
+        )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         sigma = self.level.sigma()

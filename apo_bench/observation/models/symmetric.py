@@ -17,8 +17,7 @@ from apo_bench.geometry import (
     symmetries,
     turn_about,
 )
-from apo_bench.observation.models.isotropic import observe_displaced
-from apo_bench.observation.models.level import Facts, Level
+from apo_bench.observation.models.isotropic import Facts, Level, observe_displaced
 
 WORSE = 3.0
 _MANY = 3.0
@@ -77,8 +76,7 @@ class Symmetric:
             sigma, stated = self._deviations(fold)
             if np.any(unit[k] * sigma):
                 # About the centre of volume: the body twist there is Ad(frame) xi at the part's origin.
-                off = pose.exp(about @ (unit[k] * sigma))
-                xi[k] = pose.log(nearest_symmetric_pose(off, group, np.eye(3)))
+                xi[k] = pose.log(nearest_symmetric_pose(pose.exp(about @ (unit[k] * sigma)), group, np.eye(3)))
             covariance[k] = about @ np.diag(stated**2) @ about.T
         return observe_displaced(assembly, demonstration, xi, (covariance + np.swapaxes(covariance, 1, 2)) / 2)
 

@@ -95,8 +95,7 @@ class Split:
         kept = np.zeros((0, 3))
         while len(kept) < n:
             # Student t is a Gaussian over sqrt(chi-square(n) / n): one divisor for both directions across, one along.
-            unit = rng.standard_normal((n, 3))
-            error = unit * [self.across.scale, self.across.scale, self.along.scale]
+            error = rng.standard_normal((n, 3)) * [self.across.scale, self.across.scale, self.along.scale]
             error[:, :2] /= _root_chi(self.across, n, rng)[:, None]
             error[:, 2] /= _root_chi(self.along, n, rng)
             kept = np.concatenate([kept, error[np.linalg.norm(error, axis=1) < self.limit]])

@@ -9,10 +9,9 @@ import numpy as np
 from shapely import Polygon, unary_union
 
 from apo_bench.geometry import WHOLE_TURN, Array, Face, Hull, RoundFace, straightened
-from apo_bench.parts.making.body import Body
+from apo_bench.parts.making.body import Body, extruded, summed
 from apo_bench.parts.making.cells import bands, bore_cell, clipped, convex_cells, wedges
 from apo_bench.parts.making.frustums import Frustum, at_height, chamfered, heights_of, prism, raised, tangent, without
-from apo_bench.parts.making.moments import extruded, summed
 from apo_bench.parts.making.outline import Outline, arc_of, circle, goes_on, outline_moments, receding, ring
 
 _NARROW_MM = 6e-3
@@ -174,9 +173,8 @@ def _sides(outline: Outline, low: float, high: float, hole: bool) -> tuple[list[
     arcs = [arc_of(outline, i) for i in range(len(outline))]
     for i, (edge, arc) in enumerate(zip(outline, arcs, strict=True)):
         if arc is None:
-            a = edge.start
             b = outline[(i + 1) % len(outline)].start
-            corners = np.array([(*a, low), (*b, low), (*b, high), (*a, high)])
+            corners = np.array([(*edge.start, low), (*b, low), (*b, high), (*edge.start, high)])
             flats.append(Face(edge.name, 1e-3 * (corners[::-1] if hole else corners), fit=edge.fit))
             continue
         if goes_on(arcs[i - 1], arc) and outline[i - 1].name == edge.name and i > 0:

@@ -7,7 +7,7 @@ from typing import final
 import numpy as np
 
 from apo_bench.geometry import Array, RoundFace
-from apo_bench.parts.making.moments import Moments, frustum_moments, summed
+from apo_bench.parts.making.body import Moments, frustum_moments, summed
 from apo_bench.parts.making.outline import needed_sides
 
 _SAME_MM = 1e-6
@@ -58,8 +58,7 @@ class Frustum:
         a, b = self.radii
         span = (1e-3 * self.low, 1e-3 * self.high)
         point = np.array([1e-3 * at[0], 1e-3 * at[1], 0.0])
-        axis = np.array([0.0, 0.0, 1.0])
-        return RoundFace(self.name, point, axis, span, (1e-3 * a, 1e-3 * b), hole, self.fit)
+        return RoundFace(self.name, point, np.array([0.0, 0.0, 1.0]), span, (1e-3 * a, 1e-3 * b), hole, self.fit)
 
 
 def chamfered(wall: Frustum, at_low: float, at_high: float, sign: float) -> list[Frustum]:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.geometry import Array, sides_of
-from apo_bench.parts.making.moments import Moments, polygon_moments, segment_moments
+from apo_bench.parts.making.body import Moments, polygon_moments, segment_moments
 
 COARSE_SIDES = 12
 """Of a whole turn of a round wall without a name, which no contact uses."""
@@ -152,8 +152,7 @@ def ring(outline: Outline, hole: bool = False) -> Array:
 
 def receding(outline: Outline, hole: bool = False) -> NDArray[np.bool_]:
     """Whether the sides of a ring recede by the clearance: each that begins at a corner of `ring`, (k,)."""
-    recedes = [edge.fit for i, edge in enumerate(outline) for _ in _corners(outline, i, hole)]
-    return np.array(recedes, dtype=np.bool_)
+    return np.array([edge.fit for i, edge in enumerate(outline) for _ in _corners(outline, i, hole)], dtype=np.bool_)
 
 
 def _corners(outline: Outline, i: int, hole: bool) -> Iterator[Array]:

@@ -7,7 +7,7 @@ import numpy as np
 from shapely import Polygon
 
 from apo_bench.geometry import Array, Cylinder, Face, Hull, cylinder_hull, polygons_of, rings_of
-from apo_bench.parts.making.body import Body
+from apo_bench.parts.making.body import Body, summed
 from apo_bench.parts.making.cells import clipped, wedges
 from apo_bench.parts.making.extrude import flat_face
 from apo_bench.parts.making.frustums import (
@@ -20,7 +20,6 @@ from apo_bench.parts.making.frustums import (
     tangent,
     without,
 )
-from apo_bench.parts.making.moments import summed
 
 _SAME_MM = 1e-6
 _NARROW_MM = 6e-3
@@ -87,8 +86,9 @@ def _length(outer: Sequence[Frustum], inner: Sequence[Frustum], a: float, b: flo
         yield Hull("", 1e-3 * np.concatenate([_ring(low, around.count, a), _ring(high, around.count, b)]))
     else:
         n = max(around.count, bore.count)
-        cells = [wedges(inscribed((0.0, 0.0), r, n), np.zeros(2), n) for r in (low, high)]
-        for (u, first), (_, last) in zip(*cells, strict=True):
+        for (u, first), (_, last) in zip(
+            *[wedges(inscribed((0.0, 0.0), r, n), np.zeros(2), n) for r in (low, high)], strict=True
+        ):
             ends = [(clipped(first, -u, -bore.at(a)), a), (clipped(last, -u, -bore.at(b)), b)]
             yield Hull("", 1e-3 * np.concatenate([raised(*end) for end in ends]))
 

@@ -106,8 +106,7 @@ def write_part(
     indent(root)
     path.write_text(note + tostring(root, encoding="unicode") + "\n", encoding="utf-8")
     if not boxes:
-        text = stated_text(solid, density, friction, source, licence)
-        path.with_suffix(".toml").write_text(text, encoding="utf-8")
+        path.with_suffix(".toml").write_text(stated_text(solid, density, friction, source, licence), encoding="utf-8")
     return path
 
 
@@ -155,9 +154,8 @@ def _inside(face: Face) -> Array:
 
 def stated_text(solid: Solid, density: float, friction: Sequence[float], source: str, licence: str) -> str:
     """The text of `NAME.toml`."""
-    J = solid.inertia
-    assert J is not None
-    six = 1e15 * J[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    assert solid.inertia is not None
+    six = 1e15 * solid.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     lines = [
         f'schema = "{PART_SCHEMA}"',
         f"source = {_quoted(source)}",

@@ -11,14 +11,12 @@ import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Solid, pose
-from apo_bench.io.figures import default_looks, save_figure
+from apo_bench.io import default_looks, save_figure
 from apo_bench.recording.arranging import camera_pose
-from apo_bench.recording.importing import ImportedRecording, planned_starts
-from apo_bench.recording.log import Log, PoseTrack
+from apo_bench.recording.importing import ImportedRecording, UnplannedRecording, planned_starts
 from apo_bench.recording.operations import approaches
-from apo_bench.recording.setup_files import CameraFile
+from apo_bench.recording.setup_files import CameraFile, Log, PoseTrack
 from apo_bench.recording.stays import Stays, all_stays
-from apo_bench.recording.without_scenario import UnplannedRecording
 from apo_bench.scenario.scenario import Scenario
 
 _AXES = ("#c0392b", "#2e8b57", "#2456a6")
@@ -59,7 +57,6 @@ def drawing_of(
     recording: ImportedRecording, log: Log, tracks: Mapping[str, PoseTrack], camera: CameraFile
 ) -> RecordingDrawing:
     """Of a recording that was understood."""
-    operations = recording.scenario.assembly.operations
     return RecordingDrawing(
         title=_title(log, recording.scenario),
         tracks=tracks,
@@ -67,7 +64,7 @@ def drawing_of(
         T_world_camera=recording.camera.T_world_camera,
         ended=[
             (operation.main, seen.rest.begins)
-            for operation, seen in zip(operations, recording.operations, strict=True)
+            for operation, seen in zip(recording.scenario.assembly.operations, recording.operations, strict=True)
             if seen.rest is not None
         ],
         solids=recording.scenario.assembly.solids,
@@ -112,8 +109,7 @@ def _title(log: Log, scenario: Scenario | None) -> str:
 
 def _path_ends(recording: ImportedRecording) -> Sequence[DrawnEnd]:
     drawn = []
-    X = recording.camera.T_world_camera
-    for k, end, macro, off_deg in approaches(recording.scenario, recording.operations, X):
+    for k, end, macro, off_deg in approaches(recording.scenario, recording.operations, recording.camera.T_world_camera):
         if end is not None:
             goal = recording.observation.goals[k]
             ends = np.array([goal[:3, 3] - end.length_m * goal[:3, :3] @ end.direction, goal[:3, 3]])
@@ -192,8 +188,7 @@ def _draw_frame(axis: Any, T: Array, size: float, name: str) -> None:
 
 
 def _draw_box(axis: Any, solid: Solid, T: Array, color: str, style: str) -> None:
-    corners = [np.array(corner[::-1]) for corner in product((0, 1), repeat=3)]
-    for a, b in combinations(corners, 2):
+    for a, b in combinations([np.array(corner[::-1]) for corner in product((0, 1), repeat=3)], 2):
         if np.abs(a - b).sum() == 1:
             ends = np.where(np.array([a, b]) == 1, solid.bounds[1], solid.bounds[0])
             axis.plot(*pose.apply(T, ends).T, color=color, linestyle=style, linewidth=0.9, alpha=0.8)

@@ -7,15 +7,13 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from apo_bench.geometry import Array, frozen, pose
-from apo_bench.io.words import columns, direction
+from apo_bench.io import columns, direction
 from apo_bench.recording.arranging import CameraPose
 from apo_bench.recording.averaging import per_axis
-from apo_bench.recording.importing import ImportedRecording
-from apo_bench.recording.log import Log
+from apo_bench.recording.importing import ImportedRecording, UnplannedRecording
 from apo_bench.recording.operations import approaches
 from apo_bench.recording.rests import RestSpan
-from apo_bench.recording.setup_files import ObjectsFile
-from apo_bench.recording.without_scenario import UnplannedRecording
+from apo_bench.recording.setup_files import Log, ObjectsFile
 
 _HEADS: tuple[str, ...] = (
     "",
@@ -171,9 +169,8 @@ def _paths(recording: ImportedRecording) -> Iterator[str]:
 def _rest_cells(rest: RestSpan, X: Array) -> list[str]:
     m, rad = per_axis(rest.mean.scatter)
     begins, ends, *place = (f"{x:.2f}" for x in (rest.begins, rest.ends, *(1e3 * (X @ rest.T)[:3, 3])))
-    inlier = rest.mean.inlier
     off = f"{1e3 * m:.2f} mm {np.degrees(rad):.2f} deg"
-    return [begins, ends, str(len(inlier)), str(int((~inlier).sum())), *place, off]
+    return [begins, ends, str(len(rest.mean.inlier)), str(int((~rest.mean.inlier).sum())), *place, off]
 
 
 def _pose_text(T: Array) -> str:

@@ -7,11 +7,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
-from apo_bench.errors import InputError
-from apo_bench.io.ordinary_files import read_bytes, to_write
-from apo_bench.records.limits import USUAL_LIMITS, Limits
+from apo_bench.errors import InputError, require
+from apo_bench.io import read_bytes, to_write
 from apo_bench.records.run.validation import run_of
 from apo_bench.records.salt import Salt
+from apo_bench.records.thresholds import USUAL_LIMITS, Limits
 
 _RUN = "apo-bench/run/3"
 _LARGEST_BYTES = 16_000_000
@@ -78,10 +78,10 @@ def check_same(folder: Path, run: Mapping[str, Any]) -> None:
     except InputError as error:
         raise InputError(f"'{folder}' has trials but no readable run.json ({error}); choose another folder.") from error
     schema = before.get("schema")
-    if schema is None:
-        raise InputError(f"'{folder}' has trials but no readable run.json; choose another folder.")
-    if schema != _RUN:
-        raise InputError(f"'{folder}' has a run.json of schema '{schema}', '{_RUN}' is needed; choose another folder.")
+    require(schema is not None, f"'{folder}' has trials but no readable run.json; choose another folder.")
+    require(
+        schema == _RUN, f"'{folder}' has a run.json of schema '{schema}', '{_RUN}' is needed; choose another folder."
+    )
     now = json.loads(json.dumps(run))
     grids = before.get("grids")
     if not isinstance(grids, list) or len(grids) != len(now["grids"]):

@@ -12,10 +12,17 @@ import msgspec
 from msgspec import Meta
 
 from apo_bench.errors import InputError
-from apo_bench.io.lossless_json import HALF_BUT_OF_FILES, HALF_LETTER, WHOLE_LETTERS, half_letter, is_whole, read_whole
-from apo_bench.io.plain_text import CONTROL, clean
-from apo_bench.records.row import LATER, REQUIRED, ROW_FIELDS, Row
-from apo_bench.records.setting_columns import KEY
+from apo_bench.io import (
+    CONTROL,
+    HALF_BUT_OF_FILES,
+    HALF_LETTER,
+    WHOLE_LETTERS,
+    clean,
+    half_letter,
+    is_whole,
+    read_whole,
+)
+from apo_bench.records.row import KEY, LATER, REQUIRED, ROW_FIELDS, Row
 from apo_bench.records.settings import OLDER_ROWS, ROW, Name, TrialSettings
 
 _Text = Annotated[str, Meta(max_length=100_000)]

@@ -9,11 +9,11 @@ from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
-from apo_bench.errors import InputError
-from apo_bench.io.grouping import grouped
+from apo_bench.errors import InputError, require
+from apo_bench.io import grouped
 from apo_bench.records import SETTINGS, Key, Row, one_salt, row_key, with_salt
-from apo_bench.records.run.report_rows import NUMBERS, report_rows
 from apo_bench.records.run.run_file import read_run
+from apo_bench.records.run.run_folder import NUMBERS, report_rows
 from apo_bench.statistics import ALL, Cell, Interval, Place, Rate, cell_place, order, place_of, tally, tango
 
 RUN = "run.json can be read"
@@ -133,21 +133,20 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
     """
     sides = [Side(Path(folder), read_run(Path(folder)), report_rows(Path(folder))) for folder in (first, second)]
     for side in sides:
-        if not side.rows:
-            raise InputError(f"'{side.folder}' holds no finished trial yet; run the sweep before it is compared.")
+        require(side.rows, f"'{side.folder}' holds no finished trial yet; run the sweep before it is compared.")
     salt, other_salt = (one_salt(side.rows) for side in sides)
-    if salt != other_salt:
-        raise InputError(
-            f"'{first}' was drawn {with_salt(salt)} and '{second}' {with_salt(other_salt)}, so that they have no "
-            "trial in common, whatever their seeds; compare sweeps of one salt."
-        )
+    require(
+        salt == other_salt,
+        f"'{first}' was drawn {with_salt(salt)} and '{second}' {with_salt(other_salt)}, so that they have no "
+        "trial in common, whatever their seeds; compare sweeps of one salt.",
+    )
     ours, theirs = (_by_key(side) for side in sides)
     both = [key for key in ours if key in theirs]
-    if not both:
-        raise InputError(
-            f"'{first}' and '{second}' have no trial in common (scenario, clearance, seed, carelessness, level, noise, "
-            "relations, grasp, robot error and method); compare sweeps of the same seeds."
-        )
+    require(
+        both,
+        f"'{first}' and '{second}' have no trial in common (scenario, clearance, seed, carelessness, level, noise, "
+        "relations, grasp, robot error and method); compare sweeps of the same seeds.",
+    )
     pairs = [(ours[key], theirs[key]) for key in both]
     return Comparison(
         first=sides[0],

@@ -5,14 +5,13 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.errors import InputError
-from apo_bench.io.ordinary_files import check_folders, to_write
+from apo_bench.io import check_folders, to_write
 from apo_bench.records import KEY, Row, row_key
 from apo_bench.records.run.replay_command import replay_command
-from apo_bench.records.run.report_rows import NUMBERS
+from apo_bench.records.run.run_folder import NUMBERS
 from apo_bench.report.comparison.compare import Agreement, Comparison, Side
-from apo_bench.report.page.document import page
-from apo_bench.report.run.facts import limits_of, scenario_files, value_words
-from apo_bench.report.run.trials import verdict, why
+from apo_bench.report.page.report_page import page
+from apo_bench.report.run.trials import limits_of, scenario_files, value_words, verdict, why
 from apo_bench.report.tables.table import Column, Table, level_text
 from apo_bench.statistics import (
     FEWEST_SEEDS,

@@ -5,10 +5,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import partial
 from typing import Any
 
-from apo_bench.io.grouping import grouped
+from apo_bench.io import grouped
 from apo_bench.records import STAGES, knows_truth
-from apo_bench.report.figures.sheet import WIDTH, Entry, Figure, Panel, Tips
-from apo_bench.report.figures.styles import INK, SOFT, STAGE_COLORS, SUCCESS
+from apo_bench.report.figures.sheet import INK, SOFT, STAGE_COLORS, SUCCESS, WIDTH, Entry, Figure, Panel, Tips
 from apo_bench.statistics import ALL, Cell, Confusion, Setting, TrialTimes, level_of, level_words, percent
 
 _LEFT = 138
@@ -115,8 +114,7 @@ def _outcome_panel(setting: Setting, cells: Sequence[Cell]) -> Panel:
         for top, cell in bars:
             axis.text(_LEFT - 6, top + _HIGH - 2, _level(cell, setting), ha="right", **_SMALL)
             axis.text(WIDTH - _RIGHT + 5, top + _HIGH - 2, f"n {cell.trials}", **_SMALL)
-        pieces = [piece for top, cell in bars for piece in _bar(cell, setting, top)]
-        boxes, colors, words = zip(*pieces, strict=True)
+        boxes, colors, words = zip(*[piece for top, cell in bars for piece in _bar(cell, setting, top)], strict=True)
         tip(_boxes(axis, boxes, colors), words)
         for share in (0.0, 0.5, 1.0):
             axis.text(_x(share), y + 12, f"{100 * share:.0f} %", ha="center", **_SMALL)

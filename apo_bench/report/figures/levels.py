@@ -5,11 +5,10 @@ from collections.abc import Callable, Mapping, Sequence
 from operator import attrgetter
 from typing import Any, TypeVar
 
-from apo_bench.io.grouping import grouped
+from apo_bench.io import grouped
 from apo_bench.records import RANGE, knows_truth
 from apo_bench.report.figures.lines import Axis, MethodLine, Point, RuleLine, dodges, entries, levels_axis, line_panel
-from apo_bench.report.figures.sheet import Figure, Panel
-from apo_bench.report.figures.styles import RECOGNITION_STYLES, SEEN, Style, styles
+from apo_bench.report.figures.sheet import RECOGNITION_STYLES, SEEN, Figure, Panel, Style, styles
 from apo_bench.statistics import (
     ALL,
     Cell,

@@ -4,8 +4,7 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any, NamedTuple
 
-from apo_bench.report.figures.sheet import DPI, Entry, Panel, Tips
-from apo_bench.report.figures.styles import INK, RULE, SOFT, Style
+from apo_bench.report.figures.sheet import DPI, INK, RULE, SOFT, Entry, Panel, Style, Tips
 
 _DODGE = 0.08
 _WITHIN = 0.4

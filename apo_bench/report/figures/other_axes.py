@@ -1,13 +1,36 @@
-"""Success over what is not the level: the number of looks, and tightness, which is clearance over level."""
+"""Success over what is not the level: the number of looks, and tightness, which is clearance over level.
 
-from collections.abc import Callable, Sequence
+Every figure of a sweep that has something to show.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
 
 from apo_bench.records import knows_truth, may_look
-from apo_bench.report.figures.levels import SUCCESS_AXIS, methods_of, rate_words
+from apo_bench.report.figures.bars import outcome_figure, prediction_figure, time_figure
+from apo_bench.report.figures.levels import (
+    SUCCESS_AXIS,
+    difference_figure,
+    gap_figure,
+    methods_of,
+    rate_words,
+    recognition_figure,
+    success_figure,
+)
 from apo_bench.report.figures.lines import Axis, MethodLine, Point, dodges, entries, levels_axis, line_panel
-from apo_bench.report.figures.sheet import Figure, Panel
-from apo_bench.report.figures.styles import styles
-from apo_bench.statistics import Cell, Setting, level_label, level_of, level_words, members
+from apo_bench.report.figures.sheet import DrawnFigure, Figure, Panel, draw, styles
+from apo_bench.statistics import (
+    Cell,
+    Confusion,
+    GapSummary,
+    Recognition,
+    Setting,
+    TrialTimes,
+    level_label,
+    level_of,
+    level_words,
+    members,
+)
+from apo_bench.statistics.levels.half_level import Summary
 from apo_bench.statistics.settings import settings
 
 _DODGE = 1.03
@@ -101,3 +124,30 @@ def _lines(cells: Sequence[Cell], at: Callable[[Cell, int], float], words: Calla
             ]
             lines.append(MethodLine(method, style, points))
     return lines
+
+
+def figures(
+    numbers: Summary,
+    grouped: Mapping[Setting, Sequence[Cell]],
+    gaps: Sequence[GapSummary],
+    confusions: Sequence[Confusion],
+    recognitions: Sequence[Recognition],
+    times: Sequence[TrialTimes],
+) -> dict[str, DrawnFigure]:
+    """By the name of their file."""
+    where = list(grouped)
+    looks = styles(methods_of(numbers.cells))
+    pairs = members(where, numbers.pairs)
+    figures = {
+        "success_over_level": success_figure(numbers.cells),
+        "success_over_tightness": tightness_figure(numbers.cells),
+        "success_over_looks": looks_figure(numbers.cells),
+        "failure_stages": outcome_figure(grouped),
+        "gap_before_and_after": gap_figure(members(where, gaps), looks),
+        "prediction": prediction_figure(confusions),
+        "recognised": recognition_figure(recognitions),
+        "timing": time_figure(times),
+    }
+    for reference in dict.fromkeys(p.reference for p in numbers.pairs):
+        figures[f"difference_to_{reference}"] = difference_figure(pairs, reference, looks)
+    return {name: draw(figure) for name, figure in figures.items() if figure.panels}

@@ -10,10 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from markupsafe import Markup
 
-from apo_bench.io.grouping import grouped
+from apo_bench.io import grouped
 from apo_bench.records import USUAL_LIMITS, Limits, Row, knows_truth
 from apo_bench.records.run.replay_command import Files, without_seed
-from apo_bench.records.run.report_rows import NUMBERS
+from apo_bench.records.run.run_folder import NUMBERS
 from apo_bench.report.run.trials import verdict, why
 from apo_bench.statistics import (
     Cell,

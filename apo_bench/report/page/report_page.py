@@ -1,20 +1,75 @@
-"""The page of a sweep: the answer, who succeeds, where and why not, with every trial under its cell."""
+"""The page of a sweep: the answer, who succeeds, where and why not, with every trial under its cell.
+
+Pages out of templates: one file, no address outside it, and a policy that lets a browser load none.
+"""
 
 import base64
+import hashlib
+import re
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cache
+from importlib import resources
 from typing import Any
 
-from apo_bench.io.grouping import grouped
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
+
+from apo_bench.io import grouped
 from apo_bench.records import RANGE, Limits, Row, knows_truth, look_up, one_salt
 from apo_bench.records.run.replay_command import Files, replay_command
-from apo_bench.report.figures.sheet import DrawnFigure
+from apo_bench.report.figures.sheet import DrawnFigure, dark_properties
 from apo_bench.report.page.cells import matrices, packed_json, trials
-from apo_bench.report.page.document import page
-from apo_bench.report.run.facts import limits_of, run_facts, scenario_files
-from apo_bench.report.run.trials import FailurePicture, why
+from apo_bench.report.run.trials import FailurePicture, limits_of, run_facts, scenario_files, why
 from apo_bench.report.tables.table import Table
 from apo_bench.statistics import Cell, Setting, Work, cell_place, place_of, setting_of
-from apo_bench.statistics.levels.summary import Summary
+from apo_bench.statistics.levels.half_level import Summary
+
+
+def page(template: str, **values: Any) -> str:
+    """HTML in one piece; whatever is not markup by its type is escaped.
+
+    Args:
+        template: `report.html` or `compare.html`.
+        values: For the template: `title`, `sections` (anchor -> heading), and what it needs itself.
+    """
+    script = _file("page.js")
+    dark = f"@media (prefers-color-scheme:dark){{:root{{{dark_properties()}}}}}"
+    known = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = (
+        f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{known}'; "
+        "base-uri 'none'; form-action 'none'"
+    )
+    return (
+        _templates()
+        .get_template(f"{template}.j2")
+        .render(script=Markup(script), style=Markup(_file("page.css") + dark), policy=policy, **values)
+    )
+
+
+def prose(text: str) -> Markup:
+    """Sentences in which `code` and *emphasis* are marked as in Markdown; `%` stays with its number."""
+    code = re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text)).replace(" %", "\u00a0%"))
+    return Markup(re.sub(r"\*([^*]+)\*", r"<em>\1</em>", code))
+
+
+@cache
+def _templates() -> Environment:
+    environment = Environment(
+        loader=PackageLoader("apo_bench.report.page"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"prose": prose, "zip": zip}
+    return environment
+
+
+@cache
+def _file(name: str) -> str:
+    """A style sheet or script that lies beside this module."""
+    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
+
 
 _SECTIONS = {
     "success": "Success",

@@ -8,7 +8,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
-from apo_bench.io.tables import write_columns, write_csv
+from apo_bench.io import write_columns, write_csv
 from apo_bench.records import knows_truth
 from apo_bench.statistics import Interval, Place, Rate, cell_place, level_label, setting_of
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.assembly import Arc, ArcResiduals, Graph, Node
-from apo_bench.io.figures import default_looks
+from apo_bench.io import default_looks
 from apo_bench.show.graph.layout import GraphLayout, layout_graph
 
 _INK = "#222222"

@@ -3,7 +3,7 @@
 from typing import Any
 
 from apo_bench.assembly import ArcResiduals, Graph, Node, spelled
-from apo_bench.io.words import columns
+from apo_bench.io import columns
 
 _GRAPH = "apo-bench/graph/1"
 

@@ -273,7 +273,6 @@ def wrong_value(tag: str, key: str, text: str) -> str:
     if key not in RANGES:
         return "" if len(text) <= 500 and text.isprintable() else "500 letters are the most"
     low, high = RANGES[key]
-    words = text.split()
-    if all(_NUMBER.fullmatch(word) and low <= float(word) <= high for word in words):
+    if all(_NUMBER.fullmatch(word) and low <= float(word) <= high for word in text.split()):
         return ""
     return f"numbers of {low:g} to {high:g} are allowed"

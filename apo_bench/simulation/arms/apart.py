@@ -9,8 +9,7 @@ from contextlib import suppress
 from typing import Any
 
 from apo_bench.errors import InputError
-from apo_bench.simulation.arms.arm import Arm
-from apo_bench.simulation.arms.description import ArmDescription
+from apo_bench.simulation.arms.arm import Arm, ArmDescription
 
 _START = "import sys; sys.path[:] = sys.argv[1:]; from apo_bench.simulation.arms.apart import run_child; run_child()"
 _LIMIT_S = 60

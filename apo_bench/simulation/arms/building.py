@@ -9,20 +9,17 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, pose
 from apo_bench.resources import folder
 from apo_bench.simulation.arms.apart import build_apart
-from apo_bench.simulation.arms.arm import Arm, ArmLimits
+from apo_bench.simulation.arms.arm import Arm, ArmDescription, ArmLimits, GripperDescription, read_description
 from apo_bench.simulation.arms.chain import find_flange, find_joints
-from apo_bench.simulation.arms.description import ArmDescription, GripperDescription, read_description
-from apo_bench.simulation.arms.home import with_home
-from apo_bench.simulation.arms.loading import check_surroundings, compiled, files_of, load_model
-from apo_bench.simulation.arms.measuring import Measured, measure
-from apo_bench.simulation.arms.pads import fill_grooves
+from apo_bench.simulation.arms.kinematics import with_home
+from apo_bench.simulation.arms.loading import check_surroundings, compiled, files_of, load_model, stated_arm
+from apo_bench.simulation.arms.measuring import Measured, fill_grooves, measure
 from apo_bench.simulation.arms.pressing import PROBE
 from apo_bench.simulation.arms.servo import Drive, add_servos, drives_of, felt_inertia, is_soft
-from apo_bench.simulation.arms.stated import stated_arm
 from apo_bench.simulation.arms.strength import with_force
 
 _TIP = "tip"
@@ -89,8 +86,10 @@ def build_arm(description: ArmDescription) -> Arm:
     drives = drives_of(whole, joints)
     home = _usual_home(model, joints) if description.home is None else description.home
     rig = _measuring_model(spec, mjcf)
-    if len(home) != len(joints):
-        raise InputError(f"{description.file}: 'home_deg' has {len(home)} numbers; the arm has {len(joints)} joints.")
+    require(
+        len(home) == len(joints),
+        f"{description.file}: 'home_deg' has {len(home)} numbers; the arm has {len(joints)} joints.",
+    )
     gripper = _with_names_as_mounted(rig, description.gripper)
     where = gripper.mjcf or mjcf
     flange = rig.body(last).id

@@ -5,9 +5,9 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import InputError, require, unknown
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.arms.description import ArmDescription
+from apo_bench.simulation.arms.arm import ArmDescription
 from apo_bench.simulation.arms.rig import geom_reach
 from apo_bench.simulation.frames import frame, rotation
 
@@ -41,10 +41,8 @@ def find_flange(model: Any, description: ArmDescription) -> tuple[int, Array]:
 
 def _last_link(model: Any, description: ArmDescription) -> int:
     """The body of the last joint that is named, or of the last hinge from which the model branches."""
-    if description.joints is not None:
-        known = [model.joint(j).name for j in range(model.njnt)]
-        if description.joints[-1] in known:
-            return int(model.jnt_bodyid[model.joint(description.joints[-1]).id])
+    if description.joints is not None and description.joints[-1] in [model.joint(j).name for j in range(model.njnt)]:
+        return int(model.jnt_bodyid[model.joint(description.joints[-1]).id])
     body = 0
     while True:
         moving = [b for b in range(1, model.nbody) if int(model.body_parentid[b]) == body and _moves(model, b)]
@@ -53,8 +51,7 @@ def _last_link(model: Any, description: ArmDescription) -> int:
         body = moving[0]
     while body and (not model.body_jntnum[body] or (not moving and _is_jaw(model, body))):
         body = int(model.body_parentid[body])
-    if not body:
-        raise InputError(f"{description.mjcf}: the arm has no joints; give the MJCF file of an arm.")
+    require(body, f"{description.mjcf}: the arm has no joints; give the MJCF file of an arm.")
     return body
 
 
@@ -96,20 +93,20 @@ def find_joints(model: Any, flange: int, description: ArmDescription) -> list[st
         body = int(model.body_parentid[body])
     names = [model.joint(j).name for j in chain]
     for j, name in zip(chain, names, strict=True):
-        if int(model.jnt_type[j]) != int(mujoco.mjtJoint.mjJNT_HINGE):
-            raise InputError(
-                f"{description.mjcf}: the joint '{name}' of the arm is no hinge; arms of hinges can be used."
-            )
-    if description.joints is not None:
-        if sorted(description.joints) != sorted(names):
-            raise InputError(
-                f"{description.file}: 'joints' are {', '.join(description.joints)}; between base and flange lie "
-                f"{', '.join(names) or 'none'}."
-            )
-        names = [name for name in names if name in description.joints]
-    if not _LEAST_JOINTS <= len(names) <= _MOST_JOINTS:
-        raise InputError(
-            f"{description.mjcf}: {len(names)} hinges lie between base and flange ({', '.join(names) or 'none'}); "
-            f"{_LEAST_JOINTS} to {_MOST_JOINTS} are needed, so check 'flange'."
+        require(
+            int(model.jnt_type[j]) == int(mujoco.mjtJoint.mjJNT_HINGE),
+            f"{description.mjcf}: the joint '{name}' of the arm is no hinge; arms of hinges can be used.",
         )
+    if description.joints is not None:
+        require(
+            sorted(description.joints) == sorted(names),
+            f"{description.file}: 'joints' are {', '.join(description.joints)}; between base and flange lie "
+            f"{', '.join(names) or 'none'}.",
+        )
+        names = [name for name in names if name in description.joints]
+    require(
+        _LEAST_JOINTS <= len(names) <= _MOST_JOINTS,
+        f"{description.mjcf}: {len(names)} hinges lie between base and flange ({', '.join(names) or 'none'}); "
+        f"{_LEAST_JOINTS} to {_MOST_JOINTS} are needed, so check 'flange'.",
+    )
     return names

@@ -9,13 +9,12 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import MappingProxyType
 
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import InputError, require, require_known, unknown
 from apo_bench.names import resolve
 from apo_bench.records import FOREIGN_ARMS
 from apo_bench.resources import folder
-from apo_bench.simulation.arms.arm import Arm
+from apo_bench.simulation.arms.arm import Arm, ArmDescription, GripperDescription
 from apo_bench.simulation.arms.building import read_arm, read_described
-from apo_bench.simulation.arms.description import ArmDescription, GripperDescription
 from apo_bench.simulation.arms.tree import read_model_tree
 
 _MENAGERIE = "APO_BENCH_MENAGERIE"
@@ -68,8 +67,10 @@ def find_arm(name: str | Arm) -> Arm:
             raise InputError(
                 f"the arm '{name}' failed: it raised {error!r}; give a function without arguments."
             ) from error
-        if not isinstance(arm, Arm):
-            raise InputError(f"the arm '{name}' is a {type(arm).__name__}; an `Arm`, or a function that returns one.")
+        require(
+            isinstance(arm, Arm),
+            f"the arm '{name}' is a {type(arm).__name__}; an `Arm`, or a function that returns one.",
+        )
         return arm
     raise InputError(
         f"{unknown('arm', name, _NAMES)} Or give your own as FILE.toml, menagerie:NAME, robosuite:NAME, or "
@@ -84,18 +85,15 @@ def _of_menagerie(name: str) -> ArmDescription:
             f"menagerie:{name}: MuJoCo Menagerie was not found; fetch it with 'git clone --depth 1 "
             f"https://github.com/google-deepmind/mujoco_menagerie' and name its folder in {_MENAGERIE}."
         )
-    known = [each.name for each in sorted(root.iterdir()) if any(each.glob("*.xml"))]
-    if name not in known:
-        raise InputError(f"{root}: {unknown('arm', name, known)}")
+    require_known("arm", name, [each.name for each in sorted(root.iterdir()) if any(each.glob("*.xml"))], place=root)
     plain = name.replace("_", "").lower()
     files = [f for f in sorted((root / name).glob("*.xml")) if plain.endswith(f.stem.replace("_", "").lower())]
-    if not files:
-        raise InputError(
-            f"{root / name}: which of its files is the arm is not known; state it as 'mjcf' in an arm file."
-        )
+    require(files, f"{root / name}: which of its files is the arm is not known; state it as 'mjcf' in an arm file.")
     gripper = None if _has_fingers(files[0]) else root / _2F85
-    if gripper is not None and not gripper.is_file():
-        raise InputError(f"{root}: the arm '{name}' has no gripper, and {_2F85} is not there; fetch all of it.")
+    require(
+        gripper is None or gripper.is_file(),
+        f"{root}: the arm '{name}' has no gripper, and {_2F85} is not there; fetch all of it.",
+    )
     return ArmDescription(file=files[0], mjcf=files[0], gripper=GripperDescription(mjcf=gripper))
 
 

@@ -1,4 +1,7 @@
-"""MJCF files of arms and grippers, read by MuJoCo and stripped of what a scene has of its own."""
+"""MJCF files of arms and grippers, read by MuJoCo and stripped of what a scene has of its own.
+
+From a description that states its gripper to an `Arm`: the model is used as it is.
+"""
 
 from pathlib import Path
 from typing import Any
@@ -6,8 +9,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from apo_bench.errors import InputError, one_line
+from apo_bench.errors import InputError, one_line, require, require_known
+from apo_bench.geometry import pose
 from apo_bench.simulation.arms.allowed import MOST_MESH_BYTES
+from apo_bench.simulation.arms.arm import Arm, ArmDescription, ArmLimits, SlideGripper
 from apo_bench.simulation.arms.tree import checked_size, read_model_tree
 
 _LONGEST = 200
@@ -67,23 +72,23 @@ def files_of(path: Path) -> tuple[Path, ...]:
 def _check_world(spec: Any, path: Path, kind: str) -> None:
     """One thing, of hinges and slides, that nothing ties to the world."""
     for joint in spec.joints:
-        if joint.type not in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE):
-            raise InputError(
-                f"{path}: the joint '{joint.name}' of the {kind} neither turns nor slides; arms have hinges, and "
-                "grippers hinges and slides."
-            )
-    moving = [body.name for body in spec.worldbody.bodies if body.find_all("joint")]
-    if len(moving) > 1:
-        raise InputError(
-            f"{path}: the {kind} has {len(moving)} bodies that move on their own ({', '.join(moving[:4])}); give one."
+        require(
+            joint.type in (mujoco.mjtJoint.mjJNT_HINGE, mujoco.mjtJoint.mjJNT_SLIDE),
+            f"{path}: the joint '{joint.name}' of the {kind} neither turns nor slides; arms have hinges, and "
+            "grippers hinges and slides.",
         )
+    moving = [body.name for body in spec.worldbody.bodies if body.find_all("joint")]
+    require(
+        len(moving) <= 1,
+        f"{path}: the {kind} has {len(moving)} bodies that move on their own ({', '.join(moving[:4])}); give one.",
+    )
     for equality in spec.equalities:
         holds = equality.type in (mujoco.mjtEq.mjEQ_WELD, mujoco.mjtEq.mjEQ_CONNECT)
         bodies = {equality.name1, equality.name2} if equality.objtype == mujoco.mjtObj.mjOBJ_BODY else set()
-        if holds and bodies & {"", "world"}:
-            raise InputError(
-                f"{path}: the equality '{equality.name}' ties something to the world; remove it, the arm moves."
-            )
+        require(
+            not holds or not bodies & {"", "world"},
+            f"{path}: the equality '{equality.name}' ties something to the world; remove it, the arm moves.",
+        )
 
 
 def check_surroundings(model: Any, path: Path) -> None:
@@ -117,17 +122,66 @@ def _keep_meshes(spec: Any, path: Path, kind: str) -> None:
             spec.delete(mesh)
         elif mesh.file:
             file = Path(mesh.file)
-            if not file.is_file():
-                raise InputError(
-                    f"{path}: the mesh file {one_line(str(file), _LONGEST)} of the {kind} is missing; bring it there."
-                )
+            require(
+                file.is_file(),
+                f"{path}: the mesh file {one_line(str(file), _LONGEST)} of the {kind} is missing; bring it there.",
+            )
             size += checked_size(file, kind)
-    if size > MOST_MESH_BYTES:
-        raise InputError(
-            f"{path}: the meshes that touch something have {size / 1e6:.0f} MB; {MOST_MESH_BYTES / 1e6:g} are the most."
-        )
+    require(
+        size <= MOST_MESH_BYTES,
+        f"{path}: the meshes that touch something have {size / 1e6:.0f} MB; {MOST_MESH_BYTES / 1e6:g} are the most.",
+    )
 
 
 def _reason(error: Exception) -> str:
     """What MuJoCo says, in one line."""
     return one_line(" ".join(str(error).split()).rstrip("."), _LONGEST)
+
+
+def stated_arm(description: ArmDescription, slides: SlideGripper, model: Any, joints: list[str], flange: str) -> Arm:
+    """The arm of a file whose gripper is stated.
+
+    Args:
+        model: As its MJCF file says it, compiled.
+        joints: The hinges between base and flange.
+        flange: The body at the end of the arm.
+
+    Raises:
+        InputError: Its model has not what the file names, or something is not stated that nothing else tells.
+    """
+    file = description.file
+    if description.home is None or len(description.home) != len(joints):
+        raise InputError(f"{file}: 'home_deg' needs {len(joints)} numbers, one for each joint of the arm.")
+    require(
+        description.torque_nm is None, f"{file}: 'torque_nm' is for an arm whose gripper is measured; leave it out."
+    )
+    (grip, *more) = description.gripper.actuators or ("",)
+    require(not more, f"{file}, gripper: one of 'actuators' drives all 'slides'; {1 + len(more)} were given.")
+    require_known("site", slides.tip, [model.site(i).name for i in range(model.nsite)], place=file)
+    sliding = [
+        model.joint(j).name for j in range(model.njnt) if int(model.jnt_type[j]) == int(mujoco.mjtJoint.mjJNT_SLIDE)
+    ]
+    for name in slides.joints:
+        require_known("slide", name, sliding, place=file)
+    actuators = [model.actuator(i).name for i in range(model.nu)]
+    for name in (*joints, grip):
+        require_known("actuator", name, actuators, place=file)
+    return Arm(
+        mjcf=file,
+        base=tuple(description.base[:3, 3].tolist()),
+        turn=tuple(pose.pack(description.base)[3:].tolist()),
+        joints=tuple(joints),
+        tip=slides.tip,
+        fingers=slides.joints,
+        grip=grip,
+        mount=flange,
+        home=description.home,
+        opening_m=slides.opening_m,
+        model=read_model_tree(description.mjcf, "arm").text,
+        limits=ArmLimits(
+            payload_kg=description.payload_kg,
+            speed_rad_s=description.of_each_joint("speed_deg_s", description.speed_rad_s, len(joints)),
+            fingers_m_s=description.gripper.speed_m_s or ArmLimits.fingers_m_s,
+        ),
+        files=tuple(dict.fromkeys((file, *files_of(description.mjcf)))),
+    )

@@ -11,9 +11,9 @@ from typing import Any, NamedTuple
 import mujoco
 import numpy as np
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, Ints
-from apo_bench.simulation.arms.description import GripperDescription
+from apo_bench.simulation.arms.arm import GripperDescription
 from apo_bench.simulation.physics import physics
 
 STEP_S = 0.001
@@ -60,8 +60,10 @@ class Rig(NamedTuple):
             data.qpos[self.arm] = self.home
             data.qvel[self.arm_dof] = 0.0
             quiet = quiet + 1 if np.abs(data.qvel[dof]).max() < _STILL else 0
-        if not np.isfinite(data.qpos).all() or data.warning.number.any():
-            raise InputError(f"{self.path}: the gripper is unstable when it is driven; mend its actuators or masses.")
+        require(
+            np.isfinite(data.qpos).all() and not data.warning.number.any(),
+            f"{self.path}: the gripper is unstable when it is driven; mend its actuators or masses.",
+        )
         mujoco.mj_kinematics(model, data)
         return STEP_S * steps
 
@@ -122,21 +124,21 @@ def _actuators(model: Any, data: Any, path: Path, own: Sequence[int], gripper: G
         )
     pushes = np.abs(moment[:, [int(model.jnt_dofadr[j]) for j in own]]).max(axis=1, initial=0.0) > 0.0
     pushing: Ints = np.flatnonzero(pushes)
-    if not 0 < len(pushing) <= _MOST_ACTUATORS:
-        raise InputError(
-            f"{path}: {len(pushing)} actuators move the gripper; name the 1 to {_MOST_ACTUATORS} that open it in "
-            "'gripper', 'actuators'."
-        )
+    require(
+        0 < len(pushing) <= _MOST_ACTUATORS,
+        f"{path}: {len(pushing)} actuators move the gripper; name the 1 to {_MOST_ACTUATORS} that open it in "
+        "'gripper', 'actuators'.",
+    )
     return pushing
 
 
 def command_ends(rig: Rig, gripper: GripperDescription) -> list[tuple[float, ...]]:
     """Every combination of the ends of the commands."""
     for command in (gripper.open, gripper.closed):
-        if command is not None and len(command) != len(rig.actuators):
-            raise InputError(
-                f"{rig.path}, gripper: 'open' and 'closed' have one number for each of {len(rig.actuators)} actuators."
-            )
+        require(
+            command is None or len(command) == len(rig.actuators),
+            f"{rig.path}, gripper: 'open' and 'closed' have one number for each of {len(rig.actuators)} actuators.",
+        )
     if gripper.open is not None and gripper.closed is not None:
         return [tuple(gripper.open), tuple(gripper.closed)]
     model = rig.model
@@ -176,34 +178,33 @@ def pads_of(
         called = {g: (model.geom(g).name, model.body(int(model.geom_bodyid[g])).name) for g in touching}
         named = [[g for g in touching if name in called[g]] for name in gripper.pads]
         for name, geoms in zip(gripper.pads, named, strict=True):
-            if not geoms:
-                raise InputError(f"{rig.path}, gripper: nothing that could touch a part is called '{name}'.")
+            require(geoms, f"{rig.path}, gripper: nothing that could touch a part is called '{name}'.")
         moving = named[0] + named[1]
-    if len(moving) < 2:
-        raise InputError(
-            f"{rig.path}: nothing of the gripper moves between its ends of command; state 'open' and 'closed'."
-        )
+    require(
+        len(moving) >= 2,
+        f"{rig.path}: nothing of the gripper moves between its ends of command; state 'open' and 'closed'.",
+    )
     # The direction in which the motions of all shapes are largest in the mean square: the first right singular vector.
     across = np.linalg.svd(way[moving], full_matrices=False)[2][0]
     first = [g for g in moving if way[g] @ across > 0.3 * np.linalg.norm(way[g])]
     second = [g for g in moving if way[g] @ across < -0.3 * np.linalg.norm(way[g])]
     if gripper.pads is not None:
         first, second = named
-    if not first or not second:
-        raise InputError(f"{rig.path}: the fingers do not close on each other; name both 'pads' in 'gripper'.")
+    require(first and second, f"{rig.path}: the fingers do not close on each other; name both 'pads' in 'gripper'.")
     R_flange = data.xmat[flange].reshape(3, 3)
     across = _snapped(across, R_flange, _SNAP)
     middle = np.mean([data.geom_xpos[g] for g in first + second], axis=0) - data.xpos[flange]
     ahead = middle - (middle @ across) * across
-    if np.linalg.norm(ahead) < 1e-3:
-        raise InputError(f"{rig.path}: the fingers do not reach ahead of the flange; check 'mount' in 'gripper'.")
+    require(
+        np.linalg.norm(ahead) >= 1e-3,
+        f"{rig.path}: the fingers do not reach ahead of the flange; check 'mount' in 'gripper'.",
+    )
     ahead = _snapped(ahead / np.linalg.norm(ahead), R_flange, _SNAP_AHEAD)
     if gripper.pads is None:
         most = max(geom_reach(model, data, g, ahead) for g in first + second)
         first = [g for g in first if geom_reach(model, data, g, ahead) > most - _TIP_M]
         second = [g for g in second if geom_reach(model, data, g, ahead) > most - _TIP_M]
-    if not first or not second:
-        raise InputError(f"{rig.path}: one finger is longer than the other; name both 'pads' in 'gripper'.")
+    require(first and second, f"{rig.path}: one finger is longer than the other; name both 'pads' in 'gripper'.")
     return (first, second), across, ahead
 
 

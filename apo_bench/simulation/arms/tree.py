@@ -9,8 +9,8 @@ from typing import NamedTuple, NoReturn, final
 from xml.etree.ElementTree import Element, TreeBuilder, tostring
 from xml.parsers import expat
 
-from apo_bench.errors import InputError, one_line
-from apo_bench.io.ordinary_files import opened, read_bytes
+from apo_bench.errors import InputError, one_line, require
+from apo_bench.io import opened, read_bytes
 from apo_bench.simulation.arms.allowed import (
     ARM_REMEDIES,
     ATTRIBUTES,
@@ -59,8 +59,7 @@ def read_model_tree(path: Path, kind: str) -> ModelTree:
     """
     reading = _Reading(path, kind)
     root = reading.tree(path, 0)
-    meshes = _meshes(root, path, kind)
-    return ModelTree(root, (*reading.files, *meshes))
+    return ModelTree(root, (*reading.files, *_meshes(root, path, kind)))
 
 
 @final
@@ -75,10 +74,14 @@ class _Reading:
 
     def tree(self, path: Path, deep: int) -> Element:
         """A file, with what it includes in the places of that."""
-        if len(self.files) >= MOST_FILES or deep > MOST_NESTED:
-            raise InputError(f"{self.main}: more than {MOST_FILES} files are included; write them into fewer.")
-        if any(path.exists() and path.samefile(each) for each in self.files):
-            raise InputError(f"{path}: the file is included twice; include it once.")
+        require(
+            len(self.files) < MOST_FILES and deep <= MOST_NESTED,
+            f"{self.main}: more than {MOST_FILES} files are included; write them into fewer.",
+        )
+        require(
+            not any(path.exists() and path.samefile(each) for each in self.files),
+            f"{path}: the file is included twice; include it once.",
+        )
         self.files.append(path)
         raw = read_bytes(path, f"MJCF file of the {self.kind}", LARGEST_MJCF_BYTES)
         reader = _Parser(path, self)
@@ -103,8 +106,10 @@ class _Reading:
                 self._include(child, path, deep)
                 inside.append(child)
                 continue
-            if set(child.attrib) != {"file"} or len(child):
-                raise InputError(f"{path}: an <include> has a file= and nothing else; mend it.")
+            require(
+                set(child.attrib) == {"file"} and not len(child),
+                f"{path}: an <include> has a file= and nothing else; mend it.",
+            )
             beside = (self.main.parent / child.attrib["file"], path.parent / child.attrib["file"])
             there = next((each for each in beside if each.exists()), beside[0])
             inside.extend(self.tree(there, deep + 1))
@@ -134,11 +139,14 @@ class _Parser:
         if counts[""] > MOST_ELEMENTS or counts[tag] > MOST_OF.get(tag, MOST_ELEMENTS):
             most = MOST_OF.get(tag, MOST_ELEMENTS)
             raise InputError(f"{where}: there are more than {most:,} <{tag[:60]}>, the most that an arm may have.")
-        if self._deep > MOST_NESTED:
-            raise InputError(f"{where}: elements stand in each other {MOST_NESTED} deep; that is the most.")
+        require(
+            self._deep <= MOST_NESTED, f"{where}: elements stand in each other {MOST_NESTED} deep; that is the most."
+        )
         for key, text in attributes.items():
-            if len(text) > LONGEST_VALUE:
-                raise InputError(f"{where}: {key[:60]}= has more than {LONGEST_VALUE:,} letters, which is the most.")
+            require(
+                len(text) <= LONGEST_VALUE,
+                f"{where}: {key[:60]}= has more than {LONGEST_VALUE:,} letters, which is the most.",
+            )
         self.builder.start(tag, attributes)
 
     def _end(self, tag: str) -> None:
@@ -153,8 +161,10 @@ def _check_element(path: Path, element: Element, outer: Element | None) -> None:
     """Refuse what may not be said, and take out what a scene has of its own."""
     tag = element.tag
     around = "" if outer is None else outer.tag
-    if outer is None and tag != "mujoco":
-        raise InputError(f"{path}: the outermost element is <{tag[:60]}>; an MJCF file begins with <mujoco>.")
+    require(
+        outer is not None or tag == "mujoco",
+        f"{path}: the outermost element is <{tag[:60]}>; an MJCF file begins with <mujoco>.",
+    )
     allowed = WRAPPED.get((around, tag), ATTRIBUTES[tag])
     element.attrib.pop("material", None)
     if tag == "default":
@@ -228,8 +238,10 @@ def checked_size(file: Path, kind: str) -> int:
     """
     with opened(file, f"mesh of the {kind}") as mesh:
         size = mesh.seek(0, 2)
-    if size > LARGEST_MESH_BYTES:
-        raise InputError(f"{file}: the mesh has {size / 1e6:.0f} MB; {LARGEST_MESH_BYTES / 1e6:g} are the most.")
+    require(
+        size <= LARGEST_MESH_BYTES,
+        f"{file}: the mesh has {size / 1e6:.0f} MB; {LARGEST_MESH_BYTES / 1e6:g} are the most.",
+    )
     return size
 
 

@@ -3,23 +3,125 @@
 Leaned towards the wall it touches with the place of its side that is as high as the upper edge of the wall. Two places,
 one low and one high, tell where the part lies along the pads, and how it is turned about their normal: a small round
 part stands on feet that are too near to each other to tell its tilt.
+
+Where a part that is held can be laid flat on what is fixed, before it is inserted level.
+
+Laid flush, its height and its two tilts in the hand are known (a plane on a plane, Eq. 1 of the paper), which a level
+insertion needs and pads that only centre across cannot give.
 """
 
 from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
+from shapely import MultiPoint
 
 from apo_bench.assembly import Assembly, Poses
-from apo_bench.geometry import Array, Face, extent, intrusion_depths, pose
+from apo_bench.geometry import Array, Face, all_corners, extent, intrusion_depths, own_shape, plane_frame, pose
 from apo_bench.insertion.macros import UP
-from apo_bench.simulation.execution.flush import LEVEL
-from apo_bench.simulation.execution.grasping import gripper_depth, obstacles
-from apo_bench.simulation.execution.transfer import Transfer
+from apo_bench.simulation.execution.grasping import gripper_depth, obstacles, upwards
+from apo_bench.simulation.execution.transfer import Transfer, first_contact_pose
 from apo_bench.simulation.frames import frame
-from apo_bench.simulation.robot.obstacles import Obstacle
-from apo_bench.simulation.robot.paths import turn_from, with_height
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.robot import Obstacle, shifted, turn_from, with_height
+from apo_bench.simulation.scene import Scene
+
+LEVEL = float(np.cos(np.radians(10.0)))
+"""A face that looks up by less than ten degrees off is one to lie on."""
+_LOWEST_M = 1e-4
+"""Corners this near to the lowest one lie on the floor."""
+_LIFT_M = 0.01
+"""What stood is lifted so far before it is laid down again."""
+_LIFT_ROOM_M = 0.002
+_LIFT_STEP_M = 0.003
+"""On the way down everything else stays this far away; it is looked at this often."""
+
+
+class Flush(NamedTuple):
+    """A part laid flat."""
+
+    T: Array
+    """Its pose, (4, 4), world."""
+    normal: Array
+    """Of the floor, upwards, (3,), world."""
+    feet: Array
+    """Corners of the part on which it lies, (k, 3), in its own frame, [m]: at most four, far apart."""
+
+
+def before_insertion(t: Transfer) -> Array:
+    """Where a part is when its last motion begins, (4, 4), world."""
+    before = shifted(first_contact_pose(t), t.into.way, -t.begins)
+    return shifted(before, UP, t.floats) if t.into.level else before
+
+
+def flush_pose(assembly: Assembly, scene: Scene, t: Transfer, believed: Poses) -> Flush | None:
+    """The part flat on a fixed face straight below where a level insertion begins; before one from above, where it
+    stood. None where it cannot.
+
+    Args:
+        believed: Where all parts are before the transfer.
+    """
+    T = before_insertion(t) if t.into.level else shifted(t.T_world_start, UP, _LIFT_M)
+    up = upwards(T)
+    lying = [
+        each
+        for part in assembly.fixed
+        for face in assembly.solids[part].faces.values()
+        if believed[part][2, :3] @ face.normal > LEVEL
+        for each in [_on(scene, t.part, T, up, face, believed[part])]
+        if each is not None and each.T[2, 3] < T[2, 3]
+    ]
+    if not lying:
+        return None
+    highest = max(lying, key=lambda each: float(each.T[2, 3]))
+    flush = highest.T
+    far = float(T[2, 3] - flush[2, 3])
+    lifts = np.linspace(far, 0.0, max(2, round(far / _LIFT_STEP_M)))[:, None] * UP
+    others = obstacles(assembly.solids, believed, (t.part, *assembly.fixed))
+    fixed = obstacles(assembly.solids, believed, (t.part, *(set(assembly.solids) - assembly.fixed)))
+    R = flush[:3, :3]
+    pieces = scene.pieces[t.part]
+    for each in others:
+        if intrusion_depths(pieces, R, flush[:3, 3] + lifts, each.pieces, each.T, _LIFT_ROOM_M).max() > -_LIFT_ROOM_M:
+            return None
+    for each in fixed:  # down to the floor itself, which it shall touch
+        if intrusion_depths(pieces, R, flush[:3, 3] + lifts + _LOWEST_M * UP, each.pieces, each.T, 0.0).max() > 0.0:
+            return None
+    tip = flush @ t.grips[0].T_part_tip
+    width = t.grips[0].half_width
+    if gripper_depth(scene, width, tip[:3, :3], tip[:3, 3] + lifts, (*others, *fixed), 0.0).max() > 0.0:
+        return None
+    return highest
+
+
+def _on(scene: Scene, part: str, T: Array, up: Array, floor: Face, T_floor: Array) -> Flush | None:
+    """The part above a face put down flat on it, if all that lies on it is inside of its outline."""
+    n = T_floor[:3, :3] @ floor.normal
+    axis = np.cross(T[:3, :3] @ up, n)
+    sine = float(np.linalg.norm(axis))
+    flat = np.array(T)
+    if sine > 0.0:
+        flat[:3, :3] = pose.exp(np.append(np.zeros(3), np.arcsin(sine) / sine * axis))[:3, :3] @ T[:3, :3]
+    origin = T_floor @ plane_frame(floor)
+    height = float(n @ (flat[:3, 3] - origin[:3, 3])) + extent(scene.pieces[part], flat[:3, :3].T @ n)[0]
+    flat[:3, 3] -= height / float(n @ UP) * UP
+    corners = all_corners(scene.pieces[part])[0]
+    heights = corners @ (flat[:3, :3].T @ n)
+    feet = corners[heights < heights.min() + _LOWEST_M]
+    on_floor = pose.apply(pose.inverse(origin) @ flat, feet)[:, :2]
+    if not own_shape(floor).covers(MultiPoint(on_floor).convex_hull):
+        return None
+    return Flush(flat, n, feet[_far_apart(on_floor)])
+
+
+def _far_apart(points: Array) -> list[int]:
+    """Which of points in a plane, (k, 2), are the ends of the longest way and the ends across it; each once."""
+    ahead = points - points.mean(axis=0)
+    first = int(np.argmax((ahead * ahead).sum(axis=1)))
+    along = ahead @ ahead[first]
+    across = ahead @ np.array([-ahead[first][1], ahead[first][0]])
+    ends = (first, int(np.argmin(along)), int(np.argmin(across)), int(np.argmax(across)))
+    return sorted(set(ends))
+
 
 LEAN_RAD = float(np.radians(3.0))
 """More than a part that was laid down is still turned in the hand."""

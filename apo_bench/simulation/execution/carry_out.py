@@ -15,9 +15,7 @@ from apo_bench.insertion.macros import UP
 from apo_bench.simulation.execution.fingers import centre, change_grip, check_hold, depart, grasp, grasp_again, release
 from apo_bench.simulation.execution.search import after_search, press_in
 from apo_bench.simulation.execution.transfer import ASIDE_M, Grip, Transfer, first_contact_pose
-from apo_bench.simulation.robot.forces import Guard
-from apo_bench.simulation.robot.paths import Trajectory, paced, shifted, smooth, steady, with_height
-from apo_bench.simulation.robot.robot import Halt, Robot
+from apo_bench.simulation.robot import Guard, Halt, Robot, Trajectory, paced, shifted, smooth, steady, with_height
 
 _LIFT = (0.4, 0.25)
 _CARRY = (0.5, 0.35)

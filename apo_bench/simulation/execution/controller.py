@@ -12,17 +12,13 @@ from apo_bench.prediction.stability import first_unstable
 from apo_bench.records import sentence, touching_sentence
 from apo_bench.simulation.execution.carry_out import bring, take
 from apo_bench.simulation.execution.feel.feeling import Feeling, Feels
-from apo_bench.simulation.execution.feel.laying import lay as lay_down
 from apo_bench.simulation.execution.feel.touching import find_out
+from apo_bench.simulation.execution.feel.touching import lay as lay_down
 from apo_bench.simulation.execution.prepare import Move, key_angles, moves
 from apo_bench.simulation.execution.replay_cache import Progress, ReplayCache, cache_keys
 from apo_bench.simulation.hooks import Hooks, hooks_of
-from apo_bench.simulation.robot.in_hand import HoldWatch
-from apo_bench.simulation.robot.robot import Halt, Robot
-from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.scene.apart import left_out
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import sleeping, snapshot
+from apo_bench.simulation.robot import Halt, HoldWatch, Robot, RobotError
+from apo_bench.simulation.scene import Scene, left_out, sleeping, snapshot
 
 _SETTLE_S = 0.5
 """At the end, everything is left alone this long."""

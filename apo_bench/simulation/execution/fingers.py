@@ -2,10 +2,7 @@
 
 from apo_bench.geometry import Array
 from apo_bench.simulation.execution.transfer import Grip, Transfer, hover, is_tilted
-from apo_bench.simulation.robot.in_hand import weld
-from apo_bench.simulation.robot.paths import shifted, smooth, with_height
-from apo_bench.simulation.robot.reach import led_there, way_there
-from apo_bench.simulation.robot.robot import Halt, Robot
+from apo_bench.simulation.robot import Halt, Robot, led_there, shifted, smooth, way_there, weld, with_height
 
 _FREE = 2.0
 _NEAR = 0.8
@@ -26,9 +23,8 @@ def grasp(robot: Robot, t: Transfer, grip: Grip, at: Array) -> None:
     robot.follow(smooth(robot.T, with_height(robot.T, max(robot.T[2, 3], least)), _NEAR))
     level = with_height(above, robot.T[2, 3])
     # A short arm does not reach as far out as here where it waits, or has passed over other parts.
-    kinematics = robot.scene.kinematics
-    way = way_there(kinematics, robot.arm, robot.T, level, robot.q)
-    is_far = robot.arm.hand is not None and led_there(kinematics, robot.T, way, robot.q) is None
+    way = way_there(robot.scene.kinematics, robot.arm, robot.T, level, robot.q)
+    is_far = robot.arm.hand is not None and led_there(robot.scene.kinematics, robot.T, way, robot.q) is None
     robot.go(with_height(above, least) if is_far else level, _FREE, turn_speed=4.5)
     robot.forces.handle(t.part)
     robot.fingers(min(grip.half_width + OPEN_TO_PICK_M, robot.arm.opening_m))

@@ -23,10 +23,8 @@ from apo_bench.geometry import (
 )
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.frames import frame
-from apo_bench.simulation.robot.gripper import HasGripper, gripper_boxes
-from apo_bench.simulation.robot.obstacles import Obstacle, obstacle
-from apo_bench.simulation.robot.paths import shifted
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.robot import HasGripper, Obstacle, gripper_boxes, obstacle, shifted
+from apo_bench.simulation.scene import Scene
 
 _STAND_OFF_M = 0.012
 """How far each finger stands off the part before it closes or after it has let go."""

@@ -19,8 +19,8 @@ from apo_bench.simulation.execution.grasping import (
     tip_frame,
 )
 from apo_bench.simulation.execution.transfer import ApproachLine, Grip, Motion
-from apo_bench.simulation.robot.paths import turn_from
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.robot import turn_from
+from apo_bench.simulation.scene import Scene
 
 _WRIST_ENDS = 2.5
 """A hand that looks down is turned by no more than this from its rest where there is another way, [rad]."""
@@ -35,9 +35,8 @@ def transfer_grips(
         believed: Where all parts are before the transfer.
         after: Where all parts are after it.
     """
-    solids = scene.scenario.assembly.solids
-    start = RestingPart(believed[part], obstacles(solids, believed, (part,)))
-    goal = RestingPart(after[part], obstacles(solids, after, (part,)))
+    start = RestingPart(believed[part], obstacles(scene.scenario.assembly.solids, believed, (part,)))
+    goal = RestingPart(after[part], obstacles(scene.scenario.assembly.solids, after, (part,)))
     if into.level:
         stroke = Stroke(goal.T, into.way, into.travel, goal.around)
         grips = grips_along(scene, part, preferred, (start,), stroke)

@@ -20,8 +20,7 @@ from apo_bench.insertion.surroundings import (
 )
 from apo_bench.scenario.layout import nominal_operations
 from apo_bench.simulation.arms.arm import Arm
-from apo_bench.simulation.execution.beside import beside_places
-from apo_bench.simulation.execution.flush import flush_pose
+from apo_bench.simulation.execution.beside import beside_places, flush_pose
 from apo_bench.simulation.execution.grips import centring_grips, squaring_grips, transfer_grips
 from apo_bench.simulation.execution.transfer import (
     PUT_DOWN,
@@ -35,9 +34,8 @@ from apo_bench.simulation.execution.transfer import (
     key_poses,
     motions,
 )
-from apo_bench.simulation.robot.paths import Trajectory
-from apo_bench.simulation.robot.reach import at_end, led_there, way_there
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.robot import Trajectory, at_end, led_there, way_there
+from apo_bench.simulation.scene import Scene
 
 _GRAVITY = 9.81
 _PLACE_WEIGHTS = 6.0

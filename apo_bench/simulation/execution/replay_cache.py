@@ -14,8 +14,8 @@ import numpy as np
 from apo_bench.assembly import Poses, ReplayResult, Snapshot, Step
 from apo_bench.geometry import Array
 from apo_bench.simulation.execution.transfer import Transfer
-from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.scene.world import awaken
+from apo_bench.simulation.robot import Robot
+from apo_bench.simulation.scene import awaken
 
 _MOST = 4096
 """States, and results, that are kept, 5 kB each; the oldest go first."""

@@ -14,12 +14,11 @@ from PIL import Image, ImageDraw, ImageFont
 
 from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import Array, world_bounds
-from apo_bench.io.figures import load_matplotlib
+from apo_bench.io import load_matplotlib
 from apo_bench.simulation.film.still import Chapter, FilmMoment
+from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.hooks import BY_HAND, TOUCHING
-from apo_bench.simulation.scene.graphics import renderer
-from apo_bench.simulation.scene.render import camera_view, place_for_picture, save_film
-from apo_bench.simulation.scene.world import initial_state
+from apo_bench.simulation.scene import camera_view, initial_state, place_for_picture, save_film
 
 _Picture = NDArray[np.uint8]
 ABOVE_PX = 32
@@ -127,8 +126,7 @@ def frames(
     """
     near = _looks_at(assembly, [assembled])
     for chapter in chapters:
-        wide = _looks_at(assembly, [assembled, chapter.start])
-        yield from _chapter(assembly, chapter, near, wide, speed, fps)
+        yield from _chapter(assembly, chapter, near, _looks_at(assembly, [assembled, chapter.start]), speed, fps)
 
 
 def _chapter(
@@ -193,12 +191,10 @@ def operation_words(assembly: Assembly, moment: FilmMoment) -> str:
 
 
 def _lines(assembly: Assembly, moment: FilmMoment) -> tuple[str, ...]:
-    k = moment.doing.operation
     words = operation_words(assembly, moment)
-    if k is None:
+    if moment.doing.operation is None:
         return (words,)
-    contacts = "; ".join(map(str, assembly.operations[k].contacts))
-    return (words, shortened(contacts))
+    return (words, shortened("; ".join(map(str, assembly.operations[moment.doing.operation].contacts))))
 
 
 def framing(assembly: Assembly, states: Sequence[Poses]) -> tuple[Array, float]:
@@ -206,8 +202,7 @@ def framing(assembly: Assembly, states: Sequence[Poses]) -> tuple[Array, float]:
     posed = [(assembly.solids[p], poses[p]) for poses in states for p in assembly.solids if p not in assembly.fixed]
     low, high = world_bounds(posed)
     high = high + np.array([0.0, 0.0, _ROOM_M])
-    far = _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low))
-    return (low + high) / 2, far
+    return (low + high) / 2, _NEAREST_M + _FARTHER * float(np.linalg.norm(high - low))
 
 
 def _looks_at(assembly: Assembly, states: Sequence[Poses]) -> Any:

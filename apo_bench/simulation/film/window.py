@@ -11,9 +11,8 @@ from apo_bench.assembly import Poses
 from apo_bench.errors import InputError
 from apo_bench.simulation.film.film import FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG, framing
 from apo_bench.simulation.film.still import Still, draw_over, show_moment
-from apo_bench.simulation.scene.graphics import need_window
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import initial_state
+from apo_bench.simulation.graphics import need_window
+from apo_bench.simulation.scene import Scene, initial_state
 
 WINDOW_KEYS = {
     32: "play",

@@ -12,12 +12,8 @@ from apo_bench.assembly import Poses, Step
 from apo_bench.geometry import Array, Ints, all_boxes, pose
 from apo_bench.simulation.frames import quaternion
 from apo_bench.simulation.hooks import BY_HAND, Doing, Hooks, hooks_of
-from apo_bench.simulation.robot.in_hand import TINY_S, take_along
-from apo_bench.simulation.robot.obstacles import Moving, near_spans
-from apo_bench.simulation.robot.paths import Trajectory
-from apo_bench.simulation.scene.composing import HANDS
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import initial_state, part_pose, sleeping
+from apo_bench.simulation.robot import TINY_S, Moving, Trajectory, near_spans, take_along
+from apo_bench.simulation.scene import HANDS, Scene, initial_state, part_pose, sleeping
 
 _TRAIL_S = 0.019
 """What a hand holds trails behind it by so long: its weld, of a time constant of 0.01 s, damps all motion."""
@@ -107,10 +103,9 @@ class Hands:
 
     def _spans(self, hand: int, line: Trajectory, n: int) -> list[tuple[int, int]]:
         """Which steps of a line are simulated: those where something is near; at last the end."""
-        boxes = self.scene.pieces
         tip = pose.inverse(line.start)
         held = tuple(self._held[hand])
-        moving = [Moving(boxes[part], tip @ self.pose(part)) for part in held]
+        moving = [Moving(self.scene.pieces[part], tip @ self.pose(part)) for part in held]
         s = line.progress(_trailing(np.arange(n + 1.0), n, self._step_s))
         spans = near_spans(self.scene, self.data, moving, held, line, s, self.world, _RUN_UP_S, _NEAR_M)
         return spans if spans and spans[-1][1] == n else [*spans, (n, n)]

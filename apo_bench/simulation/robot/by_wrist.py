@@ -10,12 +10,11 @@ import numpy as np
 
 from apo_bench.geometry import Array, pose
 from apo_bench.records import wrench_noise
-from apo_bench.simulation.robot.forces import Guard
 from apo_bench.simulation.robot.paths import Trajectory, shifted
 from apo_bench.simulation.robot.reach import turned_by
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, WristSensor, hand_load
-from apo_bench.simulation.scene.world import wrist_felt
+from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, Guard, WristSensor, hand_load
+from apo_bench.simulation.scene import wrist_felt
 
 ZERO_S = 0.5
 """So long a wrist is zeroed: the mean of 500 readings has 0.045 times the noise of one."""
@@ -59,8 +58,7 @@ def wrist_of(robot: Robot, name: str, rng: np.random.Generator, bandwidth_hz: fl
     Raises:
         InputError: An unknown name, or a number that is not allowed.
     """
-    sensors = robot.data.sensordata
-    return WristSensor(robot.scene, sensors, robot.encoders, wrench_noise(name), rng, bandwidth_hz)
+    return WristSensor(robot.scene, robot.data.sensordata, robot.encoders, wrench_noise(name), rng, bandwidth_hz)
 
 
 @contextmanager
@@ -151,12 +149,11 @@ def comply(robot: Robot, law: Callable[[Array], Array | None], about: Array, wri
 
 def _joint_turns(robot: Robot, q: Array, about: Array) -> Array:
     """How the joints turn, (6, joints), per metre along each axis and per radian about each through a point."""
-    kinematics = robot.scene.kinematics
-    T = kinematics.forward(q)
+    T = robot.scene.kinematics.forward(q)
     to = pose.at(about)
     T_point_tip = pose.inverse(to) @ T
     turns = []
     for ways, by in ((np.eye(6)[:3], _SHIFT_M), (np.eye(6)[3:], _TURN_RAD)):
         ends = [(to @ pose.exp(-by * way) @ T_point_tip, to @ pose.exp(by * way) @ T_point_tip) for way in ways]
-        turns.append(robot.reached(turned_by(kinematics, ends, q, by)))
+        turns.append(robot.reached(turned_by(robot.scene.kinematics, ends, q, by)))
     return np.vstack(turns)

@@ -124,8 +124,7 @@ class MeasuredFingers:
 
     def opening(self, data: Any) -> float:
         left, right = data.geom_xpos[self._pads]
-        across = data.site_xmat[self._tip][::3]
-        return (abs(float((left - right) @ across)) - self.hand.thick_m) / 2
+        return (abs(float((left - right) @ data.site_xmat[self._tip][::3])) - self.hand.thick_m) / 2
 
     def speed(self, data: Any) -> float:
         return float(np.abs(data.qvel[self._dof] * self._lever).max())

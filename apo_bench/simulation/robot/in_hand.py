@@ -17,8 +17,7 @@ import numpy as np
 from apo_bench.assembly import InHand
 from apo_bench.geometry import Array, pose
 from apo_bench.simulation.frames import body_frame, quaternion
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import World, part_pose, place, touch_others
+from apo_bench.simulation.scene import Scene, World, part_pose, place, touch_others
 
 SLIPS_M = 5e-5
 """What moves farther in the hand in a tick does not creep: it slips."""

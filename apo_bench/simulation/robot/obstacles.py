@@ -15,8 +15,7 @@ from apo_bench.geometry import Array, Ints, Piece, intrusion_depths, pose, uprig
 from apo_bench.simulation.frames import body_frame
 from apo_bench.simulation.robot.gripper import gripper_boxes
 from apo_bench.simulation.robot.paths import Trajectory
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import World, part_pose
+from apo_bench.simulation.scene import Scene, World, part_pose
 
 NEAR_HELD_M = (0.00005, 0.00015)
 """A part in a hand drifts by less than the first on its way; parts of a group, which shift, by less than the second."""

@@ -48,8 +48,7 @@ def along(kinematics: Kinematics, line: Trajectory, s: Array, q: Array, known: K
         return np.asarray(q)[None]
     part = float(s[-1] - s[0])
     least = 3 if part * _steps(line, _SHORT_M, _SHORT_RAD) <= 1.0 else 4
-    count = max(least, int(np.ceil(part * _steps(line, _KNOT_M, _KNOT_RAD))) + 1)
-    places = np.linspace(s[0], s[-1], count)
+    places = np.linspace(s[0], s[-1], max(least, int(np.ceil(part * _steps(line, _KNOT_M, _KNOT_RAD))) + 1))
     if known is None or not np.array_equal(known.s, places):
         known = _knots(kinematics, line, places, q)
     return None if known is None else np.asarray(CubicSpline(*known)(s))
@@ -58,8 +57,12 @@ def along(kinematics: Kinematics, line: Trajectory, s: Array, q: Array, known: K
 def at_end(kinematics: Kinematics, line: Trajectory, begin: float, end: float, q: Array) -> Array | None:
     """Joint angles, (joints,), at `end`, found by way of a few places from `begin`, where they are q."""
     for far, turn in ((_FAR_M, _FAR_RAD), (_KNOT_M, _KNOT_RAD)):
-        count = 1 + max(1, int(np.ceil((end - begin) * _steps(line, far, turn))))
-        knots = _knots(kinematics, line, np.linspace(begin, end, count), q)
+        knots = _knots(
+            kinematics,
+            line,
+            np.linspace(begin, end, 1 + max(1, int(np.ceil((end - begin) * _steps(line, far, turn))))),
+            q,
+        )
         if knots is not None:
             return knots.q[-1]
     return None
@@ -129,8 +132,9 @@ def within_speed(
     """
     if limit is None:
         return line, None
-    count = 1 + max(4, int(np.ceil(_steps(line, _KNOT_M, _KNOT_RAD))))
-    knots = _knots(kinematics, line, np.linspace(0.0, 1.0, count), q)
+    knots = _knots(
+        kinematics, line, np.linspace(0.0, 1.0, 1 + max(4, int(np.ceil(_steps(line, _KNOT_M, _KNOT_RAD))))), q
+    )
     if knots is None:
         return line, None
     t = np.linspace(0.0, 1.0, _SPEED_LOOKS)

@@ -17,16 +17,14 @@ import numpy as np
 from apo_bench.assembly import Poses, Step
 from apo_bench.geometry import Array, pose
 from apo_bench.simulation.hooks import TICK_S, Doing, Hooks, hooks_of
-from apo_bench.simulation.robot.forces import WRIST_S, ForceSensors, Guard
 from apo_bench.simulation.robot.gripper import STUCK_M, fingers_of
 from apo_bench.simulation.robot.in_hand import Carried, HoldWatch, fast_forward, steadied, take_along, weld
 from apo_bench.simulation.robot.obstacles import clear, moving_with_tip, near_spans
 from apo_bench.simulation.robot.paths import Trajectory, smooth
 from apo_bench.simulation.robot.reach import along, at_end, led, way_there, within_speed
 from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.robot.wrist import WristSensor
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import has_failed, initial_state, part_pose, timestep, unfelt
+from apo_bench.simulation.robot.wrist import WRIST_S, ForceSensors, Guard, WristSensor
+from apo_bench.simulation.scene import Scene, has_failed, initial_state, part_pose, timestep, unfelt
 
 _REST_RAD_S = 2e-3
 _REST_M_S = 3e-3
@@ -140,10 +138,9 @@ class Robot:
         Raises:
             Halt: The line leaves the arm's reach.
         """
-        kinematics = self.scene.kinematics
-        line, knots = within_speed(kinematics, line, self.q, self.arm.limits.speed_rad_s)
+        line, knots = within_speed(self.scene.kinematics, line, self.q, self.arm.limits.speed_rad_s)
         n = max(2, round(line.seconds / self.step_s))
-        path = self.reached(along(kinematics, line, line.progress(np.arange(n + 1) / n), self.q, knots))
+        path = self.reached(along(self.scene.kinematics, line, line.progress(np.arange(n + 1) / n), self.q, knots))
         tips = []
         for target in led(path, np.gradient(path, self.step_s, axis=0), self._lead, self._stick)[1:]:
             self._tick(self._commands(target[None]))

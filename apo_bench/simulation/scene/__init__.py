@@ -1,1 +1,51 @@
 """The scene: room, parts and arm as MuJoCo models, pictures of them, and where parts come to rest when let go."""
+
+from apo_bench.simulation.scene.apart import left_out
+from apo_bench.simulation.scene.composing import HANDS
+from apo_bench.simulation.scene.marks import Marks, ShiftArrows, TurnRing, pixels
+from apo_bench.simulation.scene.render import arm_home, camera_view, picture, place_for_picture, save_film
+from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.simulation.scene.world import (
+    WRIST_SENSORS,
+    World,
+    awaken,
+    has_failed,
+    initial_state,
+    part_pose,
+    place,
+    sleeping,
+    snapshot,
+    timestep,
+    touch_others,
+    unfelt,
+    wrist_felt,
+)
+
+__all__ = (
+    "HANDS",
+    "WRIST_SENSORS",
+    "Marks",
+    "Scene",
+    "ShiftArrows",
+    "TurnRing",
+    "World",
+    "arm_home",
+    "awaken",
+    "build_scene",
+    "camera_view",
+    "has_failed",
+    "initial_state",
+    "left_out",
+    "part_pose",
+    "picture",
+    "pixels",
+    "place",
+    "place_for_picture",
+    "save_film",
+    "sleeping",
+    "snapshot",
+    "timestep",
+    "touch_others",
+    "unfelt",
+    "wrist_felt",
+)

@@ -9,15 +9,14 @@ from typing import Any
 
 import mujoco
 
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.geometry import Array, all_boxes
 from apo_bench.parts import PartFile, read_part
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario, layout_at
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.physics import Physics, set_contact, set_options
-from apo_bench.simulation.scene.geoms import dress
-from apo_bench.simulation.scene.meeting import OF_PARTS, Bits, meetings
+from apo_bench.simulation.scene.geoms import OF_PARTS, Bits, dress, meetings
 from apo_bench.simulation.scene.walls import simulated_pieces
 from apo_bench.simulation.scene.world import WRIST_SENSORS
 
@@ -110,8 +109,10 @@ def _add_part(
 ) -> None:
     """Attach a part's file at T, its fit faces receded."""
     solid = scenario.assembly.solids[part]
-    if [piece.name for piece in file.pieces] != [piece.name for piece in solid.pieces]:
-        raise InputError(f"{file.path}: the pieces are others than those of part '{part}'; load the scenario again.")
+    require(
+        [piece.name for piece in file.pieces] == [piece.name for piece in solid.pieces],
+        f"{file.path}: the pieces are others than those of part '{part}'; load the scenario again.",
+    )
     own = mujoco.MjSpec.from_string(file.xml)
     dress(own, solid, simulated_pieces(solid, clearance_mm * 1e-3), file.density, bits)
     set_contact(own.geoms, settings)

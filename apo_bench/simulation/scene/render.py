@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Poses
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
-from apo_bench.simulation.scene.graphics import need_window, renderer
+from apo_bench.simulation.graphics import need_window, renderer
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import World, initial_state, place
 
@@ -150,8 +150,10 @@ def save_film(frames: Iterable[_Image], path: str | Path, fps: float) -> None:
     import imageio.v3 as imageio
 
     path = Path(path)
-    if path.suffix.lower() not in _VIDEO_ENDINGS:
-        raise InputError(f"a film cannot be written as '{path}'; give a name that ends in .mp4 or .gif.")
+    require(
+        path.suffix.lower() in _VIDEO_ENDINGS,
+        f"a film cannot be written as '{path}'; give a name that ends in .mp4 or .gif.",
+    )
     how: dict[str, Any] = {"duration": 1000.0 / fps, "loop": 0}
     if path.suffix.lower() == ".mp4":
         how = {"fps": fps, "macro_block_size": 8}

@@ -43,8 +43,7 @@ class World:
 
 def world(model: Any, free: tuple[str, ...], fixed: tuple[str, ...], bounds: Array) -> World:
     """Look up every part of a compiled scene."""
-    parts = free + fixed
-    body = {part: model.body(f"{part}/").id for part in parts}
+    body = {part: model.body(f"{part}/").id for part in free + fixed}
     root = {body_id: i for i, body_id in enumerate(body.values())}
     geom_part = np.array([root.get(int(b), -1) for b in model.body_rootid[model.geom_bodyid]])
     joints = {part: int(model.body(f"{part}/").jntadr[0]) for part in free}

@@ -14,21 +14,25 @@ from apo_bench.assembly import Outcome, Plan, Poses, Snapshot
 from apo_bench.geometry import Array, pose
 from apo_bench.insertion.surroundings import WALL_MARGIN_M
 from apo_bench.records import sentence
-from apo_bench.simulation.execution.carry_out import before_attach, take
-from apo_bench.simulation.execution.controller import moves_of, run_schedule
+from apo_bench.simulation.execution import (
+    Grip,
+    Move,
+    Progress,
+    ReplayCache,
+    SavedState,
+    Transfer,
+    before_attach,
+    moves_of,
+    run_schedule,
+    saved_state,
+    take,
+    take_up,
+)
 from apo_bench.simulation.execution.feel.feeling import Feeling, Feels
-from apo_bench.simulation.execution.feel.laying import lay
-from apo_bench.simulation.execution.prepare import Move
-from apo_bench.simulation.execution.replay_cache import Progress, ReplayCache, SavedState, saved_state, take_up
-from apo_bench.simulation.execution.transfer import Grip, Transfer
+from apo_bench.simulation.execution.feel.touching import lay
 from apo_bench.simulation.hooks import Hooks
-from apo_bench.simulation.robot.by_wrist import wrist_of, zero
-from apo_bench.simulation.robot.robot import Halt, Robot
-from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.robot.wrist import WristSensor, part_loads
-from apo_bench.simulation.scene.apart import left_out
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import sleeping
+from apo_bench.simulation.robot import Halt, Robot, RobotError, WristSensor, part_loads, wrist_of, zero
+from apo_bench.simulation.scene import Scene, left_out, sleeping
 
 
 @final
@@ -126,7 +130,6 @@ def _held(
     Args:
         left: What is wrong with the robot and not made up for.
     """
-    scene = robot.scene
     robot.step, t = move
     k = robot.step.operation
     if not t.into.level and t.mouths:
@@ -140,7 +143,7 @@ def _held(
             laying = None if t.flush is None else partial(lay, robot, feeling, k)
         grip, second = before_attach(robot, t, i, laying)
         wrist = wrist_of(robot, wrench[0], np.random.default_rng(wrench[1]))
-        wrist.hold(*part_loads(scene, {t.part: pose.inverse(grip.T_part_tip)}))
+        wrist.hold(*part_loads(robot.scene, {t.part: pose.inverse(grip.T_part_tip)}))
         zero(robot, wrist)
     except Halt as halt:
         return Outcome(halt.stage, halt.code, k, sentence(halt.code, part=halt.part or t.part, operation=k))
@@ -151,7 +154,7 @@ def _held(
         grip=grip,
         second=second,
         way=t.into.way if left is None else left.hand_eye[:3, :3].T @ t.into.way,
-        off=np.zeros(len(scene.arm.joints)) if left is None else left.joints,
+        off=np.zeros(len(robot.scene.arm.joints)) if left is None else left.joints,
         saved=saved_state(robot, i, progress),
         wrist=wrist.at(np.zeros(len(robot.data.sensordata)), _nowhere, np.random.default_rng(0)),
         after=tuple(progress.after[:k]),

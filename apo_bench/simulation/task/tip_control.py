@@ -13,17 +13,19 @@ import numpy as np
 
 from apo_bench.assembly import Poses, Snapshot
 from apo_bench.geometry import Array, pose
-from apo_bench.simulation.execution.carry_out import after_attach, end_of_attach, pace
-from apo_bench.simulation.execution.controller import until_rest
-from apo_bench.simulation.execution.fingers import check_hold, depart, release
-from apo_bench.simulation.execution.replay_cache import take_up
+from apo_bench.simulation.execution import (
+    after_attach,
+    check_hold,
+    depart,
+    end_of_attach,
+    pace,
+    release,
+    take_up,
+    until_rest,
+)
 from apo_bench.simulation.hooks import Hooks
-from apo_bench.simulation.robot.forces import LowPass
-from apo_bench.simulation.robot.paths import shifted
-from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.scene.apart import left_out
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.simulation.scene.world import part_pose, sleeping, snapshot, wrist_felt
+from apo_bench.simulation.robot import LowPass, Robot, shifted
+from apo_bench.simulation.scene import Scene, left_out, part_pose, sleeping, snapshot, wrist_felt
 from apo_bench.simulation.task.start import Start
 
 PERIOD_S = 0.05
@@ -196,7 +198,6 @@ class TipControl:
         dt = robot.step_s
         steps = round(PERIOD_S / dt)
         way = self.start.transfer.into.way
-        weigh = self.start.transfer.slide_n
         T = robot.T
         off = self._off(T)
         low = np.array([-_ACROSS_M, -_ACROSS_M, -self.begins - _BACK_M])
@@ -216,8 +217,7 @@ class TipControl:
         q = robot.q
         left = self._left - float(off[2])
         for _ in range(steps):
-            force = self._felt(self._force, dt)
-            f = np.array(force)
+            f = np.array(self._felt(self._force, dt))
             push = -float(f @ way)
             led = asked
             yields = _YIELD * f
@@ -242,7 +242,7 @@ class TipControl:
         robot.q = q
         robot.T = robot.scene.kinematics.forward(q)
         push = -float(np.dot(self._felt.force, way))
-        self._pushed = self._pushed + 1 if push > weigh / 2 else 0
+        self._pushed = self._pushed + 1 if push > self.start.transfer.slide_n / 2 else 0
         here = left - self._pace.end
         self.arrived = here < _ARRIVED_M or (self._pushed >= _PUSHED and left - self._left < self._stuck)
 
@@ -277,8 +277,7 @@ class TipControl:
 
     def _feel(self) -> Feel:
         robot = self.robot
-        T = robot.scene.kinematics.forward(robot.encoders())
-        tip = self._off(T)
+        tip = self._off(robot.scene.kinematics.forward(robot.encoders()))
         wrench = self._wrist.wrench_there().reshape(2, 3) @ self._R
         return Feel(tip, self._off(robot.T) - tip, robot.opening() - self.start.grip.half_width, wrench.ravel())
 

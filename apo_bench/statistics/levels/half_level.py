@@ -7,19 +7,31 @@ is most of what lies between them, as nothing is known about where. Level 0 has 
 Beside it stand bounds that need no curve but that success falls: the level up to which it is surely over one half, and
 the one from which it is surely under it. They are found by exact binomial tests in a fixed order, from each end of the
 levels to the first one that does not reject: each is wrong in at most 2.5 %.
+
+All that a report says in numbers about who succeeds, in one call.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import final
 
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.statistics.levels.curves import Curve, CurveSetting
+from apo_bench.records import Row
+from apo_bench.statistics.levels.curves import (
+    Area,
+    AreaDifference,
+    Curve,
+    CurveSetting,
+    area_differences,
+    areas,
+    curves,
+)
 from apo_bench.statistics.levels.falling import profile
 from apo_bench.statistics.over_seeds import threshold
-from apo_bench.statistics.rates import CONFIDENCE
+from apo_bench.statistics.paired import REFERENCES, Paired, paired
+from apo_bench.statistics.rates import CONFIDENCE, Cell, tally
 
 _LIKELIEST = 0.05
 """Half levels that are no more surprising than this are as good as the likeliest; their middle is the estimate."""
@@ -149,3 +161,35 @@ def _range(low: float | None, high: float | None) -> str:
     if high is not None:
         return f"< {high:.3g}" if high > 0 else "none"
     return "any" if low is None else f"> {low:.3g}"
+
+
+@final
+@dataclass(frozen=True)
+class Summary:
+    """Each sorted as `tally` sorts; nothing of it depends on chance or on the order of rows."""
+
+    cells: tuple[Cell, ...]
+    pairs: tuple[Paired, ...]
+    half_levels: tuple[HalfLevel, ...]
+    areas: tuple[Area, ...]
+    area_differences: tuple[AreaDifference, ...]
+
+
+def summary(rows: Iterable[Row], references: Sequence[str] = REFERENCES) -> Summary:
+    """Rates, pairs, half levels and areas of rows.
+
+    Args:
+        references: The methods that every other one is compared with.
+
+    Raises:
+        InputError: A trial is there twice.
+    """
+    rows = list(rows)
+    over_levels = curves(rows)
+    return Summary(
+        cells=tally(rows),
+        pairs=paired(rows, references),
+        half_levels=half_levels(over_levels),
+        areas=areas(over_levels),
+        area_differences=area_differences(over_levels, references),
+    )

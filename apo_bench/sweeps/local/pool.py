@@ -10,8 +10,7 @@ from typing import Any, final
 from apo_bench.records import Row, TrialSettings
 from apo_bench.sweeps.local.process import Process
 from apo_bench.sweeps.work.dispatch import STARTING_S, Dispatch, Job, check_limit
-from apo_bench.sweeps.work.environment_lock import EnvironmentLock
-from apo_bench.sweeps.work.messages import Check, Unit, listening, never
+from apo_bench.sweeps.work.environment_lock import Check, EnvironmentLock, Unit, listening, never
 from apo_bench.sweeps.work.worker import Emit, Worker
 from apo_bench.trial.request import Request, checked_request, lost_request, work_on
 

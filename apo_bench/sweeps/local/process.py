@@ -17,9 +17,9 @@ from contextlib import contextmanager, suppress
 from multiprocessing import connection, resource_tracker
 from typing import Any, final
 
-from apo_bench.io.processes import SAFE_PATH, end_descendants, environment
+from apo_bench.io import SAFE_PATH, end_descendants, environment
 from apo_bench.names import folder_of_own_modules, own_modules_in
-from apo_bench.sweeps.work.messages import SIGNALS, Check, Message, checked, last_message
+from apo_bench.sweeps.work.environment_lock import SIGNALS, Check, Message, checked, last_message
 
 _TURN_S = 0.1
 """How often the clock and the signals are looked at while nothing else happens."""

@@ -13,12 +13,11 @@ from dataclasses import replace
 from pathlib import Path
 from typing import final
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.sweeps.local.pool import GOING_S, GRACE_S
 from apo_bench.sweeps.local.process import Process
 from apo_bench.sweeps.ray.driver import ClusterPlan, drive, runtime_files
-from apo_bench.sweeps.work.environment_lock import EnvironmentLock
-from apo_bench.sweeps.work.messages import Check, Unit, never
+from apo_bench.sweeps.work.environment_lock import Check, EnvironmentLock, Unit, never
 from apo_bench.sweeps.work.worker import Emit
 
 _TURN_S = 0.2
@@ -39,8 +38,10 @@ def check_ray(address: str | None) -> None:
         address: `HOST:PORT` of the head of a cluster, `auto` for the one that runs on this machine, `local` for one of
             one's own; None for `auto` if there is one, else `local`.
     """
-    if importlib.util.find_spec("ray") is None:
-        raise InputError("the backend 'ray' needs a package that is not installed; pip install 'apo_bench[ray]'.")
+    require(
+        importlib.util.find_spec("ray") is not None,
+        "the backend 'ray' needs a package that is not installed; pip install 'apo_bench[ray]'.",
+    )
     named = (os.environ.get("RAY_ADDRESS") or "auto") if address in (None, "auto") else str(address)
     if named in ("auto", "local"):
         return

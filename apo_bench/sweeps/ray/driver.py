@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, final
 
 from apo_bench.errors import InputError
-from apo_bench.observation.presets import noise_path
+from apo_bench.observation.noise_file import noise_path
 from apo_bench.scenario.file import is_named, load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps.local.pool import GRACE_S
@@ -28,8 +28,7 @@ from apo_bench.sweeps.local.process import THREADS
 from apo_bench.sweeps.ray.pool import DEATHS, FALSE_STARTS_OF_TASKS, RayPool
 from apo_bench.sweeps.ray.task import made_task
 from apo_bench.sweeps.work.dispatch import Dispatch
-from apo_bench.sweeps.work.environment_lock import EnvironmentLock, Names
-from apo_bench.sweeps.work.messages import Message, Unit, last_message
+from apo_bench.sweeps.work.environment_lock import EnvironmentLock, Message, Names, Unit, last_message
 
 _OBJECT_STORE = 100 * 2**20
 """Bytes, of a cluster that is started here; rows are small."""

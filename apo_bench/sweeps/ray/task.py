@@ -7,8 +7,7 @@ from collections.abc import Callable, Iterator
 from functools import lru_cache
 
 from apo_bench.errors import InputError
-from apo_bench.sweeps.work.environment_lock import EnvironmentLock
-from apo_bench.sweeps.work.messages import Message, Unit, last_message
+from apo_bench.sweeps.work.environment_lock import EnvironmentLock, Message, Unit, last_message
 from apo_bench.sweeps.work.worker import Worker
 
 

@@ -7,12 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, final
 
-from apo_bench.errors import InputError
+from apo_bench.errors import require
 from apo_bench.records import TrialSettings, is_own
-from apo_bench.sweeps.work.environment_lock import EnvironmentLock
-from apo_bench.sweeps.work.messages import Check, Message, Unit, checked
+from apo_bench.sweeps.work.environment_lock import Check, EnvironmentLock, Message, Unit, checked
 from apo_bench.sweeps.work.worker import Emit, timing
-from apo_bench.trial.row import lost
+from apo_bench.trial.outcome_columns import lost
 
 STARTING_S = 300.0
 """What a worker gets to be ready, and to compile a scene."""
@@ -23,10 +22,10 @@ _LONGEST_TRIAL_S = 1e6
 
 def check_limit(limit_s: float) -> None:
     """Raise an `InputError` unless a trial can have such a limit."""
-    if not (math.isfinite(limit_s) and 0.0 < limit_s <= _LONGEST_TRIAL_S):
-        raise InputError(
-            f"a limit of {limit_s:g} s per trial was given; a number above 0 and up to {_LONGEST_TRIAL_S:g} is allowed."
-        )
+    require(
+        math.isfinite(limit_s) and 0.0 < limit_s <= _LONGEST_TRIAL_S,
+        f"a limit of {limit_s:g} s per trial was given; a number above 0 and up to {_LONGEST_TRIAL_S:g} is allowed.",
+    )
 
 
 class Executor(Protocol):

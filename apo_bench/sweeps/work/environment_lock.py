@@ -1,18 +1,34 @@
-"""The environment lock of a sweep: what all its rows are made with, wherever they are made."""
+"""The environment lock of a sweep: what all its rows are made with, wherever they are made.
+
+What passes between a sweep and its workers, whichever executor it has: units of work, messages, the wish to stop.
+
+Messages are tuples whose first item is a word:
+
+("began",)              a trial begins; its scene is compiled and its corrector imported, so its time counts now
+("row", row, timing)    it has ended
+("done",)               the unit of work has ended
+("refused", sentence)   the request cannot be honoured; nothing follows
+("failed", text)        a trial could not be run; nothing follows
+"""
 
 import platform
-from collections.abc import Mapping
+import signal
+import threading
+import traceback
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import metadata
 from importlib.util import find_spec
 from pathlib import Path
-from typing import final
+from types import FrameType
+from typing import Any, final
 
 from apo_bench.correction.own_code.own import check_correctors
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.relations import make_relations
-from apo_bench.records import CORRECTOR_LIMIT_S, RECOGNISED, parsed, with_simulated
+from apo_bench.records import CORRECTOR_LIMIT_S, RECOGNISED, TrialSettings, parsed, with_simulated
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.trial.fingerprint import content_hash, noise_content, own_content
@@ -88,29 +104,30 @@ class EnvironmentLock:
         self.names.check(self.corrector_limit_s)
         here = self.names.hashes()
         for name, content in self.hashes.items():
-            if here.get(name) != content:
-                raise InputError(f"the file behind the {name} is another one there; use the same everywhere.")
+            require(
+                here.get(name) == content, f"the file behind the {name} is another one there; use the same everywhere."
+            )
         arm = find_arm(self.names.arm)
         for source in self.names.scenarios:
             self.check_content(source, content_hash(load_scenario(source), source, arm.files))
 
     def check_content(self, source: str, content: str) -> None:
         """Raise an `InputError` unless a scenario, and the code that runs it, are the same here."""
-        if content != self.content[source]:
-            raise InputError(
-                f"a worker on '{platform.node()}' has other code or other files for '{source}' than the process that "
-                "started the sweep; install the same everywhere, or start the same command again if a file was changed."
-            )
+        require(
+            content == self.content[source],
+            f"a worker on '{platform.node()}' has other code or other files for '{source}' than the process that "
+            "started the sweep; install the same everywhere, or start the same command again if a file was changed.",
+        )
 
     def check_versions(self) -> None:
         """Raise an `InputError` unless the packages are the same here."""
         here = versions()
         for package, version in self.versions.items():
-            if here.get(package) != version:
-                raise InputError(
-                    f"a worker on '{platform.node()}' has {package} {here.get(package)}, the process that started the "
-                    f"sweep {version}; install the same everywhere."
-                )
+            require(
+                here.get(package) == version,
+                f"a worker on '{platform.node()}' has {package} {here.get(package)}, the process that started the "
+                f"sweep {version}; install the same everywhere.",
+            )
 
 
 def environment_lock(
@@ -133,3 +150,84 @@ def versions() -> dict[str, str]:
     return {package: metadata.version(package) for package in _PACKAGES} | {
         package: metadata.version(package) if find_spec(package) else "none" for package in _OPTIONAL
     }
+
+
+Message = tuple[Any, ...]
+
+
+@final
+@dataclass(frozen=True)
+class Unit:
+    """Trials of one scenario, clearance, seed, carelessness and eye: they share layout and demonstration."""
+
+    trials: tuple[TrialSettings, ...]
+
+
+def last_message(error: Exception) -> Message:
+    """What a worker says that cannot go on."""
+    if isinstance(error, InputError):
+        return "refused", str(error)
+    return "failed", f"a trial could not be run:\n{''.join(traceback.format_exception(error))}"
+
+
+def checked(message: Message) -> Message:
+    """The message, unless it is one after which nothing follows.
+
+    Raises:
+        InputError: The request cannot be honoured.
+        RuntimeError: A trial could not be run.
+    """
+    kind, *content = message
+    if kind == "refused":
+        raise InputError(*content)
+    if kind == "failed":
+        raise RuntimeError(*content)
+    return message
+
+
+SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+Check = Callable[[], None]
+"""Raises `Stopped` if this process was asked to stop; to be called where stopping is clean."""
+
+
+@final
+class Stopped(KeyboardInterrupt):
+    """A signal asked this process to stop."""
+
+    def __init__(self, number: int) -> None:
+        super().__init__(signal.Signals(number).name)
+        self.number = number
+
+
+def never() -> None:
+    """Nobody asks."""
+
+
+@contextmanager
+def listening() -> Iterator[Check]:
+    """Take note of signals that ask for an end; what is yielded raises `Stopped` once one came.
+
+    A second signal raises at once, wherever the program is. Signals that were ignored or had a handler of the caller's
+    own before stay as they are, and so do all of them outside the main thread.
+    """
+    came: list[int] = []
+
+    def note(number: int, frame: FrameType | None) -> None:
+        came.append(number)
+        if len(came) > 1:
+            raise Stopped(number)
+
+    def check() -> None:
+        if came:
+            raise Stopped(came[0])
+
+    ours = SIGNALS if threading.current_thread() is threading.main_thread() else ()
+    usual = (signal.SIG_DFL, signal.default_int_handler)
+    before: dict[int, Any] = {number: found for number in ours if (found := signal.getsignal(number)) in usual}
+    for number in before:
+        signal.signal(number, note)
+    try:
+        yield check
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

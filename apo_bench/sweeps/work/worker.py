@@ -11,13 +11,12 @@ from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.correction.own_code.own import OwnCorrectors
 from apo_bench.errors import InputError
 from apo_bench.records import KEY, Row, TrialSettings, parsed, row_key, sentence
-from apo_bench.simulation.execution.replay_cache import ReplayCache
-from apo_bench.simulation.scene.scene import Scene
-from apo_bench.sweeps.work.environment_lock import EnvironmentLock
-from apo_bench.sweeps.work.messages import Message, Unit
+from apo_bench.simulation.execution import ReplayCache
+from apo_bench.simulation.scene import Scene
+from apo_bench.sweeps.work.environment_lock import EnvironmentLock, Message, Unit
 from apo_bench.trial.fingerprint import content_hash
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations, demonstration_of
-from apo_bench.trial.row import result
+from apo_bench.trial.outcome_columns import result
 from apo_bench.trial.stages import SimulatedDemonstration, scene_key, scene_of
 from apo_bench.trial.trial import trial_row
 

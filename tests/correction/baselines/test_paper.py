@@ -16,8 +16,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from apo_bench import Correction, InputError, Observation, correct
 from apo_bench.assembly import Equations, Step, Try, largest_gap
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.baselines.own_contacts import solve_own_contacts
 from apo_bench.correction.baselines.paper import paper
+from apo_bench.correction.baselines.track import solve_own_contacts
 from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, Solution, descend, least_step, solve_newton
 from apo_bench.geometry import Array, is_rigid, pose
 from apo_bench.records import CODES

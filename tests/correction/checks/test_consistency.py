@@ -12,8 +12,8 @@ from scipy.stats import kstest
 
 from apo_bench import Assembly, ContactCorrector, Correction, InputError, Observation, correct
 from apo_bench.assembly import Consistency, Contact, PartFace
-from apo_bench.correction.checks.consistency import p_value
-from apo_bench.correction.contact.suspects import MOST_SUSPECTS
+from apo_bench.correction.checks.status import p_value
+from apo_bench.correction.contact.contact import MOST_SUSPECTS
 from apo_bench.geometry import Array, Face, pose
 from benchmarks.corrector_bench.problems import problem
 from tests import scenes

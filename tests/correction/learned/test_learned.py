@@ -10,14 +10,12 @@ import pytest
 from apo_bench import Demonstration, Observation, draw_layout, load_scenario
 from apo_bench.assembly import lowered_observation
 from apo_bench.correction.correctors import correct
-from apo_bench.correction.learned.correctors import as_believed
-from apo_bench.correction.learned.network import forward, shapes
-from apo_bench.correction.learned.tokens import tokens
+from apo_bench.correction.learned.network import as_believed, forward, shapes, tokens
 from apo_bench.geometry import pose
+from apo_bench.observation.looking import observe
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.observation.observing import observe
 from apo_bench.resources import folder
-from apo_bench.trial.pose_error import goal_errors
+from apo_bench.trial.outcome_columns import goal_errors
 
 
 def seen(name: str, seed: int, level: float = 1.0) -> tuple[np.ndarray, Observation]:

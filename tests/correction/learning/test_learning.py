@@ -14,13 +14,11 @@ from numpy.testing import assert_allclose
 from apo_bench import Demonstration, InputError, Observation, draw_layout, load_scenario
 from apo_bench.cli.app import main
 from apo_bench.correction.learning import likelihood
-from apo_bench.correction.learning.evidence import UNITS, readings
-from apo_bench.correction.learning.likelihood import ObservedErrors
+from apo_bench.correction.learning.likelihood import UNITS, ObservedErrors, readings
 from apo_bench.files.json_forms import observation_form, write_form
 from apo_bench.geometry import pose
-from apo_bench.observation.fitting.components import COMPONENTS, component_factors, view_ways
-from apo_bench.observation.models.anisotropic import ACROSS_SIGHT, ALONG_SIGHT, IN_IMAGE, OUT_OF_IMAGE
-from apo_bench.observation.models.camera import Camera
+from apo_bench.observation.fitting.fit import COMPONENTS, component_factors, view_ways
+from apo_bench.observation.models.camera import ACROSS_SIGHT, ALONG_SIGHT, IN_IMAGE, OUT_OF_IMAGE, Camera
 from apo_bench.observation.models.fitted import restated, view_frame
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.noise_file import noise_text, read_noise

@@ -34,12 +34,15 @@ from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.correction.own_code import own
 from apo_bench.correction.own_code import process as own_process
 from apo_bench.correction.own_code.forms import (
+    FRAME_HEADER,
+    GarbledMessage,
     correction_message,
     observation_message,
     parse_correction,
     parse_observation,
+    receive,
+    send,
 )
-from apo_bench.correction.own_code.message import FRAME_HEADER, GarbledMessage, receive, send
 from apo_bench.correction.own_code.own import CorrectorLost, OwnCorrectors
 from apo_bench.geometry import pose
 from apo_bench.io.processes import descendants
@@ -402,7 +405,7 @@ def worker(folder: Path) -> Iterator[Worker]:
 
 
 def rows(worker: Worker, *methods: str) -> dict[str, dict[str, Any]]:
-    from apo_bench.sweeps.work.messages import Unit
+    from apo_bench.sweeps.work.environment_lock import Unit
 
     asked = [TrialSettings("block_on_block", careless=0.0, method=method, seed=424243) for method in methods]
     made = [dict(said[0]) for kind, *said in worker.run(Unit(tuple(asked))) if kind == "row"]

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from apo_bench import Demonstration, InputError, correct, draw_layout, load_scenario
 from apo_bench.assembly import OutlierModel, largest_gap, looking_away, placements
 from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.checks.consistency import p_value
+from apo_bench.correction.checks.status import p_value
 from apo_bench.correction.contact.inferred import inferred_goals
 from apo_bench.correction.contact.problem import seen_system
 from apo_bench.correction.region import contains_truth
@@ -29,7 +29,7 @@ from apo_bench.geometry import overlap_area, pose
 from apo_bench.geometry.covering import overlap
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.relations import culprit, make_relations, with_relations
-from apo_bench.trial.pose_error import goal_errors
+from apo_bench.trial.outcome_columns import goal_errors
 from tests.shipped import BOXES
 
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from apo_bench.correction.touches.robot_model import (
+from apo_bench.correction.touches.robust_estimate import (
     HAND_EYE,
     TOOL,
     Places,

@@ -14,13 +14,10 @@ import numpy as np
 from apo_bench.assembly import Felt, Plan, Touch
 from apo_bench.geometry import Array, pose
 from apo_bench.records import USUAL_WRENCH
-from apo_bench.simulation.execution.flush import Flush
+from apo_bench.simulation.execution.beside import Flush
 from apo_bench.simulation.execution.transfer import Grip
-from apo_bench.simulation.robot.by_wrist import wrist_of, zero
-from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.robot.robot_error import RobotError
-from apo_bench.simulation.robot.wrist import WristSensor
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.robot import Robot, RobotError, WristSensor, wrist_of, zero
+from apo_bench.simulation.scene import Scene
 
 ACTS = ("square", "touch", "lay", "search")
 """Parts are squared before they are taken, what is fixed is touched, what is inserted is laid flat first (and touches a
@@ -189,8 +186,7 @@ class Feeling:
 
     def _cornered(self, touch: Touch, patch: Array) -> Touch:
         """The touch by the corner of the patch that is foremost as it is believed."""
-        X = self.belief.real(touch.T_world_tip, touch.jacobian)
-        ahead = pose.apply(X, patch) @ touch.normal
+        ahead = pose.apply(self.belief.real(touch.T_world_tip, touch.jacobian), patch) @ touch.normal
         flat = float(np.ptp(ahead)) < _FLAT_M
         return replace(touch, point=patch.mean(axis=0) if flat else patch[int(np.argmin(ahead))])
 

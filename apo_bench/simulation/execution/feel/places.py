@@ -12,14 +12,11 @@ from shapely import Point
 from apo_bench.assembly import Plan
 from apo_bench.geometry import Array, Box, Face, face_area, own_shape, plane_frame, pose
 from apo_bench.insertion.macros import UP
-from apo_bench.simulation.execution.beside import STAND_OFF_M, upright_walls
-from apo_bench.simulation.execution.flush import LEVEL
+from apo_bench.simulation.execution.beside import LEVEL, STAND_OFF_M, upright_walls
 from apo_bench.simulation.execution.grasping import gripper_depth, obstacles
 from apo_bench.simulation.frames import frame
-from apo_bench.simulation.robot.gripper import gripper_boxes
-from apo_bench.simulation.robot.obstacles import Obstacle
-from apo_bench.simulation.robot.paths import shifted
-from apo_bench.simulation.scene.scene import Scene
+from apo_bench.simulation.robot import Obstacle, gripper_boxes, shifted
+from apo_bench.simulation.scene import Scene
 
 OPENING_M = 0.004
 """Of each finger while the hand touches: as good as closed, and the pads do not push on each other."""

@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import Any
 
 from apo_bench.errors import InputError
-from apo_bench.io.processes import SAFE_PATH, environment
+from apo_bench.io import SAFE_PATH, environment
 
 _VARIABLE = "MUJOCO_GL"
 _NO_BACKEND = {_VARIABLE: "disable"}
