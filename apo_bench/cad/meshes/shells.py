@@ -7,7 +7,7 @@ from typing import NoReturn
 import numpy as np
 
 from apo_bench.cad.meshes.closing import closed, triangles_of_edges
-from apo_bench.cad.meshes.crossings import crossings
+from apo_bench.cad.meshes.crossings import crossings, uncrossed
 from apo_bench.cad.solids.bodies import body_of, mesh_of
 from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, SolidPlace, connected, put_together
 from apo_bench.errors import InputError
@@ -120,6 +120,9 @@ def _united(path: Path, mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
         said = [CROSSED_A_LITTLE]
     if ambiguous.any():
         _refuse_crossing(path, where[ambiguous][0])
+    if alone.all() and (moved := uncrossed(mesh, np.concatenate([pair for pair, _ in found]), ROUGH_MM)) is not None:
+        far = np.linalg.norm(moved.corners - mesh.corners, axis=1).max()
+        return moved, (f"corners were moved by up to {far:.2g} mm where the surface crossed itself",)
     pairs = pairs[~alone]
     if not len(pairs):
         return mesh, tuple(said)
