@@ -84,10 +84,13 @@ def faces_of(mesh: Mesh, fewest: int) -> Faces:
     try:
         with time_limit("drawing the mesh anew", "save it with fewer triangles", limit_s):
             for anew in _anew(mesh, fewest):
-                if _share(anew) > share + _MORE or _is_simpler(anew, best):
-                    share = _share(anew)
+                more, whole = _share(anew), sum(region.is_whole for region in anew.regions)
+                is_rounder = more > _ALL and whole > sum(region.is_whole for region in best.regions)
+                if more > share + _MORE or is_rounder or _is_simpler(anew, best):
+                    share = more
                     best = anew
-                if share > _ALL:
+                # Part of a wall may be what noise leaves of a whole one.
+                if share > _ALL and all(region.is_whole for region in best.regions if region.is_round):
                     break
     except InputError as error:  # faces as they were found are better than none
         best = best._replace(said=(*best.said, str(error).split(";")[0] + ", so it was left as it is"))

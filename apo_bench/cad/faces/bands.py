@@ -18,6 +18,7 @@ _TANGENT_RAD = 0.03
 """Surfaces that meet at less go over into each other: a fillet and the plane beside it."""
 _AROUND = 0.55
 _BESIDE = 0.4
+_TOUCHES = 0.2
 """So much of the border of a band goes over into others, and of what is beside a band."""
 _LIKE = 3.0
 """Bands side by side differ by less than this in how wide they are."""
@@ -74,6 +75,11 @@ def without_bands(rough: Rough, patches: list[Patch], fewest: int) -> list[Patch
         more = is_wall & ~bands & (share(goes_on & bands[beyond]) > _BESIDE)
         bands = bands | more
     free |= bands
+    more = free
+    while more.any():  # facets of free surfaces
+        is_facet = (share(goes_on & (free | flat)[beyond]) > _BESIDE) & (share(goes_on & free[beyond]) > _TOUCHES)
+        more = flat & ~free & is_facet
+        free |= more
     rest = free[owner]
     _, group = connected(rough.mesh.neighbours[rest[rough.mesh.neighbours].all(axis=1)], len(owner))
     loose = (Patch(None, np.flatnonzero(rest & (group == g))) for g in np.unique(group[rest]))

@@ -19,7 +19,7 @@ _SPREAD = 0.45
 """Corners of a face are nearer to it than this part of what is allowed, root mean square; those of a band that was
 grown on a free surface are not."""
 _BENT = 0.4
-_MOSTLY = 0.35
+_MOSTLY = 0.65
 """... nor are those that bend so much of it along the axis, which is so much of all that their corners are off."""
 _TURNED_RAD = 0.6
 _SEEDS = 3
@@ -53,14 +53,16 @@ def patches_of(rough: Rough) -> list[Patch]:
 def _patches_in(rough: Rough, group: Any) -> Iterator[Patch]:
     """Faces in a smooth part of the surface: one that is all of it, or the largest ones that grow from seeds."""
     strong = group[~rough.weak[group]]
-    strong = strong if len(strong) else group
+    half = rough.areas[group].sum() / 2.0
+    strong = strong if rough.areas[strong].sum() > half else group
     for kind in ("plane", "cylinder", "cone"):
         surface = _fitted(rough, kind, strong)
         if surface is not None:
             mine, hole = _on(rough, surface, group)
             if rough.areas[np.intersect1d(mine, strong)].sum() > _WHOLE * rough.areas[strong].sum():
                 stray = np.setdiff1d(group, np.concatenate([mine, strong]))  # narrow, and of another face
-                yield Patch(surface, np.setdiff1d(group, stray), hole)
+                whole = np.setdiff1d(group, stray)
+                yield Patch(_fitted(rough, kind, mine, surface) or surface, whole, hole)
                 if len(stray):
                     yield Patch(None, stray)
                 return
@@ -68,7 +70,6 @@ def _patches_in(rough: Rough, group: Any) -> Iterator[Patch]:
     left = group
     free = [group[:0]]
     failed = 0
-    half = rough.areas[group].sum() / 2.0
     while (area := rough.areas[left].sum()) > least and failed < _MOST_FAILED:
         best = _largest(rough, left)
         fewest = max(least, _BIT * area if area > half else 0.0)

@@ -36,15 +36,16 @@ def crossings(mesh: Mesh, off: Array | None = None) -> Iterator[tuple[Any, Array
                 yield pairs[apart][which], where
 
 
-def uncrossed(mesh: Mesh, pairs: Any, most: float) -> Mesh | None:
-    """The mesh with corners moved back out of triangles that they pierce, [mm]; None if that does not do.
+def uncrossed(mesh: Mesh, most: float) -> Mesh:
+    """The mesh with corners moved back out of triangles that they pierce, by no more than that, as far as that does.
 
     Args:
-        pairs: Of triangles that cross, (p, 2).
-        most: How far a corner may move.
+        most: [mm].
     """
-    corners = mesh.corners.copy()
+    new = mesh
     for _ in range(_TRIES):
+        pairs = np.concatenate([np.zeros((0, 2), dtype=np.int64), *(found for found, _ in crossings(new))])
+        corners = new.corners.copy()
         for pair in pairs:
             # Corners of that triangle which reaches less far through the other one go back to where most of it is.
             ways = []
@@ -56,11 +57,8 @@ def uncrossed(mesh: Mesh, pairs: Any, most: float) -> Mesh | None:
                 ways.append((round(-off.min() / mesh.extent, _DIGITS), mesh.triangles[edges], np.outer(side * off, n)))
             _, which, way = min(ways, key=lambda each: each[0])
             corners[which] -= way
-        new = Mesh(corners.copy(), mesh.triangles)
-        pairs = np.concatenate([np.zeros((0, 2), dtype=np.int64), *(found for found, _ in crossings(new))])
-        if not len(pairs):
-            return new if np.linalg.norm(new.corners - mesh.corners, axis=1).max() < most else None
-    return None
+        new = Mesh(corners, mesh.triangles)
+    return new if np.linalg.norm(new.corners - mesh.corners, axis=1).max() < most else mesh
 
 
 def _near(mesh: Mesh) -> Iterator[Any]:

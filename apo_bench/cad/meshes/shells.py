@@ -7,7 +7,7 @@ from typing import NoReturn
 import numpy as np
 
 from apo_bench.cad.meshes.closing import closed, triangles_of_edges
-from apo_bench.cad.meshes.crossings import crossings, uncrossed
+from apo_bench.cad.meshes.crossings import crossings
 from apo_bench.cad.solids.bodies import body_of, mesh_of
 from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, SolidPlace, connected, put_together
 from apo_bench.errors import InputError
@@ -20,7 +20,7 @@ _THINNEST = 1e-6
 NO_SOLID = "the triangles make no solid; save the part as a closed mesh."
 ROUGH_MM = 0.1
 CROSSED_A_LITTLE = f"crossings of less than {ROUGH_MM:g} mm were taken as noise"
-"""That is noise where the mesh is drawn anew, and refused elsewhere."""
+"""That is noise where the mesh is drawn anew; elsewhere corners are moved, or it is refused."""
 INSIDE_OUT = "it was inside out, and was turned"
 
 
@@ -120,9 +120,6 @@ def _united(path: Path, mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
         said = [CROSSED_A_LITTLE]
     if ambiguous.any():
         _refuse_crossing(path, where[ambiguous][0])
-    if alone.all() and (moved := uncrossed(mesh, np.concatenate([pair for pair, _ in found]), ROUGH_MM)) is not None:
-        far = np.linalg.norm(moved.corners - mesh.corners, axis=1).max()
-        return moved, (f"corners were moved by up to {far:.2g} mm where the surface crossed itself",)
     pairs = pairs[~alone]
     if not len(pairs):
         return mesh, tuple(said)
