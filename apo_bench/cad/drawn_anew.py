@@ -1,17 +1,20 @@
 """When a mesh is drawn anew: where its faces have corners inside of them, or are hidden by noise, [mm]."""
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from apo_bench.cad.faces.bands import without_bands
 from apo_bench.cad.faces.facets import facets_of
 from apo_bench.cad.faces.fitting import border_of
 from apo_bench.cad.faces.parallel import regular
+from apo_bench.cad.faces.patch import rough_of
 from apo_bench.cad.faces.polygons import seen_from_corners, with_rings
 from apo_bench.cad.faces.redrawing import redrawn
 from apo_bench.cad.faces.regions import regions_of
-from apo_bench.cad.faces.rough import patches_of, rough_of, together
+from apo_bench.cad.faces.rough import patches_of, together
 from apo_bench.cad.meshes.crossings import crossings
 from apo_bench.cad.solids.bodies import body_of, mesh_of
 from apo_bench.cad.solids.raw_solid import Mesh, Region
@@ -38,6 +41,8 @@ _MANY = 0.05
 remeshed, or so many faces, both for each of its own; drawing anew takes long, and does not help otherwise."""
 _PART_OF_TIME = 0.4
 """Of what reading the file may take; a mesh for which that does not do is left as it is."""
+_PART_OF_FINE = 0.1
+"""... and so much of it for the finest of them, with which faces fall to bits where corners are farther off."""
 _VOLUME = 0.02
 """... and changes its volume by no more than this part."""
 
@@ -79,10 +84,13 @@ def faces_of(mesh: Mesh, fewest: int) -> Faces:
     try:
         with time_limit("drawing the mesh anew", "save it with fewer triangles", limit_s):
             for anew in _anew(mesh, fewest):
-                if _share(anew) > share + _MORE or _is_simpler(anew, best):
-                    share = _share(anew)
+                more, whole = _share(anew), sum(region.is_whole for region in anew.regions)
+                is_rounder = more > _ALL and whole > sum(region.is_whole for region in best.regions)
+                if more > share + _MORE or is_rounder or _is_simpler(anew, best):
+                    share = more
                     best = anew
-                if share > _ALL:
+                # Part of a wall may be what noise leaves of a whole one.
+                if share > _ALL and all(region.is_whole for region in best.regions if region.is_round):
                     break
     except InputError as error:  # faces as they were found are better than none
         best = best._replace(said=(*best.said, str(error).split(";")[0] + ", so it was left as it is"))
@@ -95,7 +103,13 @@ def _anew(mesh: Mesh, fewest: int) -> Iterator[Faces]:
         if near > _NEAREST * mesh.extent:
             return
         rough = rough_of(mesh, near, fewest)
-        patches = together(rough, regular(rough, with_rings(rough, patches_of(rough), fewest)))
+        found = None
+        limit_s = (_PART_OF_FINE if near == _NEAR_MM[0] else _PART_OF_TIME) * limit_of(len(mesh.triangles))
+        with suppress(InputError), time_limit("finding its faces", "", limit_s):
+            found = without_bands(rough, patches_of(rough), fewest)
+        if found is None:
+            continue
+        patches = together(rough, regular(rough, with_rings(rough, found, fewest)))
         drawn = redrawn(rough, seen_from_corners(rough, patches))
         if drawn is None or not _is_sound(drawn.mesh, mesh, drawn.regions):
             continue

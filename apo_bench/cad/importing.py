@@ -12,8 +12,9 @@ import numpy as np
 from apo_bench.cad.drawn_anew import faces_of
 from apo_bench.cad.faces.facets import FEWEST_SIDES
 from apo_bench.cad.from_regions import contact_faces, moments_of_pieces, solid_moments
+from apo_bench.cad.meshes.crossings import uncrossed
 from apo_bench.cad.meshes.mesh_file import CadFile, read_meshes
-from apo_bench.cad.meshes.shells import CROSSED_A_LITTLE, check_uncrossed, closed_solids
+from apo_bench.cad.meshes.shells import CROSSED_A_LITTLE, ROUGH_MM, check_uncrossed, closed_solids
 from apo_bench.cad.pieces.cutting import Cut, cut
 from apo_bench.cad.solids.drawn import keep_drawn
 from apo_bench.cad.solids.naming import with_names
@@ -82,7 +83,12 @@ def raw_solids(path: Path, unit: str | None, fewest_sides: int = FEWEST_SIDES) -
 def _with_faces(path: Path, raw: RawSolid, fewest_sides: int) -> RawSolid:
     faces = faces_of(raw.mesh, fewest_sides)
     if CROSSED_A_LITTLE in raw.mended and faces.mesh is raw.mesh:
-        check_uncrossed(path, raw.mesh)
+        moved = uncrossed(raw.mesh, ROUGH_MM)
+        check_uncrossed(path, moved)
+        far = np.linalg.norm(moved.corners - raw.mesh.corners, axis=1).max()
+        said = f"corners were moved by up to {far:.2g} mm where the surface crossed itself"
+        faces = faces._replace(mesh=moved, said=(*faces.said, said))
+        raw = replace(raw, mended=tuple(each for each in raw.mended if each != CROSSED_A_LITTLE))
     regions = with_names(faces.mesh, faces.regions)
     return replace(raw, mesh=faces.mesh, regions=regions, facets=faces.facets, mended=(*raw.mended, *faces.said))
 

@@ -24,7 +24,7 @@ from apo_bench.geometry import (
     sides_of,
 )
 from apo_bench.geometry.penetration import intrusion
-from apo_bench.geometry.swept import overlap_intervals
+from tests.geometry.overlaps import overlap_intervals
 
 
 def posed(rng: np.random.Generator, reach: float = 0.05) -> np.ndarray:

@@ -8,8 +8,8 @@ from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import Array, Box, Hull, Posed, Solid, exit_distance, intrusion_depths, is_way_free, pose
-from apo_bench.geometry.swept import overlap_intervals
 from tests import scenes
+from tests.geometry.overlaps import overlap_intervals
 
 X, Y, Z = np.eye(3)
 

@@ -121,7 +121,7 @@ def refined(start: Round | None, points: Array, cone: bool) -> Round | None:
     first = [0.0, 0.0, 0.0, 0.0, radius / size, *([slope] if cone else [])]
     if len(points) < len(first) or not np.isfinite(off(np.array(first))).all():
         return None
-    solved = least_squares(off, first, slopes, method="lm", xtol=1e-14, ftol=1e-14, gtol=1e-14, max_nfev=200)
+    solved = least_squares(off, first, slopes, method="lm", xtol=1e-10, ftol=1e-8, gtol=1e-14, max_nfev=50)
     fitted = moved(solved.x)
     return fitted if np.isfinite(solved.x).all() and fitted.radius > 0.0 else None
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.cad.faces.fitting import Round, circle_through
-from apo_bench.cad.faces.rough import Patch, Plane, Rough
+from apo_bench.cad.faces.patch import Patch, Plane, Rough
 from apo_bench.geometry import Array
 
 

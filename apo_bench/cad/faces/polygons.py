@@ -6,7 +6,7 @@ import numpy as np
 
 from apo_bench.cad.faces.facets import widest_of
 from apo_bench.cad.faces.fitting import NEAR_MM, Round, axis_of, circle_through
-from apo_bench.cad.faces.rough import Patch, Plane, Rough
+from apo_bench.cad.faces.patch import Patch, Plane, Rough
 from apo_bench.cad.solids.raw_solid import connected, square_to
 from apo_bench.geometry import WHOLE_TURN, Array
 

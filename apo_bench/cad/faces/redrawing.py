@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from apo_bench.cad.faces.fitting import Round, plane_region, round_region, turn_of
-from apo_bench.cad.faces.rough import Patch, Plane, Rough, normals_at
+from apo_bench.cad.faces.patch import Patch, Plane, Rough, normals_at
 from apo_bench.cad.solids.raw_solid import Mesh, Region, square_to
 from apo_bench.geometry import Array
 

@@ -4,22 +4,23 @@ Here a triangle lies on a surface if its corners are near to it, however it is t
 """
 
 from collections.abc import Iterator
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.faces.facets import edges_of, widest_of
 from apo_bench.cad.faces.fitting import Round, axis_of, circle_through, refined
-from apo_bench.cad.solids.raw_solid import Mesh, connected
+from apo_bench.cad.faces.patch import Patch, Plane, Rough, bend_along, normals_at, owner_of
+from apo_bench.cad.solids.raw_solid import connected
 from apo_bench.geometry import Array
 
-_WEAK = 4.0
-"""The normal of a triangle that is less high than so many distances says nothing."""
 _WHOLE = 0.995
 """So much of a smooth part of a surface is on one face if all of it is."""
 _SPREAD = 0.45
 """Corners of a face are nearer to it than this part of what is allowed, root mean square; those of a band that was
 grown on a free surface are not."""
+_BENT = 0.4
+_MOSTLY = 0.65
+"""... nor are those that bend so much of it along the axis, which is so much of all that their corners are off."""
 _TURNED_RAD = 0.6
 _SEEDS = 3
 _BALLS = (12, 48, 192)
@@ -29,6 +30,8 @@ _FLAT = 0.995
 _FEWEST_CORNERS = 10
 """Through fewer there is a wall nearly always."""
 _MOST_FAILED = 5
+_BIT = 0.01
+"""Where the largest face is so little of what is left, that is a free surface."""
 _LEAST = 2e-4
 """Faces are no smaller than this part of the surface."""
 _CRUMB = 0.1
@@ -36,66 +39,6 @@ _CRUMB = 0.1
 _FLATTEST = 5.0
 """No wall has a radius so much larger than the part."""
 _LEAST_SLOPE = 0.02
-
-
-class Plane(NamedTuple):
-    """A flat surface."""
-
-    normal: Array
-    offset: float
-
-    def off(self, points: Array) -> Array:
-        """How far points are above it, (k,)."""
-        return np.asarray(points @ self.normal - self.offset)
-
-
-def normals_at(surface: Plane | Round, points: Array) -> Array:
-    """Outward normals of a surface under points, (k, 3)."""
-    return surface.normals(surface.polar(points)[2]) if isinstance(surface, Round) else surface.normal
-
-
-class Patch(NamedTuple):
-    """Triangles on one surface."""
-
-    surface: Plane | Round | None
-    """None: neither flat nor round."""
-    triangles: Any
-    hole: bool = False
-    sides: int = 0
-    """Of a whole turn of it; 0: that is not known."""
-
-
-class Rough(NamedTuple):
-    """A mesh and what is asked of it again and again."""
-
-    mesh: Mesh
-    near: float
-    """How far corners may be off a face."""
-    normals: Array
-    weak: Any
-    areas: Array
-    middles: Array
-    smooth: Any
-    """Pairs of triangles, (s, 2)."""
-
-    def points(self, triangles: Any) -> Array:
-        return self.mesh.corners[np.unique(self.mesh.triangles[triangles])]
-
-
-def rough_of(mesh: Mesh, near: float, fewest: int) -> Rough:
-    """Normals of narrow triangles are those of the neighbours across their longest edges."""
-    size = np.linalg.norm(mesh.across, axis=1)
-    normals = mesh.across / np.maximum(size, 1e-300)[:, None]
-    own, other, length, longest = edges_of(mesh)
-    high = size / np.maximum(longest, 1e-300)
-    weak = high < _WEAK * near
-    take = weak[own] & (length > longest[own] * (1.0 - 1e-9)) & (high[other] > 1.5 * high[own])
-    for _ in range(4):
-        normals[own[take]] = normals[other[take]]
-    i, k = mesh.neighbours.T
-    smooth = mesh.neighbours[(normals[i] * normals[k]).sum(axis=1) > np.cos(widest_of(fewest))]
-    middles = mesh.corners[mesh.triangles].mean(axis=1)
-    return Rough(mesh, near, normals, weak, size / 2.0, middles, smooth)
 
 
 def patches_of(rough: Rough) -> list[Patch]:
@@ -110,14 +53,16 @@ def patches_of(rough: Rough) -> list[Patch]:
 def _patches_in(rough: Rough, group: Any) -> Iterator[Patch]:
     """Faces in a smooth part of the surface: one that is all of it, or the largest ones that grow from seeds."""
     strong = group[~rough.weak[group]]
-    strong = strong if len(strong) else group
+    half = rough.areas[group].sum() / 2.0
+    strong = strong if rough.areas[strong].sum() > half else group
     for kind in ("plane", "cylinder", "cone"):
         surface = _fitted(rough, kind, strong)
         if surface is not None:
             mine, hole = _on(rough, surface, group)
             if rough.areas[np.intersect1d(mine, strong)].sum() > _WHOLE * rough.areas[strong].sum():
                 stray = np.setdiff1d(group, np.concatenate([mine, strong]))  # narrow, and of another face
-                yield Patch(surface, np.setdiff1d(group, stray), hole)
+                whole = np.setdiff1d(group, stray)
+                yield Patch(_fitted(rough, kind, mine, surface) or surface, whole, hole)
                 if len(stray):
                     yield Patch(None, stray)
                 return
@@ -125,9 +70,10 @@ def _patches_in(rough: Rough, group: Any) -> Iterator[Patch]:
     left = group
     free = [group[:0]]
     failed = 0
-    while rough.areas[left].sum() > least and failed < _MOST_FAILED:
+    while (area := rough.areas[left].sum()) > least and failed < _MOST_FAILED:
         best = _largest(rough, left)
-        if best is not None and rough.areas[best.triangles].sum() > least and _is_tight(rough, best):
+        fewest = max(least, _BIT * area if area > half else 0.0)
+        if best is not None and rough.areas[best.triangles].sum() > fewest:
             yield best
             gone = best.triangles
             failed = 0
@@ -144,8 +90,11 @@ def _patches_in(rough: Rough, group: Any) -> Iterator[Patch]:
 def _is_tight(rough: Rough, patch: Patch) -> bool:
     points = rough.points(patch.triangles)
     off = patch.surface.off(points) if patch.surface is not None else np.ones(1)
-    is_sure = isinstance(patch.surface, Plane) or len(points) >= _FEWEST_CORNERS
-    return is_sure and float(np.sqrt((off**2).mean())) < _SPREAD * rough.near
+    bend, share = bend_along(patch.surface, points)
+    is_few = len(points) < _FEWEST_CORNERS and isinstance(patch.surface, Round)
+    if is_few or (bend > _BENT * rough.near and share > _MOSTLY):
+        return False
+    return float(np.sqrt((off**2).mean())) < _SPREAD * rough.near
 
 
 def _largest(rough: Rough, left: Any) -> Patch | None:
@@ -257,7 +206,7 @@ def _facing(rough: Rough, surface: Plane | Round, triangles: Any) -> Array:
 
 def _at_nearest(rough: Rough, patches: list[Patch]) -> list[Patch]:
     """With triangles between faces that go over into each other smoothly on the one that they are nearer to."""
-    owner = _owner(rough, patches)
+    owner = owner_of(rough, patches)
     pairs = rough.mesh.neighbours
     sizes = np.bincount(owner, rough.areas, len(patches)) / rough.areas.sum()
     free = np.array([p.surface is None for p in patches])
@@ -290,7 +239,7 @@ def _at_nearest(rough: Rough, patches: list[Patch]) -> list[Patch]:
 
 def together(rough: Rough, patches: list[Patch]) -> list[Patch]:
     """With faces that touch and lie on one surface as one, which narrow triangles had cut in two."""
-    owner = _owner(rough, patches)
+    owner = owner_of(rough, patches)
     beside = np.unique(np.sort(owner[rough.mesh.neighbours], axis=1), axis=0)
     both = np.concatenate([beside, beside[:, ::-1]]).tolist()
     same = [(i, k) for i, k in both if i != k and _is_same(rough, patches[i], patches[k])]
@@ -314,7 +263,7 @@ def _is_same(rough: Rough, a: Patch, b: Patch) -> bool:
 
 def _without_crumbs(rough: Rough, patches: list[Patch]) -> list[Patch]:
     """Without small faces across a shallow edge, all of whose corners lie on the large faces around them."""
-    owner = _owner(rough, patches)
+    owner = owner_of(rough, patches)
     sizes = np.bincount(owner, rough.areas, len(patches))
     pairs = owner[rough.mesh.neighbours]
     for k, patch in enumerate(patches):
@@ -332,14 +281,6 @@ def _without_crumbs(rough: Rough, patches: list[Patch]) -> list[Patch]:
         if near and looks[middle.argmin(axis=0), np.arange(len(patch.triangles))].all():
             owner[patch.triangles] = np.array(large)[middle.argmin(axis=0)]
     return [p._replace(triangles=np.flatnonzero(owner == k)) for k, p in enumerate(patches) if (owner == k).any()]
-
-
-def _owner(rough: Rough, patches: list[Patch]) -> Any:
-    """The face of each triangle."""
-    owner = np.full(len(rough.areas), -1)
-    for k, patch in enumerate(patches):
-        owner[patch.triangles] = k
-    return owner
 
 
 def _cost(rough: Rough, patches: list[Patch], owner: Any, triangles: Any) -> Array:

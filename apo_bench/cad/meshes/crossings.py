@@ -10,6 +10,10 @@ from apo_bench.geometry import Array
 
 _AT_ONCE = 200_000
 _OF_TWO = np.array([[0, 0], [0, 1], [1, 0], [1, 1]])
+_TRIES = 4
+_DIGITS = 7
+_BEYOND = 1e-5
+"""A corner that is moved out of a triangle is beyond its plane by so much of the size."""
 _INSIDE = 1e-6
 """Crossings nearer to an edge than this part of a triangle are touches."""
 
@@ -30,6 +34,31 @@ def crossings(mesh: Mesh, off: Array | None = None) -> Iterator[tuple[Any, Array
             which, where = _through(mesh.corners[edges], mesh.corners[sheets], least)
             if len(which):
                 yield pairs[apart][which], where
+
+
+def uncrossed(mesh: Mesh, most: float) -> Mesh:
+    """The mesh with corners moved back out of triangles that they pierce, by no more than that, as far as that does.
+
+    Args:
+        most: [mm].
+    """
+    new = mesh
+    for _ in range(_TRIES):
+        pairs = np.concatenate([np.zeros((0, 2), dtype=np.int64), *(found for found, _ in crossings(new))])
+        corners = new.corners.copy()
+        for pair in pairs:
+            # Corners of that triangle which reaches less far through the other one go back to where most of it is.
+            ways = []
+            for edges, sheet in (pair, pair[::-1]):
+                n = mesh.across[sheet] / np.linalg.norm(mesh.across[sheet])
+                height = (corners[mesh.triangles[edges]] - corners[mesh.triangles[sheet, 0]]) @ n
+                side = np.sign(height[np.abs(height).argmax()])
+                off = np.minimum(side * height - _BEYOND * mesh.extent, 0.0)
+                ways.append((round(-off.min() / mesh.extent, _DIGITS), mesh.triangles[edges], np.outer(side * off, n)))
+            _, which, way = min(ways, key=lambda each: each[0])
+            corners[which] -= way
+        new = Mesh(corners, mesh.triangles)
+    return new if np.linalg.norm(new.corners - mesh.corners, axis=1).max() < most else mesh
 
 
 def _near(mesh: Mesh) -> Iterator[Any]:

@@ -20,7 +20,7 @@ _THINNEST = 1e-6
 NO_SOLID = "the triangles make no solid; save the part as a closed mesh."
 ROUGH_MM = 0.1
 CROSSED_A_LITTLE = f"crossings of less than {ROUGH_MM:g} mm were taken as noise"
-"""That is noise where the mesh is drawn anew, and refused elsewhere."""
+"""That is noise where the mesh is drawn anew; elsewhere corners are moved, or it is refused."""
 INSIDE_OUT = "it was inside out, and was turned"
 
 

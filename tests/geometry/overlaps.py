@@ -1,0 +1,27 @@
+"""Where on a line parts overlap, from all pairs of their pieces: what swept parts are held against."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from apo_bench.geometry import Array, Posed
+from apo_bench.geometry.solid import all_boxes
+from apo_bench.geometry.swept import _ANYWHERE, _SLACK_M, _boxed, _exactly
+
+
+def overlap_intervals(
+    moving: Posed, way: Array, resting: Posed, slack_m: float = _SLACK_M, within: tuple[float, float] = _ANYWHERE
+) -> Array:
+    """Where along a line the pieces of two parts overlap by more than a slack, (k, 2), [m]: from and until.
+
+    Args:
+        way: Unit vector of the motion, (3,), world.
+        slack_m: Negative: pieces count that are still this far apart.
+        within: Overlaps that end before or begin after these places may be left out, [m].
+    """
+    pairs, spans = _boxed(moving, way, resting, slack_m, within)
+    if all_boxes(moving.pieces) and all_boxes(resting.pieces):
+        return spans
+    near = (spans[:, 1] > within[0]) & (spans[:, 0] < within[1])
+    exact = [_exactly(moving, way, resting, slack_m, int(k)) for k in pairs[near]]
+    return np.concatenate([np.zeros((0, 2)), *exact])
