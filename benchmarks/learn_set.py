@@ -28,7 +28,6 @@ from pathlib import Path
 from typing import Any, final
 
 import numpy as np
-from apo_bench.trial.pose_error import goal_errors
 
 from apo_bench import Assembly, Demonstration, Observation, draw_layout, load_scenario
 from apo_bench.assembly import lowered_observation
@@ -42,6 +41,7 @@ from apo_bench.observation.looking import observe
 from apo_bench.observation.models.isotropic import Isotropic
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.scenario.scenario import Scenario
+from apo_bench.trial.outcome_columns import goal_errors
 from benchmarks.failures import right
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -68,12 +68,13 @@ def test_crumbs_that_hang_on_nothing_are_left_out() -> None:
         return Hull("", np.array(list(product((x - half, x + half), *[(-half, half)] * 2))))
 
     near, far, crumb = cube(0.0, 0.01), cube(0.0205, 0.01), cube(0.05, 0.0005)
-    kept, lost = cutting._without_crumbs([crumb, near, cube(0.02, 0.01)], 2.0)
+    kept, lost, is_one = cutting._without_crumbs([crumb, near, cube(0.02, 0.01)], 2.0)
     assert len(kept) == 2
     assert lost == pytest.approx([1.0])
+    assert is_one
     # What is more is no crumb: it stays, and is refused with the part.
-    assert cutting._without_crumbs([near, far], 2.0) == ([near, far], [])
-    assert cutting._without_crumbs([near], 2.0) == ([near], [])
+    assert cutting._without_crumbs([near, far], 2.0) == ([near, far], [], False)
+    assert cutting._without_crumbs([near], 2.0) == ([near], [], True)
 
 
 def test_what_has_more_triangles_may_take_longer_up_to_a_limit() -> None:

@@ -11,7 +11,7 @@ import pytest
 from apo_bench import Scene, build_scene, demonstrate, draw_layout, load_scenario
 from apo_bench.geometry import pose
 from apo_bench.simulation.scene import apart
-from apo_bench.simulation.scene.settling import NO_BOUNDS
+from apo_bench.simulation.scene.bounds import NO_BOUNDS
 from apo_bench.simulation.scene.world import World, initial_state, place
 
 ROUND = ("peg_in_hole", "nested_bushings", "shaft_through_brackets", "l_bracket_on_plate")

@@ -18,9 +18,9 @@ from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.physics import Physics, physics
+from apo_bench.simulation.scene.bounds import bounds_of
 from apo_bench.simulation.scene.composing import fixed_parts, movable_parts, room_with_parts, with_arm, with_hands
 from apo_bench.simulation.scene.geoms import SMOOTH_PRIORITY
-from apo_bench.simulation.scene.settling import bounds_of
 from apo_bench.simulation.scene.world import World, leave_wrist_unfelt, world
 
 _GRAVITY = 9.81

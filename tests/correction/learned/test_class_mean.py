@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from apo_bench.trial.pose_error import goal_errors
 
 from apo_bench import correct, load_scenario
 from apo_bench.correction.learned.class_mean import ClassMean, class_mean
 from apo_bench.geometry import pose
+from apo_bench.trial.outcome_columns import goal_errors
 from tests.correction.learned.test_learned import seen
 
 RNG = np.random.default_rng(35)
