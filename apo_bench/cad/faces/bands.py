@@ -38,7 +38,7 @@ def without_bands(rough: Rough, patches: list[Patch], fewest: int) -> list[Patch
     own, other, length = own[rows], other[rows], length[rows]
     ends = rough.mesh.corners[np.tile(rough.mesh.edges, (2, 1))[rows]]
     here, beyond = owner[own], owner[other]
-    n, m = (_normals(rough, patches, each, ends.mean(axis=1)) for each in (own, other))
+    n, m = (_normals(rough, patches, owner, each, ends.mean(axis=1)) for each in (own, other))
     # The edges of the second half are directed as in the triangle beyond.
     forth = np.where(rows < len(rough.mesh.edges), 1.0, -1.0)
     angle = np.arcsin(np.clip(np.linalg.norm(np.cross(n, m), axis=1), 0.0, 1.0))
@@ -86,12 +86,12 @@ def without_bands(rough: Rough, patches: list[Patch], fewest: int) -> list[Patch
     return [*(p for p, is_free in zip(patches, free, strict=True) if not is_free), *loose]
 
 
-def _normals(rough: Rough, patches: Sequence[Patch], triangles: Any, points: Array) -> Array:
+def _normals(rough: Rough, patches: Sequence[Patch], owner: Any, triangles: Any, points: Array) -> Array:
     """Outward ones, of the faces of triangles, or of the triangles themselves, at points beside them, (k, 3)."""
     normals = rough.normals[triangles].copy()
-    owner = owner_of(rough, patches)[triangles]
-    for k in np.unique(owner):
+    faces = owner[triangles]
+    for k in np.unique(faces):
         if (surface := patches[k].surface) is not None:
-            mine = owner == k
+            mine = faces == k
             normals[mine] = (-1.0 if patches[k].hole else 1.0) * normals_at(surface, points[mine])
     return normals

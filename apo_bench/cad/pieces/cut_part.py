@@ -6,6 +6,9 @@ import numpy as np
 
 from apo_bench.geometry import Array
 
+SLIVER = 1e-7
+"""What is less than this part of a solid is rounding."""
+
 
 class CutPart(NamedTuple):
     """A part of a solid that is to be one piece."""
@@ -23,3 +26,9 @@ class CutPart(NamedTuple):
         planes = np.concatenate([self.planes, [[*n, d]]])
         above = CutPart(self.body.trim_by_plane(n, d + hair), planes)
         return above, CutPart(self.body.trim_by_plane(-n, hair - d), planes)
+
+
+def bodies_of(halves: tuple[CutPart, CutPart], least: float) -> list[CutPart]:
+    """The bodies that halves consist of, less those of so little volume, [mm^3]."""
+    every = (CutPart(body, half.planes) for half in halves for body in half.body.decompose())
+    return [each for each in every if each.body.volume() > least]

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.cad.pieces.corners import corners_of
-from apo_bench.cad.pieces.cut_part import CutPart
+from apo_bench.cad.pieces.cut_part import SLIVER, CutPart
 from apo_bench.cad.pieces.refining import Beside, refined
 from apo_bench.cad.solids.bodies import mesh_of
 from apo_bench.cad.solids.raw_solid import Region
@@ -46,7 +46,7 @@ def _cut(
 ) -> Iterator[CutPart]:
     """Cut along planes of reflex edges, as long as there are cuts left."""
     to_cut = [part]
-    least = 1e-7 * volume
+    least = SLIVER * volume
     while to_cut:
         whole, along = to_cut.pop()
         # The bodies that one consists of; the whole, if there is a cavity in one of them: a smaller one is rounding.

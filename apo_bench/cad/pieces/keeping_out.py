@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.pieces.cut_part import CutPart
+from apo_bench.cad.pieces.cut_part import SLIVER, CutPart, bodies_of
 from apo_bench.cad.solids.bodies import mesh_of
 from apo_bench.geometry import Array
 
@@ -24,7 +24,6 @@ _FREE = 0.05
 _MOST_LOST = 0.05
 _LEFT = 0.01
 """Of a part so much may be trimmed, if no more than this part of what reaches into others is left then."""
-_SLIVER = 1e-7
 
 
 def keeping_out(parts: Iterable[CutPart], solid: Any, mates: Any, hair: float) -> Iterator[CutPart]:
@@ -34,7 +33,7 @@ def keeping_out(parts: Iterable[CutPart], solid: Any, mates: Any, hair: float) -
         solid: The whole one: where others are inside of that as drawn, nothing is cut.
         mates: All others at their places, as one body.
     """
-    least = _SLIVER * solid.volume()
+    least = SLIVER * solid.volume()
     more = _MOST_MORE
     to_cut = [*parts][::-1]
     while to_cut:
@@ -58,9 +57,7 @@ def _apart(part: CutPart, solid: Any, mates: Any, hair: float, least: float) -> 
     whole = CutPart(part.body ^ own, part.planes)
     best, smallest = [part], _BETTER * into.volume()
     for n, d in _sides(into):
-        halves = whole.halves(n, d, hair)
-        bodies = [CutPart(body, half.planes) for half in halves for body in half.body.decompose()]
-        bodies = [each for each in bodies if each.body.volume() > least]
+        bodies = bodies_of(whole.halves(n, d, hair), least)
         left = [((each.body.hull() ^ near) - own).volume() for each in bodies]
         # Around others the first cut takes a side off that is free, and no more.
         free = sum(each.body.volume() for each, more in zip(bodies, left, strict=True) if more < least)

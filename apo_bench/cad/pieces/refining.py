@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from apo_bench.cad.pieces.corners import LEFT_MM, is_thick, reduced
-from apo_bench.cad.pieces.cut_part import CutPart
+from apo_bench.cad.pieces.cut_part import SLIVER, CutPart, bodies_of
 from apo_bench.cad.pieces.misfit import depths
 from apo_bench.cad.solids.bodies import mesh_of
 from apo_bench.cad.solids.raw_solid import Mesh, square_to
@@ -37,7 +37,6 @@ _MOST_SPARE = 4.0
 """Of a part so much may be taken away, or so many times what its hull fills beyond it."""
 _SAME = 1e-3
 """Planes are one if normals and offsets, [mm], differ by less."""
-_SLIVER = 1e-7
 
 
 @final
@@ -105,7 +104,7 @@ def refined(parts: Iterable[CutPart], beside: Beside, volume: float, hair: float
     while queue:
         share, _, part, worst = heappop(queue)
         more = share < 0.0 and done + len(queue) < most
-        pieces = _best(part, worst, _SLIVER * volume, hair) if more else [part]
+        pieces = _best(part, worst, SLIVER * volume, hair) if more else [part]
         if len(pieces) < 2:
             done += 1
             yield _within(part, beside) if beside.trims else part
@@ -174,8 +173,7 @@ def _best(part: CutPart, worst: _Worst, least: float, hair: float) -> list[CutPa
         halves = part.halves(n, float(n @ worst.point), hair)
         if min(half.body.volume() for half in halves) < least:
             continue
-        bodies = [CutPart(body, half.planes) for half in halves for body in half.body.decompose()]
-        bodies = [each for each in bodies if each.body.volume() > least]
+        bodies = bodies_of(halves, least)
         filled = float(sum(each.body.hull().volume() for each in bodies))
         if filled < smallest:
             smallest = filled
