@@ -12,7 +12,7 @@ import numpy as np
 
 from apo_bench.datasets.card import About, Field, Rollout
 from apo_bench.datasets.episodes import about_replays, replay_rollouts, replays, write_parquet
-from apo_bench.datasets.lerobot import write_lerobot, write_minari
+from apo_bench.datasets.loaders import write_lerobot, write_minari
 from apo_bench.envs.policies import POLICIES, insert_env
 from apo_bench.errors import InputError, require, require_known
 from apo_bench.names import resolve

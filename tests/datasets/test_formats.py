@@ -14,7 +14,7 @@ from gymnasium.envs.registration import EnvSpec
 from pyarrow import parquet
 
 from apo_bench import InputError, TrialSettings
-from apo_bench.datasets.lerobot import write_minari
+from apo_bench.datasets.loaders import write_minari
 from apo_bench.datasets.making import make_dataset
 
 REPLAYED = [
