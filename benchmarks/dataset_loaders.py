@@ -2,24 +2,31 @@
 
 Replays and insertions are made here in every format, and read in environments made for it by pip: by LeRobot (with
 `--python312`, since it needs Python 3.12 or later; its PyTorch is some 5 GB), by Minari, and by mlcroissant. Each says
-what it found, compared with what PyArrow or h5py read here. `--envs FOLDER` keeps the environments for the next time.
+what it found, compared with what PyArrow or h5py read here. LeRobot also trains a small policy and evaluates it, as the
+guide says. `--envs FOLDER` keeps the environments for the next time.
 Needs h5py: `pip install apo_bench[data]`.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
+import re
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 
+ROOT = Path(__file__).resolve().parents[1]
 MADE = {
     "replays": ("block_on_block", "dovetail", "--episodes", "2", "--level", "2", "--method", "contact"),
     "insertions": ("block_on_block", "--episodes", "2", "--record", "insertions"),
 }
-NEEDS = {"lerobot": ("lerobot[dataset]",), "minari": ("minari[hdf5]", "pillow", "mlcroissant[parquet]")}
+NEEDS = {
+    "lerobot": ("lerobot[dataset,training]", str(ROOT)),
+    "minari": ("minari[hdf5]", "pillow", "mlcroissant[parquet]"),
+}
 LEROBOT = """
 import sys
 from importlib.metadata import version
@@ -94,6 +101,30 @@ def environment(folder: Path, python: str, needs: tuple[str, ...]) -> Path:
     return made
 
 
+def trains(python: Path, data: Path) -> None:
+    """A few steps of a small policy, and an episode of it, by LeRobot's commands and the files of the guide."""
+    here = data.parent / "trained"
+    guide = (ROOT / "docs" / "guide" / "insertion.md").read_text(encoding="utf-8")
+    for name, text in re.findall(r'^```py(?:thon)? title="([^"]+)"\n(.*?)^```$', guide, re.M | re.S):
+        (here / name).parent.mkdir(parents=True, exist_ok=True)
+        (here / name).write_text(text, encoding="utf-8")
+    small = "--policy.type=act --policy.dim_model=64 --policy.n_heads=2 --policy.push_to_hub=false"
+    steps = "--steps=5 --save_freq=5 --batch_size=8 --num_workers=0 --policy.device=cpu --output_dir=act"
+    taken = "--policy.path=act/checkpoints/last/pretrained_model --policy.device=cpu --env.type=apo_insert"
+    tried = "--env.discover_packages_path=apo_lerobot --eval.n_episodes=2 --eval.batch_size=2 --output_dir=tried"
+    for command, words in (
+        ("lerobot-train", f"{small} {steps} --dataset.repo_id=me/inserted --dataset.root={data}"),
+        ("lerobot-eval", f"{taken} {tried}"),
+    ):
+        alone = os.environ | {"PYTHONPATH": str(here), "HF_HUB_OFFLINE": "1", "HF_HOME": str(data.parent / "hub")}
+        told = [python.with_name(command), *words.split()]
+        done = subprocess.run(told, env=alone, cwd=here, capture_output=True, text=True)
+        if done.returncode:
+            sys.exit(f"{command} failed:\n{done.stderr[-2000:]}")
+    overall = json.loads((here / "tried" / "eval_info.json").read_text(encoding="utf-8"))["overall"]
+    print(f"  trained and evaluated: {overall['n_episodes']} episodes, {overall['pc_success']:.0f} % right", flush=True)
+
+
 def reads(python: Path, program: str, folder: Path) -> None:
     """Print what a loader says; end this program if it fails."""
     alone = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
@@ -124,6 +155,8 @@ def main() -> None:
                 print(f"{what}, {form}:", flush=True)
                 if form == "lerobot":
                     reads(lerobot, LEROBOT, out)
+                    if what == "insertions":
+                        trains(lerobot, out)
                 if form == "minari":
                     reads(others, MINARI, out)
                 reads(others, CROISSANT, out)

@@ -32,6 +32,8 @@ _CHUNK = 1000
 _FRAMES_OF_A_FILE = 200_000
 """Some 60 MB."""
 _QUANTILES = (0.01, 0.10, 0.50, 0.90, 0.99)
+_TOGETHER = "observation.environment_state"
+"""Policies of LeRobot look at the state, at this and at pictures, and at no other observation."""
 _OWN = {
     "next.reward": ("float32", "reward of the action"),
     "next.done": ("bool", "whether the episode is over after the action"),
@@ -67,6 +69,10 @@ def write_lerobot(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple
         OSError: Something cannot be written.
     """
     fields = {_called(name): field for name, field in about.fields.items()} | {"action": about.action}
+    apart = [] if _TOGETHER in fields else [name for name in fields if name not in (_called("agent_pos"), "action")]
+    if apart:
+        names = tuple(name for each in apart for name in fields[each].names)
+        fields[_TOGETHER] = Field(names, "", "", f"{' and '.join(apart)} in one row")
     schema = pa.schema(
         [(n, pa.float32() if len(f.names) == 1 else pa.list_(pa.float32(), len(f.names))) for n, f in fields.items()]
         + [(name, pa.bool_() if kind == "bool" else getattr(pa, kind)()) for name, (kind, _) in _OWN.items()]
@@ -86,6 +92,8 @@ def write_lerobot(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple
                 writer = opened.enter_context(parquet.ParquetWriter(opened.enter_context(to_write(path)), schema))
                 files += 1
             columns = _columns(rollout, e, frames, tasks.setdefault(rollout.task, len(tasks)))
+            if apart:
+                columns[_TOGETHER] = np.hstack([columns[name] for name in apart])
             writer.write_table(pa.table([_arrow(columns[each.name], each.type) for each in schema], schema=schema))
             of_episode = (e, [rollout.task], n, frames, frames + n, chunk, file, 0, 0)
             statistics = {f"stats/{x}/{y}": z for x, column in columns.items() for y, z in _statistics(column).items()}

@@ -1,7 +1,7 @@
 """One operation for learners: `APOInsert-v0`. It is long, as the docstring of the class is its page for learners."""
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +11,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Outcome, Poses, Snapshot
+from apo_bench.envs.episode import asked_options
 from apo_bench.envs.spaces import PIXELS, as_seen, insert_space
 from apo_bench.envs.starts import Begun, RobotSettings, Trials, judged
 from apo_bench.errors import InputError, require, unknown
@@ -214,13 +215,10 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         """
         if seed is not None:
             check("seed", int(seed))
-        require(
-            isinstance(options or {}, Mapping) and not set(options or {}) - {"trial"},
-            f"the options {options!r} were given to reset(); a dict with trial is allowed.",
-        )
+        asked = asked_options(options, ("trial",))
         super().reset(seed=seed)
         self._over = True
-        self._begin(self._drawn((options or {}).get("trial")))
+        self._begin(self._drawn(asked.get("trial")))
         return self._seen(), {}
 
     def _begin(self, begun: Begun) -> None:

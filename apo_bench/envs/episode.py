@@ -6,7 +6,7 @@ A vector environment gathers the infos of its environments into arrays. If the f
 that holds nothing but ints, and a None of the next one raises; numbers of these types go into an array of objects.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any, final
 
@@ -61,22 +61,30 @@ _OF_TOOLS = frozenset({"lerobot_new_rollout"})
 _OPTIONS = tuple(field.name for field in fields(Settings))
 
 
+def asked_options(options: object, allowed: Sequence[str]) -> dict[str, Any]:
+    """What is asked of `reset()`, without what evaluation tools pass to every environment.
+
+    Raises:
+        InputError: No dict, or an option that there is not.
+    """
+    if options is None:
+        return {}
+    if not isinstance(options, Mapping):
+        raise InputError(f"the options {options!r} were given to reset(); a dict with {', '.join(allowed)} is allowed.")
+    asked = {name: value for name, value in options.items() if name not in _OF_TOOLS}
+    for name in asked:
+        if name not in allowed:
+            raise InputError(unknown("option of reset()", str(name), allowed))
+    return asked
+
+
 def with_options(usual: Settings, options: object, eye: str) -> Settings:
-    """The settings of an episode: the usual ones, but for what the options say; those of tools say nothing.
+    """The settings of an episode: the usual ones, but for what the options say.
 
     Raises:
         InputError: An option that there is not, or a value that is not allowed.
     """
-    if options is None:
-        return usual
-    if not isinstance(options, Mapping):
-        raise InputError(
-            f"the options {options!r} were given to reset(); a dict with {', '.join(_OPTIONS)} is allowed."
-        )
-    changes: dict[str, Any] = {name: value for name, value in options.items() if name not in _OF_TOOLS}
-    for name in changes:
-        if name not in _OPTIONS:
-            raise InputError(unknown("option of reset()", str(name), _OPTIONS))
+    changes = asked_options(options, _OPTIONS)
     if "level" in changes:
         changes["level"] = Level(*level_pair(changes["level"], eye))
     return replace(usual, **changes)

@@ -74,6 +74,14 @@ def test_lerobot_finds_every_frame_where_its_table_of_episodes_says(lerobot: dic
     assert parquet.ParquetFile(root / "data" / "chunk-000" / "file-000.parquet").num_row_groups == 2
 
 
+def test_policies_of_lerobot_see_what_is_felt(lerobot: dict[str, Path]) -> None:
+    """They look at `environment_state`, never at a wrench."""
+    frames = columns(parquet.read_table(lerobot["insertions"] / "data"))
+    both = np.hstack([frames["observation.plan"], frames["observation.wrench"]])
+    np.testing.assert_array_equal(frames["observation.environment_state"], both)
+    assert np.abs(frames["observation.wrench"]).max() > 0.1
+
+
 def test_lerobot_has_statistics_of_every_feature_and_tasks_by_their_words(lerobot: dict[str, Path]) -> None:
     root = lerobot["replays"]
     info = json.loads((root / "meta" / "info.json").read_text())

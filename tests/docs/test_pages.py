@@ -229,6 +229,7 @@ def test_what_a_page_says_works_from_top_to_bottom(
             printed = capsys.readouterr().out
             assert each.output is None or same_output(printed, each.output), f"{each.text}\nprints\n{printed}"
         else:
+            Path(each.title).parent.mkdir(parents=True, exist_ok=True)
             Path(each.title).write_text(each.text, encoding="utf-8")
             assert not each.title.endswith(".xml") or load_part(Path(each.title)).pieces
     for name in set(sys.modules) - known:

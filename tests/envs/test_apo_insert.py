@@ -180,3 +180,4 @@ def test_wrong_calls_are_refused_in_one_sentence(env: APOInsert) -> None:
         env.step(np.full(7, 2.0, dtype=np.float32))
     with pytest.raises(InputError, match="options"):
         env.reset(options={"level": 2})
+    env.reset(options={"lerobot_new_rollout": True, **TRIAL})
