@@ -71,7 +71,10 @@ def scenario_new(
     order: Annotated[
         str | None, typer.Option(help="In which order parts are put, with commas. Default: an order that works.")
     ] = None,
-    clearance: Annotated[float, typer.Option(help="Room per side of faces marked as fit, mm.")] = 0.25,
+    clearance: Annotated[
+        float | None,
+        typer.Option(help="Room per side of faces that fit, mm. Default: as parts were drawn, or 0.25."),
+    ] = None,
     loosen: Annotated[
         float,
         typer.Option(help="Parts drawn without play, or no deeper in each other, mm, get the clearance; 0: none do."),
@@ -90,7 +93,7 @@ def scenario_new(
         f"--out {out} is there already, maybe with changes by hand; name another, or add --overwrite.",
     )
     require(up is None or up in UPS, f"--up {up} was given; {', '.join(UPS)} are allowed.")
-    require(0.0 <= clearance <= 5.0, f"--clearance {clearance:g} was given; 0 to 5 mm are allowed.")
+    require(0.0 <= (clearance or 0.0) <= 5.0, f"--clearance {clearance} was given; 0 to 5 mm are allowed.")
     require(0.0 <= loosen <= 1.0, f"--loosen {loosen:g} was given; 0 to 1 mm are allowed.")
     named = [*(assembly or parts or []), *(more or [])]
     source = ", ".join(Path(each).name for each in named) if assembly else "" if poses is None else poses.name

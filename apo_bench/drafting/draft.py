@@ -12,7 +12,7 @@ from apo_bench.drafting.holding import Holds, found_holds
 from apo_bench.drafting.nests import FLOOR_M, RAISED_M, nest_of
 from apo_bench.drafting.ordering import OrderSearch, Placing
 from apo_bench.drafting.posed import TABLE, PosedPart
-from apo_bench.drafting.touching import clashes, closed, found_contacts, walls_without_play
+from apo_bench.drafting.touching import PLAY_M, clashes, closed, found_contacts, walls_without_play
 from apo_bench.drafting.waiting import Stance, laid_out, reach_of, site_of, stance
 from apo_bench.errors import InputError, unknown
 from apo_bench.geometry import Array, Solid, extent, pose
@@ -21,8 +21,6 @@ from apo_bench.scenario.scenario import Grasp, Site
 
 _OPENING_M = 0.046
 """How far each finger of the arm that comes with the benchmark opens."""
-_PLAY_M = 5e-4
-"""Flat walls that are so far apart fit."""
 _LOW_M = 1e-4
 _GROUP_ROOM_M = 0.05
 _FARTHEST_ASIDE_M = 0.26
@@ -89,7 +87,7 @@ def draft(
         (tuple(fixed), "as asked") if fixed else (lowest(parts)[:1], "the largest of those that lie lowest")
     )
     files = {each.name: each.file for each in parts}
-    given_mm = {each.name: max(each.fit.values(), default=0.0) for each in parts}
+    given_mm = {each.name: max([0.0, *each.fit.values()]) for each in parts}
     wrong = clashes(solids, poses, clearance_mm, files, given_mm)
     if wrong:
         raise RuntimeError("; ".join(wrong) + ".")
@@ -102,10 +100,10 @@ def draft(
             for contact, opposite in walls_without_play(solids, poses, contacts)
         ),
     ]
-    apart = set(found_contacts(solids, poses, _PLAY_M)) - {*contacts, *dropped}
+    apart = set(found_contacts(solids, poses, PLAY_M)) - {*contacts, *dropped}
     notes += [
         f"'{contact}' and '{opposite}' have play as drawn, so they are no contacts and correct nothing; draw them line "
-        "to line, and they touch, and get their play from --loosen"
+        "to line, and they touch, and get their play from --loosen; or alike in all pairs, with the part in the middle"
         for contact, opposite in walls_without_play(solids, poses, sorted(apart))
     ]
     reach = reach_of(solids, poses, [each.name for each in parts])

@@ -1,4 +1,5 @@
-"""Play for parts that were drawn without any: mating faces of the smaller part recede.
+"""Play for parts that were drawn without any: mating faces of the smaller part recede. And the play of those that were
+drawn with it: they are made as thick as there is room, so that walls touch, and the clearance makes them as drawn.
 
 Printed and moulded parts are often drawn line to line, or a little inside each other. Physics then finds no way in. So
 faces recede to where they only touch, and by the clearance; where nothing would be left of a piece, those of the larger
@@ -9,16 +10,19 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
+import numpy as np
+
 from apo_bench.assembly import Contact, PartFace, contact_kind, geometric_play
 from apo_bench.assembly.touching import facing
 from apo_bench.drafting.posed import PosedPart
-from apo_bench.drafting.touching import NEAR_M, NEAR_RAD, NO_PLAY_MM, SHARE, walls_without_play
+from apo_bench.drafting.touching import NEAR_M, NEAR_RAD, NO_PLAY_MM, PLAY_M, SHARE, walls_without_play
 from apo_bench.errors import InputError
 from apo_bench.geometry import physical_pieces
 from apo_bench.parts.agreement import with_fit
 
 LOOSEN_MM = 0.2
 """Faces that are deeper in each other are not made looser."""
+_ALIKE_MM = 0.02
 _OVER_MM = 1e-5
 _DIGITS = 5
 
@@ -54,6 +58,58 @@ def loosened(
         else:
             notes.append(why)
     return tuple(made.values()), tuple(notes)
+
+
+def filled(parts: Sequence[PosedPart]) -> tuple[tuple[PosedPart, ...], float | None, tuple[str, ...]]:
+    """The parts, some as thick as there is room between flat walls; the play per side, [mm]; what is to be said.
+
+    The smaller part of two is, where it stands in the middle, between walls of the other that are up to twice `PLAY_M`
+    farther apart than its own. There is one clearance in a scenario, so play that differs stays as it was drawn.
+    """
+    gaps = {
+        (thin.name, wide.name): _gaps(thin, wide)
+        for pair in combinations(parts, 2)
+        for wide, thin in [sorted(pair, key=lambda each: -each.solid.volume)]
+    }
+    held = {pair: {face: mm for face, (mm, walled) in faces.items() if walled} for pair, faces in gaps.items()}
+    plays = [mm for faces in held.values() for mm in faces.values()]
+    play_mm = round(float(np.median(plays)), 3) if plays else 0.0
+    made = {each.name: each for each in parts}
+    notes = []
+    for (own, other), faces in held.items():
+        # A wall that touches a third part, or is nearer to it, stays where it is.
+        nearest = [min(g[face][0] for (a, _), g in gaps.items() if a == own and face in g) for face in faces]
+        if not faces or max(abs(mm - play_mm) for mm in (*faces.values(), *nearest)) > _ALIKE_MM:
+            continue
+        part = made[own]
+        fit = {**part.fit, **{face: -round(mm, _DIGITS) for face, mm in faces.items()}}
+        made[own] = replace(part, solid=with_fit(part.solid, fit), fit=fit)
+        notes.append(
+            f"'{own}' was drawn with {play_mm:g} mm of play per side in '{other}': {len(faces)} of its faces are taken "
+            f"to touch, as stated under [parts.{own}.fit], so that contacts correct it; the clearance leaves the play"
+        )
+    return tuple(made.values()), (play_mm if notes else None), tuple(notes)
+
+
+def _gaps(own: PosedPart, other: PosedPart) -> dict[str, tuple[float, bool]]:
+    """Flat faces of the first part near the second -> the gap, [mm], and whether another face is opposite as far."""
+    solids = {each.name: each.solid for each in (own, other)}
+    poses = {each.name: each.T for each in (own, other)}
+    found = {
+        Contact(PartFace(own.name, each.a), PartFace(other.name, each.b)): 1e3 * each.gap_m
+        for each in facing(own.solid, own.T, other.solid, other.T, gap_m=PLAY_M, angle_rad=NEAR_RAD, share=SHARE)
+        if each.a in own.solid.faces
+    }
+    apart = [contact for contact, mm in found.items() if mm > 1e3 * NEAR_M]
+    walled = {
+        contact
+        for pair in walls_without_play(solids, poses, apart)
+        if abs(found[pair[0]] - found[pair[1]]) < _ALIKE_MM
+        for contact in pair
+    }
+    # Of a face that is near to several the nearest comes last.
+    order = sorted(found.items(), key=lambda each: -each[1])
+    return {contact.manipulated.face: (mm, contact in walled) for contact, mm in order}
 
 
 def _said(own: str, other: str, tight: Mapping[str, float]) -> str:

@@ -26,6 +26,8 @@ _CLOSED_RAD = 1e-4
 _ROUNDS = 8
 _ARM_M = 0.05
 """Turns count as what they move at this distance."""
+PLAY_M = 1e-3
+"""Flat walls that are so far apart fit."""
 DEEP_M = 2e-5
 """Parts that are deeper in each other do not only touch."""
 NO_PLAY_MM = 1e-3

@@ -5,10 +5,11 @@ from contextlib import suppress
 from dataclasses import replace
 
 from apo_bench.drafting.draft import Draft, NoOrder, draft, lowest
-from apo_bench.drafting.loosening import LOOSEN_MM, loosened
+from apo_bench.drafting.loosening import LOOSEN_MM, filled, loosened
 from apo_bench.drafting.posed import PosedPart, on_the_table
 from apo_bench.errors import InputError
 
+USUAL_MM = 0.25
 _FIRST = ("z", "-z", "x", "-x", "y", "-y")
 _MOST_BASES = 3
 
@@ -17,7 +18,7 @@ def drafted(
     parts: Sequence[PosedPart],
     up: str | None = None,
     fixed: Sequence[str] = (),
-    clearance_mm: float = 0.25,
+    clearance_mm: float | None = None,
     loosen_mm: float = LOOSEN_MM,
     asked: Sequence[str] = (),
 ) -> Draft:
@@ -26,6 +27,7 @@ def drafted(
     Args:
         up: An axis of `posed.UPS`; None: z, unless parts then find no order, do not stand, or cannot be held, and
             another axis is better.
+        clearance_mm: Room per side of faces that fit; None: as some parts were drawn, else `USUAL_MM`.
         loosen_mm: Parts without play are given some where they are no deeper in each other; 0: none are.
         asked: The parts that are moved, in the order in which they are put; none: any order.
 
@@ -33,7 +35,9 @@ def drafted(
         InputError: No part has that name, or there is no room on the table.
         RuntimeError: Parts are inside each other, or there is no order in which they can be put together.
     """
-    parts, said = loosened(parts, clearance_mm, loosen_mm)
+    parts, drawn_mm, said = filled(parts) if clearance_mm is None else (parts, None, ())
+    clearance_mm = next(mm for mm in (clearance_mm, drawn_mm, USUAL_MM) if mm is not None)
+    parts, more = loosened(parts, clearance_mm, loosen_mm)
     tried: dict[str, Draft] = {}
     failed: dict[str, NoOrder | InputError] = {}
     for axis in (up,) if up else _FIRST:
@@ -47,7 +51,7 @@ def drafted(
     if not tried:
         first = next(iter(failed.values()))
         raise first if up else type(first)(f"{str(first).rstrip('.')}; nor is there one with another axis up.")
-    tried = {axis: replace(made, notes=(*said, *made.notes)) for axis, made in tried.items()}
+    tried = {axis: replace(made, notes=(*said, *more, *made.notes)) for axis, made in tried.items()}
     best = min(tried, key=lambda axis: len(tried[axis].unfit))
     if up or best == "z":
         return replace(tried[best], up=f"{best}, as asked" if up else best)

@@ -42,12 +42,15 @@ def physical_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
         f"a clearance of {1e3 * clearance_m:g} mm was given for part '{solid.name}'; "
         "give a finite length per side that is not negative.",
     )
-    return _receded_pieces(solid, clearance_m) if solid.fits else solid.pieces
+    return receded_pieces(solid, clearance_m) if solid.fits else solid.pieces
 
 
 @remembered
-def _receded_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
-    """`physical_pieces` of a part that fits; beside pieces other than boxes, a box is taken as one of them."""
+def receded_pieces(solid: Solid, clearance_m: float) -> tuple[Piece, ...]:
+    """`physical_pieces` of a part that fits; beside pieces other than boxes, a box is taken as one of them.
+
+    By less than nothing they come forward.
+    """
     if all_boxes(solid.pieces):
         return tuple(_receded(solid, box, clearance_m) for box in solid.pieces if isinstance(box, Box))
     hulls = [p if isinstance(p, Hull) else Hull(p.name, p.corners) for p in solid.pieces]

@@ -25,6 +25,7 @@ from apo_bench.geometry import (
     passage,
     physical_pieces,
     plane_across,
+    receded_pieces,
     rings_of,
 )
 from apo_bench.parts.stated import twice_area
@@ -247,8 +248,11 @@ def with_fit(solid: Solid, undersizes_mm: Mapping[str, float]) -> Solid:
     A wall between two that are 0.1 mm too near to each other gets room by an undersize of 0.05 mm per side, and play by
     the clearance. Outlines of faces beside keep what was there.
 
+    A part that was drawn with play is made as thick as there is room by undersizes below 0: then its walls touch, and
+    the clearance makes it as thin as it was drawn.
+
     Args:
-        undersizes_mm: Name of a face -> how far it lies inside of where the file has it, >= 0, [mm].
+        undersizes_mm: Name of a face -> how far it lies inside of where the file has it, [mm].
 
     Raises:
         InputError: A face is the side of a box with another one, a hole cannot get wider, or nothing is left of a
@@ -259,7 +263,7 @@ def with_fit(solid: Solid, undersizes_mm: Mapping[str, float]) -> Solid:
         names = {name for name, by_mm in undersizes_mm.items() if by_mm == depth_mm}
         flats = {name: replace(face, fit=name in names) for name, face in solid.faces.items()}
         walls = {name: replace(face, fit=name in names) for name, face in solid.rounds.items()}
-        pieces = physical_pieces(replace(solid, pieces=pieces, faces=flats, rounds=walls), 1e-3 * depth_mm)
+        pieces = receded_pieces(replace(solid, pieces=pieces, faces=flats, rounds=walls), 1e-3 * depth_mm)
     fitted = replace(
         solid,
         pieces=pieces,

@@ -120,7 +120,7 @@ def _solid(node: JsonNode, folder: Path, solids: dict[Path, Solid], checked: boo
 def _with_fit(node: JsonNode, solid: Solid) -> Solid:
     """A part with faces that recede here: face -> by how much it lies deeper in the part than its file says, mm."""
     keys = node.fields((), (*solid.faces, *solid.rounds))
-    undersizes = {name: key.number(0.0, _MOST_UNDERSIZE_MM) for name, key in keys.items()}
+    undersizes = {name: key.number(-_MOST_UNDERSIZE_MM, _MOST_UNDERSIZE_MM) for name, key in keys.items()}
     try:
         return with_fit(solid, undersizes)
     except InputError as error:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from apo_bench import InputError
-from apo_bench.drafting.loosening import loosened
+from apo_bench.drafting.loosening import filled, loosened
 from apo_bench.drafting.posed import PosedPart
 from apo_bench.drafting.upright import drafted
 from apo_bench.drafting.writing import scenario_text, write_scenario
@@ -66,6 +67,42 @@ def test_what_has_play_keeps_its_size(tmp_path: Path) -> None:
     assert loosened(parts, 0.25) == (parts, ())
 
 
+@pytest.mark.parametrize("play", [0.06, 0.25, 0.9])
+def test_what_was_drawn_with_play_touches_its_walls_and_is_as_drawn_with_the_clearance(
+    tmp_path: Path, play: float
+) -> None:
+    parts = slotted(tmp_path, 20.0 - 2.0 * play)
+    (base, tongue), clearance, (note,) = filled(parts)
+    assert clearance == pytest.approx(play, abs=1e-3)
+    assert (base, f"{clearance:g} mm of play per side" in note) == (parts[0], True)
+    assert width(tongue.solid) == pytest.approx(20.0, abs=1e-4)
+    found = drafted(parts)
+    path = tmp_path / "own.toml"
+    write_scenario(found, path, "own", "a test")
+    assert note in found.notes
+    scenario = load_scenario(path)
+    assert scenario.clearance_mm == found.clearance_mm == clearance
+    assert len(scenario.assembly.operations[0].contacts) == 3
+    assert width(scenario.assembly.solids["tongue"], clearance) == pytest.approx(20.0 - 2.0 * play, abs=1e-3)
+    assert drafted(parts, clearance_mm=0.25).parts[1].solid is parts[1].solid
+
+
+def test_play_that_differs_or_is_on_one_side_stays_as_it_was_drawn(tmp_path: Path) -> None:
+    aside = slotted(tmp_path, 19.5)
+    moved = replace(aside[1], T=aside[1].T + np.eye(4, k=3) * 1e-4)
+    assert filled((aside[0], moved))[1:] == (None, ())
+    wide = slotted(tmp_path, 17.0)
+    assert filled(wide) == (wide, None, ())
+    (tmp_path / "two").mkdir()
+    both = made(
+        tmp_path / "two",
+        base=(SLOTTED, (0, 0, 0)),
+        tight=(extrude(rectangle(19.4, 18), 0, 35), (0, -12, 10)),
+        loose=(extrude(rectangle(18.6, 18), 0, 35), (0, 12, 10)),
+    )
+    assert filled(both) == (both, None, ())
+
+
 @pytest.mark.parametrize("over", [0.0, 0.05])
 def test_a_pin_as_thick_as_its_hole_or_thicker_gets_thinner(tmp_path: Path, over: float) -> None:
     plate = extrude(rectangle(40, 40), 0, 10, bores=[bore((0, 0), 4.0, 0, 10, "hole")], bottom="foot", top="top")
@@ -86,7 +123,7 @@ def test_nothing_is_left_of_what_is_too_thin(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("fit", "said"),
-    [("nope = 0", "unknown key 'nope'"), ("head = -0.1", "0 to 1"), ("head = 'x'", "number"), ("head = 2", "0 to 1")],
+    [("nope = 0", "unknown key 'nope'"), ("head = -1.1", "-1 to 1"), ("head = 'x'", "number"), ("head = 2", "-1 to 1")],
 )
 def test_a_scenario_that_states_fit_faces_wrongly_is_refused(tmp_path: Path, fit: str, said: str) -> None:
     parts = slotted(tmp_path, 20.0)
