@@ -7,6 +7,7 @@ part do.
 """
 
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
 
@@ -15,9 +16,9 @@ import numpy as np
 from apo_bench.assembly import Contact, PartFace, contact_kind, geometric_play
 from apo_bench.assembly.touching import facing
 from apo_bench.drafting.posed import PosedPart
-from apo_bench.drafting.touching import NEAR_M, NEAR_RAD, NO_PLAY_MM, PLAY_M, SHARE, walls_without_play
+from apo_bench.drafting.touching import DEEP_M, NEAR_M, NEAR_RAD, NO_PLAY_MM, PLAY_M, SHARE, walls_without_play
 from apo_bench.errors import InputError
-from apo_bench.geometry import physical_pieces
+from apo_bench.geometry import Solid, intrusion, physical_pieces
 from apo_bench.parts.agreement import with_fit
 
 LOOSEN_MM = 0.2
@@ -83,12 +84,24 @@ def filled(parts: Sequence[PosedPart]) -> tuple[tuple[PosedPart, ...], float | N
             continue
         part = made[own]
         fit = {**part.fit, **{face: -round(mm, _DIGITS) for face, mm in faces.items()}}
-        made[own] = replace(part, solid=with_fit(part.solid, fit), fit=fit)
+        others = [each for each in made.values() if each is not part]
+        with suppress(InputError):  # of a box with another face on that side
+            solid = with_fit(part.solid, fit)
+            physical_pieces(solid, 1e-3 * play_mm)
+            if _deepest(solid, part, others) <= max(DEEP_M, _deepest(part.solid, part, others)):
+                made[own] = replace(part, solid=solid, fit=fit)
+        if made[own] is part:
+            continue
         notes.append(
             f"'{own}' was drawn with {play_mm:g} mm of play per side in '{other}': {len(faces)} of its faces are taken "
             f"to touch, as stated under [parts.{own}.fit], so that contacts correct it; the clearance leaves the play"
         )
     return tuple(made.values()), (play_mm if notes else None), tuple(notes)
+
+
+def _deepest(solid: Solid, at: PosedPart, others: Sequence[PosedPart]) -> float:
+    """How deep a solid is in any of the others, [m]."""
+    return max(intrusion(solid, at.T, each.solid, each.T) for each in others)
 
 
 def _gaps(own: PosedPart, other: PosedPart) -> dict[str, tuple[float, bool]]:

@@ -16,7 +16,7 @@ from apo_bench.drafting.writing import scenario_text, write_scenario
 from apo_bench.geometry import Solid, intrusion, physical_pieces
 from apo_bench.parts import load_part
 from apo_bench.parts.agreement import with_fit
-from apo_bench.parts.making import bore, extrude, join, rectangle, shaft, write_part
+from apo_bench.parts.making import bore, extrude, join, polygon, rectangle, shaft, write_part
 from apo_bench.scenario.file import load_scenario
 from tests.drafting.test_blocked import FLOOR, made
 
@@ -101,6 +101,19 @@ def test_play_that_differs_or_is_on_one_side_stays_as_it_was_drawn(tmp_path: Pat
         loose=(extrude(rectangle(18.6, 18), 0, 35), (0, 12, 10)),
     )
     assert filled(both) == (both, None, ())
+
+
+def test_what_would_come_forward_into_a_third_part_stays(tmp_path: Path) -> None:
+    """A wedge whose edge is as near to the side of the tongue as the walls are."""
+    wedge = extrude(polygon((9.8, 0), (20, -10), (20, 10)), 40, 50)
+    parts = made(
+        tmp_path,
+        base=(SLOTTED, (0, 0, 0)),
+        tongue=(extrude(rectangle(19.4, 20), 0, 60, bottom="foot"), (0, -5, 10)),
+        wedge=(wedge, (0, 0, 0)),
+    )
+    assert filled(parts[:2])[1] is not None
+    assert filled(parts)[1:] == (None, ())
 
 
 @pytest.mark.parametrize("over", [0.0, 0.05])
