@@ -67,12 +67,16 @@ def filled(parts: Sequence[PosedPart]) -> tuple[tuple[PosedPart, ...], float | N
     The smaller part of two is, where it stands in the middle, between walls of the other that are up to twice `PLAY_M`
     farther apart than its own. There is one clearance in a scenario, so play that differs stays as it was drawn.
     """
+    solids = {each.name: each.solid for each in parts}
     gaps = {
         (thin.name, wide.name): _gaps(thin, wide)
         for pair in combinations(parts, 2)
         for wide, thin in [sorted(pair, key=lambda each: -each.solid.volume)]
     }
-    held = {pair: {face: mm for face, (mm, walled) in faces.items() if walled} for pair, faces in gaps.items()}
+    held = {
+        (thin, wide): _opposed(solids[thin], {face: mm for face, (mm, walled) in faces.items() if walled})
+        for (thin, wide), faces in gaps.items()
+    }
     plays = [mm for faces in held.values() for mm in faces.values()]
     play_mm = round(float(np.median(plays)), 3) if plays else 0.0
     made = {each.name: each for each in parts}
@@ -97,6 +101,12 @@ def filled(parts: Sequence[PosedPart]) -> tuple[tuple[PosedPart, ...], float | N
             f"to touch, as stated under [parts.{own}.fit], so that contacts correct it; the clearance leaves the play"
         )
     return tuple(made.values()), (play_mm if notes else None), tuple(notes)
+
+
+def _opposed(solid: Solid, gaps: Mapping[str, float]) -> dict[str, float]:
+    """Those of some flat faces that have an opposite one among them."""
+    n = {face: solid.faces[face].normal for face in gaps}
+    return {face: mm for face, mm in gaps.items() if any(n[face] @ n[other] < -1.0 + 1e-6 for other in gaps)}
 
 
 def _deepest(solid: Solid, at: PosedPart, others: Sequence[PosedPart]) -> float:
