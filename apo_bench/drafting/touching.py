@@ -15,6 +15,7 @@ from apo_bench.assembly import Assembly, Contact, Facing, PartFace, Poses, conta
 from apo_bench.assembly.touching import facing
 from apo_bench.cad.solids.drawn import drawn_mesh, overlap
 from apo_bench.geometry import Array, Solid, intrusion, mate, pose
+from apo_bench.scenario.checks import DEEP_M
 
 NEAR_M = 5e-5
 NEAR_RAD = 2e-3
@@ -28,8 +29,6 @@ _ARM_M = 0.05
 """Turns count as what they move at this distance."""
 PLAY_M = 1e-3
 """Flat walls that are so far apart fit."""
-DEEP_M = 2e-5
-"""Parts that are deeper in each other do not only touch."""
 NO_PLAY_MM = 1e-3
 _COAXIAL_M = 1e-4
 _THREAD_M = 2.5e-3

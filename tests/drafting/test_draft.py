@@ -262,3 +262,22 @@ def test_from_poses_to_a_checked_scenario(tmp_path: Path, capsys: pytest.Capture
     assert main(["scenario", "check", str(out)]) == 1
     assert main(["scenario", "check", str(tmp_path / "none.toml")]) == 2
     assert main(["scenario", "new", "--out", str(tmp_path / "other.toml")]) == 2
+
+
+@pytest.mark.parametrize(("deep_mm", "is_loaded"), [(0.01, True), (0.03, False)])
+def test_parts_that_are_as_deep_in_each_other_as_a_draft_allows_are_loaded(
+    tmp_path: Path, deep_mm: float, is_loaded: bool
+) -> None:
+    bodies = {
+        "floor": extrude(rectangle(80, 80), 0, 10),
+        "block": extrude(rectangle(20, 20), 0, 30),
+        "edge": extrude(polygon((0, 0), (20, -10), (20, 10)), 0, 30),
+    }
+    places = {"floor": at(0, 0, 0), "block": at(-10, 0, 10), "edge": at(-deep_mm, 0, 10)}
+    parts = on_the_table(made(tmp_path, bodies, {name: (name, T) for name, T in places.items()}))
+    if not is_loaded:
+        with pytest.raises(RuntimeError, match=r"0\.03 mm inside each other"):
+            draft(parts)
+        return
+    write_scenario(draft(parts), tmp_path / "own.toml", "own", "a test")
+    assert len(load_scenario(tmp_path / "own.toml").assembly) == 2
