@@ -76,7 +76,7 @@ def clashes(
     sentences = list[str]()
     for a, b in combinations(solids, 2):
         deep = intrusion(solids[a], poses[a], solids[b], poses[b])
-        tight = next(_tight(solids, poses, a, b, clearance_mm), "")
+        tight = next(_tight(solids, poses, a, b, clearance_mm, deep), "")
         if tight or deep > DEEP_M:
             sentences.append(
                 tight or _inside(poses, a, b, deep, files, max(given_mm.get(a, 0.0), given_mm.get(b, 0.0)))
@@ -128,11 +128,13 @@ def _normal(solids: Mapping[str, Solid], poses: Poses, contact: Contact) -> Arra
     return np.asarray(poses[of.part][:3, :3] @ solids[of.part].faces[of.face].normal)
 
 
-def _tight(solids: Mapping[str, Solid], poses: Poses, a: str, b: str, clearance_mm: float) -> Iterator[str]:
-    """What shafts are that have no play in the holes around them."""
+def _tight(
+    solids: Mapping[str, Solid], poses: Poses, a: str, b: str, clearance_mm: float, deep_m: float
+) -> Iterator[str]:
+    """What shafts are that have no play in the holes around them; one that is less deep in than that ends before it."""
     for wall, other in product(solids[a].rounds.values(), solids[b].rounds.values()):
         play = play_mm(wall, other, clearance_mm) if contact_kind(wall, other) == "shaft in hole" else None
-        if play is None or play > NO_PLAY_MM or geometric_play(wall, other) < -_THREAD_M:
+        if play is None or play > NO_PLAY_MM or geometric_play(wall, other) < -min(_THREAD_M, deep_m + NEAR_M):
             continue
         fit = mate(wall, poses[a], other, poses[b])
         if fit.gap_m < _COAXIAL_M and fit.angle_rad < NEAR_RAD and fit.length_m > 1e-4:

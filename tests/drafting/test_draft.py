@@ -12,11 +12,12 @@ from apo_bench.cli.app import main
 from apo_bench.drafting.checking import line_of
 from apo_bench.drafting.draft import draft
 from apo_bench.drafting.posed import PosedPart, on_the_table
+from apo_bench.drafting.touching import clashes
 from apo_bench.drafting.waiting import stance
 from apo_bench.drafting.writing import write_scenario
 from apo_bench.geometry import pose
 from apo_bench.parts import load_part
-from apo_bench.parts.making import Body, bore, extrude, join, polygon, rectangle, shaft, write_part
+from apo_bench.parts.making import Body, bore, circle, extrude, join, polygon, rectangle, shaft, write_part
 
 
 def made(folder: Path, bodies: dict[str, Body], places: dict[str, tuple[str, np.ndarray]]) -> tuple[PosedPart, ...]:
@@ -281,3 +282,14 @@ def test_parts_that_are_as_deep_in_each_other_as_a_draft_allows_are_loaded(
         return
     write_scenario(draft(parts), tmp_path / "own.toml", "own", "a test")
     assert len(load_scenario(tmp_path / "own.toml").assembly) == 2
+
+
+def test_a_tube_in_a_pit_of_a_boss_is_pressed_into_nothing(tmp_path: Path) -> None:
+    """Its bore is narrower than the boss around it, on one axis with it and at one height."""
+    boss = extrude(circle(5), 10, 20, bores=[bore((0, 0), 4.5, 15, 20, "pit")])
+    tube = extrude(circle(4), 16, 30, bores=[bore((0, 0), 2.65, 16, 30, "bore")])
+    bodies = {"base": join(extrude(rectangle(80, 80), 0, 10), boss), "tube": tube}
+    parts = made(tmp_path, bodies, {name: (name, at(0, 0, 0)) for name in bodies})
+    solids = {part.name: part.solid for part in parts}
+    assert any(wall.radius == pytest.approx(0.005) for wall in solids["base"].rounds.values())
+    assert clashes(solids, {part.name: part.T for part in parts}, 0.25) == []
