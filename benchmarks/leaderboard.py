@@ -38,7 +38,7 @@ def for_regression(of: Sequence[Entry]) -> Iterator[str]:
     for name in sorted({name for entry in of for name in entry.tracks}):
         scores = [e.tracks[name].score for e in of if name in e.tracks and e.name != "oracle"]
         best = sorted(scores, reverse=True)[:BEST]
-        if len(best) == BEST and best[0] - best[-1] <= WITHIN:
+        if len(best) == BEST and round(best[0] - best[-1], 6) <= WITHIN:
             yield name
 
 
