@@ -16,6 +16,7 @@ from pathlib import Path
 
 from apo_bench.scoring.entry import Entry, read_entry
 from apo_bench.scoring.leaderboard import leaderboard_table, ranked, write_leaderboard
+from benchmarks.made_with import with_mujoco
 
 ROOT = Path(__file__).resolve().parents[1]
 ENTRIES = ROOT / "benchmarks" / "entries"
@@ -54,13 +55,20 @@ def in_readme(text: str) -> str:
     return f"{before}{BEGIN}\n{first_lines()}\n{END}{rest.split(END)[1]}"
 
 
+def write_page(page: Path) -> None:
+    """The page and its figure, and what the rows were simulated with."""
+    write_leaderboard(ENTRIES, page)
+    versions = sorted({entry.versions["mujoco"] for entry in entries()})
+    page.write_text(with_mujoco(page.read_text(encoding="utf-8"), versions), encoding="utf-8")
+
+
 def main() -> None:
     asked = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     asked.add_argument("--marks", action="store_true", help="only say which tracks are for regression tests")
     if asked.parse_args().marks:
         print("\n".join(for_regression(entries())))
         return
-    write_leaderboard(ENTRIES, PAGE)
+    write_page(PAGE)
     README.write_text(in_readme(README.read_text(encoding="utf-8")), encoding="utf-8")
 
 

@@ -32,7 +32,7 @@ import numpy as np
 
 from apo_bench import TrialSettings, build_scene, load_scenario, run_trial
 from apo_bench.generated import FAMILIES
-from apo_bench.records.run.report_rows import NUMBERS
+from apo_bench.records.run.run_folder import NUMBERS
 from apo_bench.sweeps.grid import SweepSettings
 from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.trial.stages import simulate_demonstration

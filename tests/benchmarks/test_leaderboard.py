@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from apo_bench.scoring.leaderboard import write_leaderboard
 from apo_bench.scoring.track import read_track, track_names
-from benchmarks.leaderboard import ENTRIES, PAGE, README, entries, for_regression, in_readme
+from benchmarks.leaderboard import PAGE, README, entries, for_regression, in_readme, write_page
 
 
 def test_the_page_and_the_readme_are_of_the_entries(tmp_path: Path) -> None:
-    write_leaderboard(ENTRIES, tmp_path / PAGE.name)
+    write_page(tmp_path / PAGE.name)
     assert (tmp_path / PAGE.name).read_text() == PAGE.read_text()
     assert in_readme(README.read_text()) == README.read_text()
 

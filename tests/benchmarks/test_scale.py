@@ -6,7 +6,7 @@ import json
 from itertools import islice
 from pathlib import Path
 
-from apo_bench.records.run.report_rows import report_rows
+from apo_bench.records.run.run_folder import report_rows
 from benchmarks.scale import AXES, made_up
 
 
