@@ -178,6 +178,6 @@ def test_wrong_calls_are_refused_in_one_sentence(env: APOInsert) -> None:
     env.reset(options=TRIAL)
     with pytest.raises(InputError, match="seven numbers"):
         env.step(np.full(7, 2.0, dtype=np.float32))
-    with pytest.raises(InputError, match="options"):
+    with pytest.raises(InputError, match="option of reset"):
         env.reset(options={"level": 2})
     env.reset(options={"lerobot_new_rollout": True, **TRIAL})

@@ -178,8 +178,9 @@ def as_believed(flat: Observation) -> tuple[Observation, NDArray[np.bool_]]:
     L = np.linalg.cholesky(flat.covariance)
     gross = np.asarray(said.gross > 0.0)
     moved = flat.goals @ pose.exp((L @ said.twist[..., None])[..., 0])
-    goals = np.where((gross | ~flat.seen)[:, None, None], flat.goals, moved)
-    # What operations share is within what is stated of each, so that is not made less.
+    # What operations share is stated of where they were seen, and within what is stated of each: both stay then.
+    stays = gross | ~flat.seen | bool(flat.shared)
+    goals = np.where(stays[:, None, None], flat.goals, moved)
     scale = np.where(gross, 1.0, np.exp(np.maximum(said.log_scale, 0.0 if flat.shared else -np.inf)))
     return replace(flat, goals=goals, covariance=flat.covariance * scale[:, None, None] ** 2), gross
 

@@ -18,14 +18,14 @@ from apo_bench.resources import folder
 from apo_bench.trial.outcome_columns import goal_errors
 
 
-def seen(name: str, seed: int, level: float = 1.0) -> tuple[np.ndarray, Observation]:
+def seen(name: str, seed: int, level: float = 1.0, noise: str = "isotropic") -> tuple[np.ndarray, Observation]:
     rng = np.random.default_rng([seed, 77])
     scenario = load_scenario(name)
     layout = draw_layout(scenario, rng, 0.0)
     shown = Demonstration(
         scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((len(layout.goals), 6, 6))
     )
-    return layout.goals, observe(shown, make_noise("isotropic", Level(level, level)), rng)
+    return layout.goals, observe(shown, make_noise(noise, Level(level, level)), rng)
 
 
 def displaced(observation: Observation, k: int, metres: float) -> Observation:
@@ -107,3 +107,11 @@ def test_what_was_not_seen_is_inferred() -> None:
     found = correct(replace(observation, seen=np.array([True, True, False])), "learned-set")
     assert found.ok
     assert np.abs(found.goals[2, :3, 3] - truth[2, :3, 3]).max() < 0.01
+
+
+@pytest.mark.parametrize("noise", ["bias-view", "correlated", "bias"])
+def test_errors_that_operations_share_stay_within_what_is_stated_of_each(noise: str) -> None:
+    for seed in range(12):
+        for name in ("stick_in_tower", "l_bracket_on_plate"):
+            _, observation = seen(name, seed, 2.0, noise)
+            assert correct(observation, "learned-set").ok
