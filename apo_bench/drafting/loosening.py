@@ -48,13 +48,12 @@ def loosened(
             before = made[own.name].fit
             fit = {**before, **{face: max(mm, before.get(face, 0.0)) for face, mm in tight.items()}}
             try:
-                solid = with_fit(own.solid, fit)
-                physical_pieces(solid, 1e-3 * clearance_mm)
+                fitted = _with_fit(own, fit, clearance_mm)
             except InputError as error:
                 why = why or f"'{own.name}' has no play in '{other.name}' and is given none: {str(error).rstrip('.')}"
                 continue
             if tight:
-                made[own.name] = replace(own, solid=solid, fit=fit)
+                made[own.name] = fitted
                 notes.append(_said(own.name, other.name, tight))
             break
         else:
@@ -68,19 +67,19 @@ def filled(parts: Sequence[PosedPart]) -> tuple[tuple[PosedPart, ...], float | N
     The smaller part of two is, where it stands in the middle, between walls of the other that are up to twice `PLAY_M`
     farther apart than its own. There is one clearance in a scenario, so play that differs stays as it was drawn.
     """
-    solids = {each.name: each.solid for each in parts}
+    drawn = {each.name: each for each in parts}
     gaps = {
         (thin.name, wide.name): _gaps(thin, wide)
         for pair in combinations(parts, 2)
         for wide, thin in [sorted(pair, key=lambda each: -each.solid.volume)]
     }
     held = {
-        (thin, wide): _opposed(solids[thin], {face: mm for face, (mm, walled) in faces.items() if walled})
+        (thin, wide): _opposed(drawn[thin].solid, {face: mm for face, (mm, walled) in faces.items() if walled})
         for (thin, wide), faces in gaps.items()
     }
     plays = [mm for faces in held.values() for mm in faces.values()]
     play_mm = round(float(np.median(plays)), 3) if plays else 0.0
-    made = {each.name: each for each in parts}
+    made = dict(drawn)
     notes = []
     for (own, other), faces in held.items():
         # A wall that touches a third part, or is nearer to it, stays where it is.
@@ -91,10 +90,9 @@ def filled(parts: Sequence[PosedPart]) -> tuple[tuple[PosedPart, ...], float | N
         fit = {**part.fit, **{face: -round(mm, _DIGITS) for face, mm in faces.items()}}
         others = [each for each in made.values() if each is not part]
         with suppress(InputError):  # of a box with another face on that side
-            solid = with_fit(part.solid, fit)
-            physical_pieces(solid, 1e-3 * play_mm)
-            if _deepest(solid, part, others) <= max(DEEP_M, _deepest(part.solid, part, others)):
-                made[own] = replace(part, solid=solid, fit=fit)
+            fitted = _with_fit(drawn[own], fit, play_mm)
+            if _deepest(fitted, others) <= max(DEEP_M, _deepest(part, others)):
+                made[own] = fitted
         if made[own] is part:
             continue
         notes.append(
@@ -110,9 +108,16 @@ def _opposed(solid: Solid, gaps: Mapping[str, float]) -> dict[str, float]:
     return {face: mm for face, mm in gaps.items() if any(n[face] @ n[other] < -1.0 + 1e-6 for other in gaps)}
 
 
-def _deepest(solid: Solid, at: PosedPart, others: Sequence[PosedPart]) -> float:
-    """How deep a solid is in any of the others, [m]."""
-    return max(intrusion(solid, at.T, each.solid, each.T) for each in others)
+def _with_fit(part: PosedPart, fit: Mapping[str, float], clearance_mm: float) -> PosedPart:
+    """A part with all faces of `fit`, those of its own fit where they are already, and pieces that can recede."""
+    solid = with_fit(part.solid, {face: mm for face, mm in fit.items() if face not in part.fit})
+    physical_pieces(solid, 1e-3 * clearance_mm)
+    return replace(part, solid=solid, fit=fit)
+
+
+def _deepest(part: PosedPart, others: Sequence[PosedPart]) -> float:
+    """How deep a part is in any of the others, [m]."""
+    return max(intrusion(part.solid, part.T, each.solid, each.T) for each in others)
 
 
 def _gaps(own: PosedPart, other: PosedPart) -> dict[str, tuple[float, bool]]:

@@ -87,6 +87,25 @@ def test_what_was_drawn_with_play_touches_its_walls_and_is_as_drawn_with_the_cle
     assert drafted(parts, clearance_mm=0.25).parts[1].solid is parts[1].solid
 
 
+def test_a_part_between_walls_of_two_others_comes_forward_once(tmp_path: Path) -> None:
+    """Loosening leaves it so."""
+    bar = extrude(rectangle(10, 60, (35, 0)), 35, 50)
+    frame = join(*(extrude(rectangle(50, 20, (15, 20 * s)), 35, 50) for s in (-1, 1)), bar)
+    parts = made(
+        tmp_path,
+        base=(SLOTTED, (0, 0, 0)),
+        tongue=(extrude(rectangle(19.5, 19.5), 0, 60), (0, 0, 10)),
+        frame=(frame, (0, 0, 0)),
+    )
+    grown, clearance, notes = filled(parts)
+    assert (clearance, len(notes)) == (0.25, 2)
+    for each in (grown, loosened(grown, 0.25)[0]):
+        solid = each[1].solid
+        corners = 1e3 * np.concatenate([piece.corners for piece in solid.pieces])
+        assert np.ptp(corners[:, :2], axis=0) == pytest.approx([20.0, 20.0], abs=1e-4)
+        assert width(solid, 0.25) == pytest.approx(19.5, abs=1e-4)
+
+
 def test_play_that_differs_or_is_on_one_side_stays_as_it_was_drawn(tmp_path: Path) -> None:
     aside = slotted(tmp_path, 19.5)
     moved = replace(aside[1], T=aside[1].T + np.eye(4, k=3) * 1e-4)
