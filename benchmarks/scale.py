@@ -16,7 +16,6 @@ import argparse
 import itertools
 import json
 import os
-import platform
 import statistics
 import subprocess
 import sys
@@ -27,7 +26,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
-import mujoco
 import numpy as np
 
 from apo_bench import TrialSettings, build_scene, load_scenario, run_trial
@@ -37,6 +35,7 @@ from apo_bench.sweeps.grid import SweepSettings
 from apo_bench.sweeps.sweep import run_sweep
 from apo_bench.trial.stages import simulate_demonstration
 from benchmarks.made_with import with_mujoco
+from benchmarks.measured_parts import measured
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULT = ROOT / "benchmarks" / "results" / "scale.json"
@@ -230,12 +229,7 @@ def main() -> None:
         "workers": workers,
         "rows": lambda: rows(given.rows),
     }
-    found = json.loads(RESULT.read_text(encoding="utf-8")) if RESULT.exists() else {}
-    for name in given.only or parts:
-        if name in parts:
-            found[name] = parts[name]()
-            found |= {"cores": os.cpu_count(), "machine": platform.platform(), "mujoco": mujoco.__version__}
-            RESULT.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+    found = measured(parts, given.only, RESULT)
     PAGE.write_text(with_mujoco("\n".join(_page(found)) + "\n", [found["mujoco"]]), encoding="utf-8")
 
 

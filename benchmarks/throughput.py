@@ -9,9 +9,6 @@ results/throughput.json and docs/results/throughput.md; --only parts of it, and 
 from __future__ import annotations
 
 import argparse
-import json
-import os
-import platform
 import resource
 import statistics
 import subprocess
@@ -21,11 +18,11 @@ from pathlib import Path
 from typing import Any
 
 import gymnasium
-import mujoco
 import numpy as np
 
 import apo_bench  # noqa: F401  # registers the environments
 from benchmarks.made_with import with_mujoco
+from benchmarks.measured_parts import measured
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULT = ROOT / "benchmarks" / "results" / "throughput.json"
@@ -215,12 +212,7 @@ def main() -> None:
         "vectors": vectors,
         "memory": lambda: memory(given.episodes),
     }
-    found = json.loads(RESULT.read_text(encoding="utf-8")) if RESULT.exists() else {}
-    for name in given.only or parts:
-        if name in parts:
-            found[name] = parts[name]()
-            found |= {"cores": os.cpu_count(), "machine": platform.platform(), "mujoco": mujoco.__version__}
-            RESULT.write_text(json.dumps(found, indent=2) + "\n", encoding="utf-8")
+    found = measured(parts, given.only, RESULT)
     PAGE.write_text(with_mujoco("\n".join(_page(found)) + "\n", [found["mujoco"]]), encoding="utf-8")
 
 
