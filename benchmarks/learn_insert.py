@@ -196,17 +196,20 @@ def compare(folder: Path, given: argparse.Namespace) -> None:
     policies = [policy for policy in POLICIES if policy in given.policies] + list(students)
     lines = lines_of(folder)
     with (folder / "compare.jsonl").open("a", encoding="utf-8") as out:
+        envs: dict[Any, APOInsert] = {}  # policies share the starts that one keeps
         for scenario, level, policy in product(given.scenarios, given.levels, policies):
             cell = {"scenario": scenario, "level": level, "policy": policy, "horizon": given.horizon}
             known = {line["trial"]: line for line in lines if cell.items() <= line.items()}
+            of = scenario, level, policy == "feel"
             came = 0
-            env = None
             for trial in range(3 * given.layouts):
                 if came == given.layouts:
                     break
                 if trial not in known:
-                    env = env or made(scenario, level, horizon=given.horizon, feels=policy == "feel")
-                    known[trial] = cell | {"trial": trial} | episode(env, begun(policy, students), trial)
+                    if of not in envs:
+                        envs = {key: env for key, env in envs.items() if key[:2] == of[:2]}
+                        envs[of] = made(scenario, level, horizon=given.horizon, feels=of[2])
+                    known[trial] = cell | {"trial": trial} | episode(envs[of], begun(policy, students), trial)
                     out.write(json.dumps(known[trial]) + "\n")
                     out.flush()
                 came += known[trial]["success"] is not None

@@ -2,7 +2,7 @@
 
 import os
 import re
-from collections.abc import Callable, Container, Mapping
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, final
@@ -123,6 +123,8 @@ def import_part(
                 f"{source}: the part weighs {1e3 * weight:.3g} g at {density:g} kg/m^3; {1e3 * LIGHTEST_KG:g} g to "
                 f"{HEAVIEST_KG / 1e3:g} t are allowed, so give another --density, or scale the part."
             )
+        flats, rounds, refused = contact_faces(raw)
+        _check_touches(source, flats, rounds)
         try:
             pieces = cut(raw, others, mates)
         except InputError as error:
@@ -133,7 +135,6 @@ def import_part(
                 f"{source}: the convex pieces of the part have {corners:,} corners; {MOST_CORNERS_IN_ALL:,} are the "
                 "most, so leave out small holes and fillets."
             )
-        flats, rounds, refused = contact_faces(raw)
         refused |= dict.fromkeys(pieces.filled, _FILLED)
         rounds = [wall for wall in rounds if wall.name not in refused]
         if len(flats) + len(rounds) > MOST_FACES:
@@ -155,10 +156,7 @@ def import_part(
             elif reason:
                 refused[face.name] = reason
         body = _without(replace(body, flats=tuple(flats)), refused)
-        if not (body.flats or body.rounds):
-            raise InputError(
-                f"{source}: no face of the part is flat or round, so it could touch nothing; draw one that is."
-            )
+        _check_touches(source, body.flats, body.rounds)
         color = {"color": raw.places[0].color} if raw.places[0].color else {}
 
         def write(body: Body) -> Path:
@@ -168,6 +166,13 @@ def import_part(
         keep_drawn(raw.mesh, path)
         free = {wall.name: 1e3 * _free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
         return Imported(path, raw, solid, pieces, refused, shares, free)
+
+
+def _check_touches(source: str, flats: Sequence[Face], rounds: Sequence[RoundFace]) -> None:
+    if not (flats or rounds):
+        raise InputError(
+            f"{source}: no face of the part is flat or round, so it could touch nothing; draw one that is."
+        )
 
 
 def _without(body: Body, names: Container[str]) -> Body:

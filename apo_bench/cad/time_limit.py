@@ -42,7 +42,7 @@ def time_limit(what: str, remedy: str, limit_s: float = _LIMIT_S) -> Iterator[No
     try:
         yield
     except _Late:
-        raise InputError(f"{what} takes more than {limit_s:g} s; {remedy}.") from None
+        raise InputError(f"{what} takes more than {limit_s:.3g} s; {remedy}.") from None
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0.0)
         signal.signal(signal.SIGPROF, before)

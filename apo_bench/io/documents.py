@@ -21,7 +21,7 @@ import numpy as np
 
 from apo_bench.errors import InputError, one_line, require
 from apo_bench.geometry import Array
-from apo_bench.io.ordinary_files import decoded, read_bytes, read_text
+from apo_bench.io.ordinary_files import LARGEST_BYTES, decoded, read_bytes, read_text
 from apo_bench.io.words import UNSHOWN, clean
 
 HALF_LETTER = re.compile("[\ud800-\udfff]")
@@ -229,16 +229,17 @@ def parse_json(text: str, file: str) -> JsonNode:
     return _plain(JsonNode(document, file))
 
 
-def read_toml(path: str | Path, kind: str) -> JsonNode:
+def read_toml(path: str | Path, kind: str, limit: int = LARGEST_BYTES) -> JsonNode:
     """The document in a file.
 
     Args:
         kind: What the file should be, for the message: `sweep file`.
+        limit: Bytes.
 
     Raises:
         InputError: No such file, too large, not UTF-8, not TOML, nested too deep, a huge number, or a date or time.
     """
-    return parse_toml(read_bytes(path, f"{kind} (.toml)"), str(path))
+    return parse_toml(read_bytes(path, f"{kind} (.toml)", limit), str(path))
 
 
 def parse_toml(raw: bytes, file: str) -> JsonNode:

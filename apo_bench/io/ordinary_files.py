@@ -15,7 +15,7 @@ from typing import IO, Any, BinaryIO
 
 from apo_bench.errors import InputError, require
 
-_LARGEST_BYTES = 1_000_000
+LARGEST_BYTES = 1_000_000
 _LONGEST_LINE = 1 << 20
 """Bytes; ten times the longest line that a sweep writes."""
 _FLAGS = ("O_NONBLOCK", "O_NOCTTY", "O_CLOEXEC", "O_BINARY")
@@ -45,7 +45,7 @@ def opened(path: str | Path, kind: str) -> Iterator[BinaryIO]:
         raise InputError(f"{str(path)!r}: this is not a path ({error}); give the path of a {kind}.") from error
 
 
-def read_bytes(path: str | Path, kind: str, limit: int = _LARGEST_BYTES, *, own: bool = False) -> bytes:
+def read_bytes(path: str | Path, kind: str, limit: int = LARGEST_BYTES, *, own: bool = False) -> bytes:
     """What stands in a file.
 
     Args:
@@ -64,7 +64,7 @@ def read_bytes(path: str | Path, kind: str, limit: int = _LARGEST_BYTES, *, own:
     return content
 
 
-def read_text(path: str | Path, kind: str, limit: int = _LARGEST_BYTES, *, own: bool = False) -> str:
+def read_text(path: str | Path, kind: str, limit: int = LARGEST_BYTES, *, own: bool = False) -> str:
     """The text of a file, without a byte order mark.
 
     Args:

@@ -87,16 +87,13 @@ def _check_flat(face: Face, pieces: tuple[Piece, ...], place: str) -> None:
         at = bare.representative_point()
         x, y, z = 1e3 * (to_plane @ np.array([at.x, at.y]) + (n @ face.outline[0]) * n)
         _fail(place, f"no side of a piece lies below the face at ({x:.4g}, {y:.4g}, {z:.4g}) mm")
-    for area in below:
-        common = stated.intersection(area)
-        if common.area < _BESIDE_M**2:
-            continue
-        at = common.representative_point()
-        point = to_plane @ np.array([at.x, at.y]) + (n @ face.outline[0] + _ABOVE_M) * n
-        deepest = max(near, key=lambda piece: depth_inside(piece, point[None])[0])
-        if depth_inside(deepest, point[None])[0] > _ROUNDED_M:
-            x, y, z = 1e3 * point
-            _fail(place, f"piece '{deepest.name}' covers the face at ({x:.4g}, {y:.4g}, {z:.4g}) mm")
+    commons = [common for area in below if (common := stated.intersection(area)).area >= _BESIDE_M**2]
+    within = [[at.x, at.y] for at in (common.representative_point() for common in commons)]
+    points = np.array(within).reshape(-1, 2) @ to_plane.T + (n @ face.outline[0] + _ABOVE_M) * n
+    depths = np.array([depth_inside(piece, points) for piece in near])
+    for k in np.flatnonzero((depths > _ROUNDED_M).any(axis=0)):
+        x, y, z = 1e3 * points[k]
+        _fail(place, f"piece '{near[depths[:, k].argmax()].name}' covers the face at ({x:.4g}, {y:.4g}, {z:.4g}) mm")
 
 
 def _below(face: Face, pieces: Iterable[Piece], to_plane: Array) -> list[Any]:

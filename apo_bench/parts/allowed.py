@@ -111,7 +111,7 @@ HEAVIEST_KG = 1e6
 MOST_SITES = 600
 MOST_CLASSES = 20
 LARGEST_PART_BYTES = 4_000_000
-"""Of a part file."""
+"""Of a part file, and of the file beside it."""
 _CORNERS = NumbersRule(
     ((-_LARGEST_M, _LARGEST_M),) * 3 * MOST_CORNERS,
     12,

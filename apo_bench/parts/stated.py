@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench.errors import require
 from apo_bench.geometry import WHOLE_TURN, Array, Face, RoundFace, flat_area, plane_across
 from apo_bench.io import JsonNode, read_toml
-from apo_bench.parts.allowed import FACE_OR_PART_NAME, FRICTION, LONGEST_FACE_NAME, MOST_FACES
+from apo_bench.parts.allowed import FACE_OR_PART_NAME, FRICTION, LARGEST_PART_BYTES, LONGEST_FACE_NAME, MOST_FACES
 
 PART_SCHEMA = "apo-bench/part/1"
 USUAL_DENSITY = 1000.0
@@ -51,7 +51,7 @@ def read_stated_part(path: Path) -> StatedPart:
     Raises:
         InputError: Anything in the file that is not as described, naming file and place.
     """
-    top = read_toml(path, "file that states the faces of a part").fields_of(
+    top = read_toml(path, "file that states the faces of a part", LARGEST_PART_BYTES).fields_of(
         PART_SCHEMA, ("faces", "volume_mm3", "centroid_mm", "inertia_mm5"), ("density", "friction", "source", "licence")
     )
     faces = [_face(name, node) for name, node in _named(top["faces"])]

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from manifold3d import Manifold
 from scipy.spatial import ConvexHull
 
 from apo_bench import InputError
@@ -123,6 +124,14 @@ def test_a_part_of_a_tenth_of_a_millimetre_is_refused(tmp_path: Path) -> None:
     path = write_stl(block(30, 30, 30), tmp_path / "a.stl", 0.1 / 30)
     with pytest.raises(InputError, match="parts of 1 mm to 2 m are allowed"):
         raw_solids(path, "mm")
+
+
+def test_a_ball_is_refused_before_it_is_cut(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It took two minutes and all the memory."""
+    (raw,) = raw_solids(write_stl(Manifold.sphere(20, 64), tmp_path / "a.stl"), "mm")[1]
+    monkeypatch.setattr(importing, "cut", None)
+    with pytest.raises(InputError, match="no face of the part is flat or round"):
+        import_part(raw, "a", tmp_path, "a.stl")
 
 
 def shells(*given: Any) -> Any:

@@ -14,6 +14,7 @@ from apo_bench import InputError
 from apo_bench.geometry import physical_pieces
 from apo_bench.io.documents import JsonNode
 from apo_bench.parts import load_part, part_names, part_path, read_part
+from apo_bench.parts.allowed import LARGEST_PART_BYTES
 from apo_bench.parts.load import check_part
 from apo_bench.parts.making import bore, circle, extrude, join, rectangle, shaft, write_part
 from apo_bench.parts.stated import _beside
@@ -53,6 +54,14 @@ def test_the_part_loads_with_its_matter(part: Path) -> None:
     assert file.xml.count('density="2700.0"') == len(file.pieces) == len(load_part(part).pieces)
     assert file.stated is not None
     assert (file.stated.source, file.stated.licence) == ("a test", "Apache-2.0")
+
+
+def test_faces_with_hundreds_of_holes_take_as_much_room_as_the_part_file(part: Path) -> None:
+    beside = part.with_suffix(".toml")
+    beside.write_text(beside.read_text() + "#" * 1_500_000 + "\n")
+    assert load_part(part).faces
+    beside.write_text(beside.read_text() + "#" * LARGEST_PART_BYTES)
+    assert "larger than 4 MB" in refusal(part)
 
 
 FACES = {
