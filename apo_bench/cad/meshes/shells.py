@@ -103,21 +103,19 @@ def _united(path: Path, mesh: Mesh) -> tuple[Mesh, tuple[str, ...]]:
     """
     import manifold3d
 
-    found = [*crossings(mesh)]
-    if not found:
+    if next(crossings(mesh), None) is None:
         return mesh, ()
     count, owner = connected(mesh.neighbours, len(mesh.triangles))
+    for deep, at in crossings(mesh, np.full(len(mesh.triangles), ROUGH_MM / 2.0)):
+        if (itself := owner[deep[:, 0]] == owner[deep[:, 1]]).any():
+            _refuse_crossing(path, at[itself][0])
+    found = [*crossings(mesh)]
     pairs = owner[np.concatenate([pair for pair, _ in found])]
     where = np.concatenate([at for _, at in found])
     sign = np.sign([mesh.part(np.flatnonzero(owner == shell)).volume for shell in range(count)])
     alone = pairs[:, 0] == pairs[:, 1]
+    said = [CROSSED_A_LITTLE] if alone.any() else []
     ambiguous = sign[pairs[:, 0]] != sign[pairs[:, 1]]
-    said = []
-    if alone.any():
-        deep = [owner[pair] for pair, _ in crossings(mesh, np.full(len(mesh.triangles), ROUGH_MM / 2.0))]
-        if any((shells == shells[:, :1]).all(axis=1).any() for shells in deep):
-            ambiguous |= alone
-        said = [CROSSED_A_LITTLE]
     if ambiguous.any():
         _refuse_crossing(path, where[ambiguous][0])
     pairs = pairs[~alone]
