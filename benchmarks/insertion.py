@@ -3,8 +3,8 @@
 The last operation, by a robot whose hand and eye are off by 0.5 mm and 0.1 degrees, poses corrected by the default
 corrector; trials from `--first` on, of which those count that come to the operation. `straight` does nothing, so it is
 the approach alone; `spiral` looks for the hole where the approach is stopped, from what every learner sees; `search` is
-what `contact-robust+search` does in the bench in the same trials. Prints successes, and control steps a second of a
-core.
+what `contact-robust+search` does in the bench in the same trials. With `--feels`, `straight` after all that a robot
+that feels does before it, beside `contact-robust+feel`. Prints successes, and control steps a second of a core.
 """
 
 from __future__ import annotations
@@ -122,20 +122,23 @@ def main() -> None:
     asked.add_argument("--trials", type=int, default=10)
     asked.add_argument("--first", type=int, default=0)
     asked.add_argument("--horizon", type=int, default=200, help="actions of an episode")
+    asked.add_argument("--feels", action="store_true", help="after what `+feel` does, beside `contact-robust+feel`")
     given = asked.parse_args()
-    env = gymnasium.make(
-        "APOInsert-v0", scenario=given.scenario, horizon=given.horizon, robot_error=ERROR, disable_env_checker=True
-    )
-    trials: list[int] = []
-    for name, policy in {"straight": Straight, "spiral": Spiral}.items():
+    more = {"robot_error": ERROR, "horizon": given.horizon, "feels": given.feels}
+    env = gymnasium.make("APOInsert-v0", scenario=given.scenario, disable_env_checker=True, **more)
+    policies = {"straight": Straight} if given.feels else {"straight": Straight, "spiral": Spiral}
+    right: dict[str, dict[int, bool]] = {}
+    for name, policy in policies.items():
         found = episodes(env, policy, range(given.first, given.first + given.trials))
-        trials = list(found)
+        right[name] = {trial: each[0] for trial, each in found.items()}
         speed = np.mean([each[2] for each in found.values()])
-        print(f"{name}: {sum(each[0] for each in found.values())} of {len(trials)}, {speed:.0f} steps/s", flush=True)
+        print(f"{name}: {sum(right[name].values())} of {len(found)}, {speed:.0f} steps/s", flush=True)
     scene = build_scene(load_scenario(given.scenario))
-    settings = TrialSettings(given.scenario, method="contact-robust+search", robot_error=ERROR, fidelity="contact")
-    searched = [run_trial(replace(settings, seed=trial), scene)["success"] for trial in trials]
-    print(f"search: {sum(map(bool, searched))} of {len(trials)}")
+    method = "contact-robust+feel" if given.feels else "contact-robust+search"
+    settings = TrialSettings(given.scenario, method=method, robot_error=ERROR, fidelity="contact")
+    bench = {trial: bool(run_trial(replace(settings, seed=trial), scene)["success"]) for trial in right[name]}
+    alone = [sum(right[name][t] > bench[t] for t in bench), sum(bench[t] > right[name][t] for t in bench)]
+    print(f"{method}: {sum(bench.values())} of {len(bench)}; {name} and not it: {alone[0]}, the other way {alone[1]}")
 
 
 if __name__ == "__main__":
