@@ -26,6 +26,7 @@ from apo_bench.assembly import Demonstration, placements
 from apo_bench.correction.correctors import correct
 from apo_bench.errors import InputError
 from apo_bench.generated import FAMILIES, drawn, whole_name
+from apo_bench.io import grouped
 from apo_bench.observation.looking import observe
 from apo_bench.records import TrialSettings
 from apo_bench.scenario import draw_layout, load_scenario, nominal_operations
@@ -256,6 +257,10 @@ def trials_table(lines: Sequence[Line]) -> Iterator[str]:
             names = len({line["name"] for line in own})
             cells = [rate([line for line in own if line["method"] == method]) for method in methods]
             yield f"| {family or 'all'} | {names} | {' | '.join(cells)} |"
+    for method in ("oracle", "contact"):
+        ended = grouped((line["name"], line["success"] == "1") for line in lines if line["method"] == method)
+        whole = [all(each) for each in ended.values() if len(each) == SEEDS["contact"]]
+        yield from ("", f"All five trials of `{method}` are right in {sum(whole)} of {len(whole)} assemblies.")
     bad = [line for line in lines if line["success"] != "1" and line["method"] in ("oracle", "contact")]
     yield from ("", "Trials of `oracle` and `contact` that fail:", "") if bad else ()
     yield from (f"- `{x['name']}`, `{x['method']}`, seed {x['seed']}: {x['code']}, {x['sentence']}" for x in bad)

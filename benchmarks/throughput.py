@@ -195,6 +195,8 @@ def _page(found: dict[str, Any]) -> Iterator[str]:
         one = found["vectors"][0]["rate"]
         for each in found["vectors"]:
             yield f"| {each['mode']} | {each['count']} | {each['rate']:.0f} | {each['rate'] / one:.2f} |"
+        two = next(each["rate"] for each in found["vectors"] if (each["mode"], each["count"]) == ("async", 2))
+        yield from ("", f"Two in processes of their own: on each core {two / one / 2:.0%} of what one makes alone.")
     if "memory" in found:
         yield from ("", "## Memory", "", "Resident, of one environment with 16 layouts, after so many episodes:", "")
         yield ", ".join(f"{count}: {mb:.0f} MB" for count, mb in found["memory"]) + "."
