@@ -161,7 +161,7 @@ def make_dataset(
     )
     require(
         form in _WRITERS or policy is None,
-        "insertions were asked for as parquet; lerobot and minari are allowed for them.",
+        "insertions were asked for as parquet; give the format lerobot, whose tables are Parquet files, or minari.",
     )
     if policy is not None:
         about, rollouts = insertions(trials, policy, command, say)
