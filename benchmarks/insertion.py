@@ -96,6 +96,9 @@ class Spiral:
         return action
 
 
+POLICIES: dict[str, Callable[[], Any]] = {"straight": Straight, "spiral": Spiral}
+
+
 def episodes(env: Any, policy: Callable[[], Any], trials: range) -> dict[int, tuple[bool, int, float]]:
     """Trial -> success, actions, actions a second; of trials that come to the operation."""
     found = {}
@@ -122,14 +125,15 @@ def main() -> None:
     asked.add_argument("--trials", type=int, default=10)
     asked.add_argument("--first", type=int, default=0)
     asked.add_argument("--horizon", type=int, default=200, help="actions of an episode")
+    asked.add_argument("--policies", nargs="+", choices=POLICIES, help="default: both; straight with --feels")
     asked.add_argument("--feels", action="store_true", help="after what `+feel` does, beside `contact-robust+feel`")
     given = asked.parse_args()
     more = {"robot_error": ERROR, "horizon": given.horizon, "feels": given.feels}
     env = gymnasium.make("APOInsert-v0", scenario=given.scenario, disable_env_checker=True, **more)
-    policies = {"straight": Straight} if given.feels else {"straight": Straight, "spiral": Spiral}
+    trials = range(given.first, given.first + given.trials)
     right: dict[str, dict[int, bool]] = {}
-    for name, policy in policies.items():
-        found = episodes(env, policy, range(given.first, given.first + given.trials))
+    for name in given.policies or [*POLICIES][: 1 if given.feels else 2]:
+        found = episodes(env, POLICIES[name], trials)
         right[name] = {trial: each[0] for trial, each in found.items()}
         speed = np.mean([each[2] for each in found.values()])
         print(f"{name}: {sum(right[name].values())} of {len(found)}, {speed:.0f} steps/s", flush=True)
