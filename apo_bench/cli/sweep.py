@@ -172,8 +172,8 @@ def dataset_make(
     format: Annotated[str, typer.Option(help="parquet, lerobot or minari.")] = "parquet",
     record: Annotated[str, typer.Option(help="replays, or insertions: APOInsert-v0 led by a policy.")] = "replays",
     policy: Annotated[
-        str, typer.Option(help="Of insertions: expert, straight, dagger-insert, or your own.")
-    ] = "expert",
+        str | None, typer.Option(help="Of insertions: expert (default), straight, dagger-insert, or your own.")
+    ] = None,
     **options: Any,
 ) -> None:
     """Run trials and write what was seen, planned and true, and all frames, with a card for people and programs."""
@@ -182,11 +182,18 @@ def dataset_make(
 
     require(record in ("replays", "insertions"), f"--record {record} was given; replays or insertions is allowed.")
     require(episodes >= 1, f"--episodes {episodes} was given; a whole number from 1 is allowed.")
+    require(
+        policy is None or record == "insertions",
+        f"--policy {policy} was given, but replays have none; say --record insertions as well.",
+    )
     options["seed"] = seed
-    asked = [Request(scenario=name, options=options) for name in (scenario, *(more or ()))]
+    names = (scenario, *(more or ()))
+    for name in names:
+        require(names.count(name) == 1, f"the scenario {name} was given twice; give each once.")
+    asked = [Request(scenario=name, options=options) for name in names]
     several = [requested_settings(each, load_scenario(each.scenario).clearance_mm) for each in asked]
     trials = [replace(each, seed=each.seed + k) for each in several for k in range(episodes)]
-    led = policy if record == "insertions" else None
+    led = (policy or "expert") if record == "insertions" else None
     with writing():
         made, right = make_dataset(
             trials, out, shlex.join(["apo-bench", *sys.argv[1:]]), format, led, partial(typer.echo, err=True)

@@ -92,8 +92,9 @@ def write_card(about: About, out: Path, counted: tuple[int, int], tables: Mappin
         tables: Files, as a pattern -> column -> a `Field`, or in words what it is.
     """
     summary = f"{counted[0]} simulated trials, {counted[1]} of them right, made by apo_bench {__version__} with MuJoCo"
+    lerobot = "LeRobot, " if any(pattern.startswith("meta/") for pattern in tables) else ""
     lines = [
-        *("---", "license: apache-2.0", "task_categories: [robotics]", "tags: [LeRobot, assembly, simulation]"),
+        *("---", "license: apache-2.0", "task_categories: [robotics]", f"tags: [{lerobot}assembly, simulation]"),
         *(f"configs: [{{config_name: {name}, data_files: '{name}'}}]" for name in [*tables][:1] if "parquet" in name),
         "---",
         *("# Assemblies that a robot repeats", "", f"{summary}:", "", f"    {about.command}", "", about.summary, ""),
@@ -116,7 +117,7 @@ def write_card(about: About, out: Path, counted: tuple[int, int], tables: Mappin
 def _cells(column: Field | str) -> tuple[str, ...]:
     if isinstance(column, str):
         return ("", "", "", column)
-    return (str(len(column.names)), column.unit, column.frame, column.meaning)
+    return (str(len(column.names) or ""), column.unit, column.frame, column.meaning)
 
 
 def _croissant(about: About, out: Path, files: list[Path], summary: str, tables: Mapping[str, Any]) -> dict[str, Any]:

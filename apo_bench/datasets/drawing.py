@@ -3,7 +3,7 @@
 Many demonstrations, seen by one call of a noise model: as one long demonstration whose parts are all different.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import lru_cache
 from itertools import count
@@ -115,6 +115,7 @@ def _repeated(assembly: Assembly, n: int) -> Assembly:
 
 BLOCK = 128
 """So many pairs of a scenario are drawn at once, whatever is asked for: more of them begin with the same ones."""
+_MOST = 10_000_000
 STREAM = 0x70616972
 """What tells these streams of chance from others of the same seed; trials have none with a spawn key."""
 
@@ -182,7 +183,8 @@ def pairs(
     Raises:
         InputError: There is no such scenario or noise model, or a number is not allowed.
     """
-    require(isinstance(n, int | np.integer) and n >= 1, f"{n!r} pairs were asked for; give a whole number from 1.")
+    is_count = isinstance(n, int | np.integer) and 1 <= n <= _MOST
+    require(is_count, f"{n!r} pairs were asked for; give a whole number from 1 to {_MOST}.")
     blocks = list[Pairs]()
     for block in endless_pairs(scenarios, noise, seed, level=level, careless=careless):
         blocks.append(block)
@@ -201,7 +203,8 @@ def endless_pairs(
     careless: float = TrialSettings.careless,
 ) -> Iterator[Pairs]:
     """Pairs without end, `BLOCK` of each scenario at a time, in turn; arguments are those of `pairs`."""
-    given = [scenarios] if isinstance(scenarios, str | Path | Scenario) else [*scenarios]
+    several: Any = scenarios if isinstance(scenarios, Iterable) and not isinstance(scenarios, str) else [scenarios]
+    given = [*several]
     require(given, "no scenario was given; give one or more.")
     check("seed", seed)
     check("careless", careless)

@@ -51,6 +51,15 @@ OF_EPISODE: Mapping[str, str] = MappingProxyType(
     }
 )
 """What is said of an episode -> what it is."""
+KINDS = MappingProxyType(
+    {
+        **dict.fromkeys(("failure_stage", "failure_code"), "text"),
+        "failure_operation": "whole",
+        "planned_goals": "numbers",
+        "schedule": "wholes",
+    }
+)
+"""Of what is not said of every episode, so that tables of any trials can be joined."""
 EPISODES: Mapping[str, str] = MappingProxyType(
     {
         "episode": "from 0; its frames are in frames/EPISODE.parquet, if it was replayed",
@@ -184,7 +193,8 @@ def write_parquet(found: Iterable[Replay], about: About, out: Path) -> tuple[int
         if n:
             columns = [[k] * n, *(x.tolist() if isinstance(x, np.ndarray) else x for x in frames.values())]
             write_columns([*FRAMES], columns, out / "frames" / f"{k:06}.parquet")
-    write_columns([*EPISODES], [[each[name] for each in episodes] for name in EPISODES], out / "episodes.parquet")
+    columns = [[each[name] for each in episodes] for name in EPISODES]
+    write_columns([*EPISODES], columns, out / "episodes.parquet", KINDS)
     counted = len(episodes), sum(bool(each["success"]) for each in episodes)
     write_card(about, out, counted, {"episodes.parquet": EPISODES, "frames/*.parquet": FRAMES})
     return counted

@@ -22,6 +22,7 @@ from pyarrow import parquet
 
 from apo_bench import __version__
 from apo_bench.datasets.card import FPS, About, Field, Rollout, write_card
+from apo_bench.datasets.episodes import KINDS
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
 from apo_bench.io import to_write, write_columns
@@ -99,6 +100,8 @@ def write_lerobot(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple
             statistics = {f"stats/{x}/{y}": z for x, column in columns.items() for y, z in _statistics(column).items()}
             episodes.append({**dict(zip(_OF_EPISODE, of_episode, strict=True)), **rollout.more, **statistics})
             frames += n
+    if not episodes:
+        return 0, 0
     _write_meta(out, about, fields, schema, tasks, episodes, frames)
     counted = len(episodes), sum(bool(each["success"]) for each in episodes)
     of_frames = {**fields, **{name: Field((name,), "", "", meaning) for name, (_, meaning) in _OWN.items()}}
@@ -151,7 +154,8 @@ def _write_meta(
     folder = out / "meta" / "episodes" / "chunk-000"
     folder.mkdir(parents=True)
     names = [*episodes[0]] if episodes else []
-    write_columns(names, [[each[name] for each in episodes] for name in names], folder / "file-000.parquet")
+    columns = [[each[name] for each in episodes] for name in names]
+    write_columns(names, columns, folder / "file-000.parquet", KINDS)
     _write_tasks(tasks, out / "meta" / "tasks.parquet")
     statistics = {}
     for name in schema.names if frames else ():
@@ -201,6 +205,14 @@ _MINARI_OWN = {
 }
 
 
+_MINARI_OF_EPISODE = {
+    "id": "from 0",
+    "seed": "number of the trial",
+    "total_steps": "how many actions",
+    **{f"rewards_{name}": f"{name} of all rewards" for name in ("max", "min", "mean", "std", "sum")},
+}
+
+
 def write_minari(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple[int, int]:
     """Write episodes, and the card.
 
@@ -246,7 +258,7 @@ def write_minari(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple[
     where = "data/main_data.hdf5"
     tables: dict[str, dict[str, Any]] = {
         f"{where}: groups episode_0, ..": {**observations, "actions": about.action, **_MINARI_OWN},
-        f"{where}: attributes of each": {"id": "from 0", "total_steps": "how many actions", **about.episodes},
+        f"{where}: attributes of each": {**_MINARI_OF_EPISODE, **about.episodes},
     }
     write_card(about, out, (episodes, right), tables)
     return episodes, right

@@ -3,6 +3,8 @@
 Insertions as data: what a policy saw and did in `APOInsert-v0`, and what the judge said.
 """
 
+import shutil
+import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
@@ -15,6 +17,7 @@ from apo_bench.datasets.episodes import about_replays, replay_rollouts, replays,
 from apo_bench.datasets.loaders import write_lerobot, write_minari
 from apo_bench.envs.policies import POLICIES, insert_env
 from apo_bench.errors import InputError, require, require_known
+from apo_bench.geometry import Array
 from apo_bench.names import resolve
 from apo_bench.records import TrialSettings
 from apo_bench.trial.stages import scene_of
@@ -52,6 +55,7 @@ _FIELDS: Mapping[str, Field] = MappingProxyType(
 )
 _OF_EPISODE: Mapping[str, str] = MappingProxyType(
     {
+        "seed": "number of the trial",
         "scenario": "the assembly",
         "operation": "the operation, from 1",
         "policy": "what acted",
@@ -77,12 +81,14 @@ def insertions(
     """
     act = resolve(policy, POLICIES, "policy")
     env = insert_env(trials[0])
+    made = ", ".join(f"{name}={x!r}" for name, x in (env.spec.kwargs if env.spec else {}).items() if name != "scenario")
     boxes = {**dict(env.observation_space.items()), "action": env.action_space}  # type: ignore[attr-defined]
     fields = {name: _FIELDS[name]._replace(most=tuple(box.high.tolist())) for name, box in boxes.items()}
     about = About(
         name="insertions",
         summary="A robot holds a part before its mouth and is led by a policy until it lets go, in `APOInsert-v0` of "
-        f"apo_bench; the policy is `{policy}`. `reset(seed=seed, options={{'trial': seed}})` begins an episode.",
+        f"apo_bench; the policy is `{policy}`. The environment is made with `{made}`; then "
+        "`reset(seed=seed, options={'trial': seed})` begins an episode.",
         command=command,
         action=fields.pop("action"),
         fields=fields,
@@ -108,11 +114,11 @@ def _rollouts(trials: Iterable[TrialSettings], policy: str, act: Any, say: Calla
         sights, actions, rewards = [seen], [], []
         over = False
         while not over:
-            actions.append(np.clip(decide(env, seen), -1.0, 1.0).astype(np.float32))
+            actions.append(np.clip(_decided(decide, policy, env, seen), -1.0, 1.0).astype(np.float32))
             seen, reward, over, _, info = env.step(actions[-1])
             sights.append(seen)
             rewards.append(reward)
-        told = {"scenario": scenario.name, "operation": k, "policy": policy}
+        told = {"seed": trial.seed, "scenario": scenario.name, "operation": k, "policy": policy}
         yield Rollout(
             seed=trial.seed,
             task=f"{scenario.title}: insert the part in the hand, the last one.",
@@ -121,6 +127,16 @@ def _rollouts(trials: Iterable[TrialSettings], policy: str, act: Any, say: Calla
             rewards=np.array(rewards),
             more={**told, **{name: info[name] for name in ("success", "code", "sentence")}},
         )
+
+
+def _decided(decide: Callable[[Any, Any], Any], policy: str, env: Any, seen: Any) -> Array:
+    """What a policy, which may be somebody's own, does."""
+    try:
+        return np.asarray(decide(env, seen), dtype=np.float64)
+    except Exception as error:
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        what = f"{type(error).__name__}: {error}".rstrip(": ")
+        raise InputError(f"the policy '{policy}' raised {what} ({last.filename}, line {last.lineno}).") from error
 
 
 _WRITERS = {"lerobot": write_lerobot, "minari": write_minari}
@@ -137,7 +153,7 @@ def make_dataset(
 ) -> tuple[int, int]:
     """Run trials and write them, with a card `README.md` and `croissant.json`.
 
-    The same trials give the same bytes on one machine.
+    The same trials give the same bytes on one machine. What was not finished is removed.
 
     Args:
         trials: At least one.
@@ -151,7 +167,7 @@ def make_dataset(
         How many episodes there are, and how many of them are right.
 
     Raises:
-        InputError: The folder holds something, a trial cannot be run, or a package is missing.
+        InputError: The folder holds something, a trial cannot be run, none makes an episode, or a package is missing.
         OSError: Something cannot be written.
     """
     require_known("format", form, FORMATS)
@@ -163,6 +179,22 @@ def make_dataset(
         form in _WRITERS or policy is None,
         "insertions were asked for as parquet; give the format lerobot, whose tables are Parquet files, or minari.",
     )
+    existed = out.exists()
+    try:
+        counted = _made(trials, out, command, form, policy, say)
+        require(counted[0] > 0, "no trial made an episode, so nothing was written; give other seeds or a lower level.")
+    except BaseException:
+        for each in out.iterdir() if out.is_dir() else ():
+            shutil.rmtree(each) if each.is_dir() else each.unlink()
+        if out.is_dir() and not existed:
+            out.rmdir()
+        raise
+    return counted
+
+
+def _made(
+    trials: Sequence[TrialSettings], out: Path, command: str, form: str, policy: str | None, say: Callable[[str], None]
+) -> tuple[int, int]:
     if policy is not None:
         about, rollouts = insertions(trials, policy, command, say)
         return _WRITERS[form](rollouts, about, out)

@@ -7,6 +7,7 @@ from gymnasium import spaces
 
 from apo_bench.assembly import Outcome, Snapshot
 from apo_bench.envs.apo_insert import APOInsert, Seen, ended
+from apo_bench.errors import require
 from apo_bench.simulation.task.tip_control import TipControl
 
 
@@ -42,6 +43,10 @@ class APOAssemble(APOInsert):
     """
 
     def __init__(self, **settings: Any) -> None:
+        given = [name for name in ("operation", "feels") if name in settings]
+        require(
+            not given, f"{' and '.join(given)} was given; all operations are done here, and nothing is felt before."
+        )
         super().__init__(operation=1, feels=False, **settings)
         n = len(self.scene.scenario.assembly)
         self.share /= n

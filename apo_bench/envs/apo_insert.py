@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable, Sequence
+from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -135,13 +136,22 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         if reward not in _REWARDS:
             raise InputError(unknown("reward", str(reward), _REWARDS))
         for name, size in (("shift_mm", shift_mm), ("turn_deg", turn_deg), ("fails_above_n", fails_above_n)):
-            require(0.0 < size < math.inf, f"{name} {size!r} was given; a number above 0 is allowed.")
+            is_size = isinstance(size, Real) and 0.0 < size < math.inf
+            require(is_size, f"{name} {size!r} was given; a number above 0 is allowed.")
         for name, count in (("horizon", horizon), ("layouts", layouts)):
-            require(count == int(count) > 0, f"{name} {count!r} was given; a whole number above 0 is allowed.")
-        check("seed", int(first_trial))
+            is_count = isinstance(count, Real) and count == int(count) > 0
+            require(is_count, f"{name} {count!r} was given; a whole number above 0 is allowed.")
+        for name, flag in (("residual", residual), ("pixels", pixels)):
+            require(isinstance(flag, bool | np.bool_), f"{name} {flag!r} was given; True or False is allowed.")
+        check("seed", first_trial)
         check("careless", careless)
         self.render_mode = render_mode
-        planner = corrector if corrector in _PLANS else resolve(corrector, {**CORRECTORS, **SIMULATED}, "corrector")
+        require(
+            "+" not in str(corrector),
+            f"the corrector '{corrector}' was given; what follows + is of whole replays, so give what is before it.",
+        )
+        known = {**CORRECTORS, **SIMULATED, **dict.fromkeys(_PLANS, "")}
+        planner = corrector if corrector in _PLANS else resolve(corrector, known, "corrector")
         loaded = load_scenario(scenario)
         n = len(loaded.assembly)
         k = n if operation is None else operation
@@ -208,17 +218,19 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         """Begin at one of the starts.
 
         Args:
-            options: `trial`: the number of the trial to begin with.
+            options: `trial`: the number of the trial to begin with, and without a seed that of what is felt.
 
         Raises:
             InputError: Another option, a trial that never comes to the operation, or none of the pool does.
         """
-        if seed is not None:
-            check("seed", int(seed))
-        asked = asked_options(options, ("trial",))
-        super().reset(seed=seed)
+        trial = asked_options(options, ("trial",)).get("trial")
+        for number, called in ((seed, ""), (trial, "trial")):
+            if number is not None:
+                check("seed", number, called=called)
+        seed = trial if seed is None else seed
+        super().reset(seed=None if seed is None else int(seed))
         self._over = True
-        self._begin(self._drawn(asked.get("trial")))
+        self._begin(self._drawn(trial))
         return self._seen(), {}
 
     def _begin(self, begun: Begun) -> None:
@@ -239,7 +251,10 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         """
         if self._over:
             raise gymnasium.error.ResetNeeded("the episode is over; call reset() for the next one.")
-        given = np.asarray(action, dtype=np.float32)
+        try:
+            given = np.asarray(action, dtype=np.float32)
+        except (TypeError, ValueError):
+            given = np.zeros(0, dtype=np.float32)
         if not self.action_space.contains(given):
             raise InputError(f"the action {action!r} was given; seven numbers from -1 to 1 are allowed.")
         control = self._at_work()
@@ -271,7 +286,6 @@ class APOInsert(gymnasium.Env[Seen, Action]):
 
     def _drawn(self, trial: int | None) -> Begun:
         if trial is not None:
-            check("seed", int(trial))
             begun = self._trials.begin(int(trial))
             if isinstance(begun, Outcome):
                 raise InputError(f"trial {trial} does not come to this operation: {begun.sentence}.")

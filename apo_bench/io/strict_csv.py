@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NoReturn, final
 
 from apo_bench.errors import InputError, require
@@ -160,8 +161,13 @@ def _number(text: str) -> bool:
     return "_" not in text
 
 
-def write_columns(names: Sequence[str], columns: Sequence[Sequence[Any]], path: Path) -> None:
+def write_columns(
+    names: Sequence[str], columns: Sequence[Sequence[Any]], path: Path, kinds: Mapping[str, str] = MappingProxyType({})
+) -> None:
     """Write columns; lists of a column are lists there, and a column without any value is one of numbers.
+
+    Args:
+        kinds: What columns are that may have no value: text, whole, numbers or wholes, the last two of lists.
 
     Raises:
         InputError: A link or anything else that is no regular file stands there.
@@ -170,7 +176,14 @@ def write_columns(names: Sequence[str], columns: Sequence[Sequence[Any]], path: 
     import pyarrow as pa
     from pyarrow import parquet
 
-    arrays = [pa.array(column, from_pandas=False) for column in columns]
+    of_kind = {
+        "text": pa.string(),
+        "whole": pa.int64(),
+        "numbers": pa.list_(pa.float64()),
+        "wholes": pa.list_(pa.int64()),
+    }
+    types = [of_kind[kinds[name]] if name in kinds else None for name in names]
+    arrays = [pa.array(column, kind, from_pandas=False) for column, kind in zip(columns, types, strict=True)]
     arrays = [a.cast(pa.float64()) if pa.types.is_null(a.type) else a for a in arrays]
     with to_write(path) as out:
         parquet.write_table(pa.table(arrays, names=list(names)), out, compression="zstd")

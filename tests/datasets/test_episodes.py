@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pyarrow import parquet
 
-from apo_bench import TrialSettings, load_scenario, run_trial
+from apo_bench import InputError, TrialSettings, load_scenario, run_trial
 from apo_bench.cli.app import main
 from apo_bench.datasets.episodes import EPISODES, FRAMES
 from apo_bench.datasets.making import make_dataset
@@ -102,10 +102,12 @@ def test_the_same_trials_give_the_same_tables_and_one_without_a_plan_has_no_fram
         (["--out", "."], "is there already and not an empty folder"),
         (["--out", "new", "--format", "csv"], "unknown format 'csv'"),
         (["--out", "new", "--record", "films"], "replays or insertions is allowed"),
-        (["--out", "new", "--record", "insertions"], "lerobot and minari are allowed for them"),
+        (["--out", "new", "--record", "insertions"], "give the format lerobot, whose tables are Parquet"),
         (["--out", "new", "--record", "insertions", "--format", "lerobot", "--policy", "expret"], "mean 'expert'"),
         (["--out", "new", "--episodes", "0"], "a whole number from 1 is allowed"),
         (["--out", "new", "--method", "contcat"], "did you mean 'contact'"),
+        (["--out", "new", "--policy", "straight"], "replays have none; say --record insertions as well"),
+        (["block_on_block", "--out", "new"], "the scenario block_on_block was given twice"),
     ],
 )
 def test_what_is_wrong_is_said(
@@ -119,3 +121,31 @@ def test_what_is_wrong_is_said(
     (tmp_path / "mine.txt").write_text("kept")
     assert main(["dataset", "make", "block_on_block", *words]) == 2
     assert complaint in capsys.readouterr().err
+    assert [each.name for each in tmp_path.iterdir()] == ["mine.txt"]
+
+
+def test_tables_of_any_trials_can_be_joined(made: Path, tmp_path: Path) -> None:
+    failed = TrialSettings("stick_in_tower", method="none", level_mm=4.0, level_deg=4.0, seed=1)
+    assert make_dataset([failed], tmp_path / "failed", "by hand") == (1, 0)
+    schemas = [parquet.read_schema(folder / "episodes.parquet") for folder in (made, tmp_path / "failed")]
+    assert schemas[0].equals(schemas[1])
+
+
+def test_what_makes_no_episode_leaves_nothing_behind(tmp_path: Path) -> None:
+    failed = TrialSettings("stick_in_tower", method="none", level_mm=4.0, level_deg=4.0, seed=1)
+    (tmp_path / "here").mkdir()
+    for form in ("lerobot", "minari"):
+        for out in (tmp_path / "here", tmp_path / "new"):
+            with pytest.raises(InputError, match="no trial made an episode, so nothing was written"):
+                make_dataset([failed], out, "by hand", form, "straight", say=lambda _: None)
+    assert [each.name for each in tmp_path.iterdir()] == ["here"]
+    assert not [*(tmp_path / "here").iterdir()]
+
+
+def test_a_policy_that_raises_is_named_with_its_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "raising.py").write_text("def act(env, seen):\n    return 1 / 0\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    trials = [TrialSettings("block_on_block", method="contact", seed=1)]
+    with pytest.raises(InputError, match=r"raised ZeroDivisionError: division by zero \(.*raising.py, line 2\)"):
+        make_dataset(trials, tmp_path / "out", "by hand", "lerobot", "raising:act")
+    assert not (tmp_path / "out").exists()

@@ -176,6 +176,8 @@ def test_neither_simulator_nor_torch_is_loaded() -> None:
         ({"scenarios": "dovetail", "noise": "isotropc"}, "unknown noise model"),
         ({"scenarios": "dovetail", "n": 0}, "0 pairs were asked for"),
         ({"scenarios": "dovetail", "n": 1.5}, r"1\.5 pairs were asked for"),
+        ({"scenarios": "dovetail", "n": 10**12}, "a whole number from 1 to 10000000"),
+        ({"scenarios": 5}, "a path or a Scenario"),
         ({"scenarios": "dovetail", "seed": -1}, "seed"),
         ({"scenarios": "dovetail", "level": -1.0}, "level"),
     ],

@@ -11,6 +11,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from apo_bench.envs.apo_assemble import APOAssemble
+from apo_bench.errors import InputError
 
 STILL = np.zeros(7, dtype=np.float32)
 OPEN = np.array([0, 0, 0, 0, 0, 0, 1], dtype=np.float32)
@@ -60,5 +61,5 @@ def test_the_last_part_dropped_before_its_mouth_makes_the_whole_wrong() -> None:
 
 def test_settings_that_are_of_one_operation_alone_are_not_taken() -> None:
     for name in ("operation", "feels"):
-        with pytest.raises(TypeError, match=name):
+        with pytest.raises(InputError, match=f"{name} was given; all operations are done"):
             APOAssemble(scenario="block_on_block", **{name: 1})

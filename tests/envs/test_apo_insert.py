@@ -166,7 +166,14 @@ def test_many_environments_and_a_history() -> None:
         ({"horizon": 0}, "horizon"),
         ({"shift_mm": -1.0}, "shift_mm"),
         ({"corrector": "nobody"}, "corrector"),
+        ({"corrector": "oracle+feel"}, "give what is before it"),
+        ({"corrector": "orcale"}, "did you mean 'oracle'"),
         ({"render_mode": "human"}, "render mode"),
+        ({"residual": "no"}, "residual 'no' was given; True or False"),
+        ({"pixels": 2}, "pixels 2 was given; True or False"),
+        ({"horizon": "a"}, "horizon 'a' was given"),
+        ({"turn_deg": "a"}, "turn_deg 'a' was given"),
+        ({"first_trial": "x"}, "seed of x"),
     ],
 )
 def test_wrong_arguments_are_refused_in_one_sentence(wrong: dict[str, Any], said: str) -> None:
@@ -180,4 +187,25 @@ def test_wrong_calls_are_refused_in_one_sentence(env: APOInsert) -> None:
         env.step(np.full(7, 2.0, dtype=np.float32))
     with pytest.raises(InputError, match="option of reset"):
         env.reset(options={"level": 2})
+    with pytest.raises(InputError, match="seven numbers"):
+        env.step("forward")  # type: ignore[arg-type]
+    for trial in (3.5, "3", True, float("nan"), [1], -1):
+        with pytest.raises(InputError, match="whole numbers from 0"):
+            env.reset(options={"trial": trial})
+        with pytest.raises(InputError, match="whole numbers from 0"):
+            env.reset(seed=trial)  # type: ignore[arg-type]
     env.reset(options={"lerobot_new_rollout": True, **TRIAL})
+
+
+def test_a_trial_that_is_named_is_the_same_every_time(env: APOInsert) -> None:
+    """What is felt as well, whatever was done before; another seed has it felt otherwise."""
+
+    def felt(**how: Any) -> bytes:
+        env.reset(**how)
+        wrench: Any = b"".join(env.step(np.zeros(7, dtype=np.float32))[0]["wrench"].tobytes() for _ in range(3))
+        return bytes(wrench)
+
+    first = felt(options=TRIAL)
+    env.reset()
+    assert felt(options=TRIAL) == first == felt(seed=TRIAL["trial"], options=TRIAL)
+    assert felt(seed=TRIAL["trial"] + 1, options=TRIAL) != first
