@@ -254,7 +254,8 @@ def episode(env: APOInsert, act: Callable[[Any, Any], Any], trial: int) -> dict[
 
 def page(lines: Sequence[dict[str, Any]], given: argparse.Namespace) -> str:
     """The page of what is kept, of this horizon."""
-    policies = list(dict.fromkeys(line["policy"] for line in lines))
+    named = {line["policy"] for line in lines}
+    policies = [policy for policy in POLICIES if policy in named] + sorted(named.difference(POLICIES))
     here = [line for line in lines if line["horizon"] == given.horizon and line["success"] is not None]
 
     def cell(**of: Any) -> str:
