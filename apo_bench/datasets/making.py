@@ -153,7 +153,7 @@ def make_dataset(
 ) -> tuple[int, int]:
     """Run trials and write them, with a card `README.md` and `croissant.json`.
 
-    The same trials give the same bytes on one machine. What was not finished is removed.
+    The same trials give the same bytes on one machine. An interrupt, or a policy that raises, ends the data set early.
 
     Args:
         trials: At least one.
@@ -180,27 +180,34 @@ def make_dataset(
         "insertions were asked for as parquet; give the format lerobot, whose tables are Parquet files, or minari.",
     )
     existed = out.exists()
-    try:
-        counted = _made(trials, out, command, form, policy, say)
-        require(counted[0] > 0, "no trial made an episode, so nothing was written; give other seeds or a lower level.")
-    except BaseException:
+    ends: list[BaseException] = []
+    if policy is not None:
+        about, rollouts = insertions(trials, policy, command, say)
+        counted = _WRITERS[form](_to_the_end(rollouts, ends), about, out)
+    else:
+        scenes = {each.scenario: scene_of(each) for each in trials}
+        about = about_replays([*scenes.values()], command, trials[0].arm)
+        found = _to_the_end(replays(trials, scenes), ends)
+        if form == "parquet":
+            counted = write_parquet(found, about, out)
+        else:
+            counted = _WRITERS[form](replay_rollouts(found, about, say), about, out)
+    if not counted[0]:
         for each in out.iterdir() if out.is_dir() else ():
             shutil.rmtree(each) if each.is_dir() else each.unlink()
         if out.is_dir() and not existed:
             out.rmdir()
-        raise
+    elif ends:
+        say(f"{counted[0]} episodes that had ended are kept.")
+    for end in ends:
+        raise end
+    require(counted[0] > 0, "no trial made an episode, so nothing was written; give other seeds or a lower level.")
     return counted
 
 
-def _made(
-    trials: Sequence[TrialSettings], out: Path, command: str, form: str, policy: str | None, say: Callable[[str], None]
-) -> tuple[int, int]:
-    if policy is not None:
-        about, rollouts = insertions(trials, policy, command, say)
-        return _WRITERS[form](rollouts, about, out)
-    scenes = {each.scenario: scene_of(each) for each in trials}
-    about = about_replays([*scenes.values()], command, trials[0].arm)
-    found = replays(trials, scenes)
-    if form == "parquet":
-        return write_parquet(found, about, out)
-    return _WRITERS[form](replay_rollouts(found, about, say), about, out)
+def _to_the_end(found: Iterable[Any], ends: list[BaseException]) -> Iterator[Any]:
+    """What is found until something ends it, which is added to the list: the data set is finished first."""
+    try:
+        yield from found
+    except (InputError, KeyboardInterrupt) as error:
+        ends.append(error)

@@ -139,7 +139,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
             is_size = isinstance(size, Real) and 0.0 < size < math.inf
             require(is_size, f"{name} {size!r} was given; a number above 0 is allowed.")
         for name, count in (("horizon", horizon), ("layouts", layouts)):
-            is_count = isinstance(count, Real) and count == int(count) > 0
+            is_count = isinstance(count, Real) and math.isfinite(count) and count == int(count) > 0
             require(is_count, f"{name} {count!r} was given; a whole number above 0 is allowed.")
         for name, flag in (("residual", residual), ("pixels", pixels)):
             require(isinstance(flag, bool | np.bool_), f"{name} {flag!r} was given; True or False is allowed.")
@@ -147,7 +147,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         check("careless", careless)
         self.render_mode = render_mode
         require(
-            "+" not in str(corrector),
+            not isinstance(corrector, str) or "+" not in corrector,
             f"the corrector '{corrector}' was given; what follows + is of whole replays, so give what is before it.",
         )
         known = {**CORRECTORS, **SIMULATED, **dict.fromkeys(_PLANS, "")}

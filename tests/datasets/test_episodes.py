@@ -11,7 +11,8 @@ from pyarrow import parquet
 
 from apo_bench import InputError, TrialSettings, load_scenario, run_trial
 from apo_bench.cli.app import main
-from apo_bench.datasets.episodes import EPISODES, FRAMES
+from apo_bench.datasets import making
+from apo_bench.datasets.episodes import EPISODES, FRAMES, replays
 from apo_bench.datasets.making import make_dataset
 from apo_bench.geometry import pose
 
@@ -149,3 +150,20 @@ def test_a_policy_that_raises_is_named_with_its_line(tmp_path: Path, monkeypatch
     with pytest.raises(InputError, match=r"raised ZeroDivisionError: division by zero \(.*raising.py, line 2\)"):
         make_dataset(trials, tmp_path / "out", "by hand", "lerobot", "raising:act")
     assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize("form", ["parquet", "lerobot"])
+def test_an_interrupt_keeps_the_episodes_that_had_ended(
+    form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(trials: Any, scenes: Any) -> Any:
+        yield from replays(trials[:1], scenes)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(making, "replays", interrupted)
+    trials = [TrialSettings("block_on_block", method="contact", seed=k) for k in range(3)]
+    said: list[str] = []
+    with pytest.raises(KeyboardInterrupt):
+        make_dataset(trials, tmp_path / "out", "by hand", form, say=said.append)
+    assert said == ["1 episodes that had ended are kept."]
+    assert "1 simulated trials" in (tmp_path / "out" / "README.md").read_text()

@@ -172,6 +172,7 @@ def test_many_environments_and_a_history() -> None:
         ({"residual": "no"}, "residual 'no' was given; True or False"),
         ({"pixels": 2}, "pixels 2 was given; True or False"),
         ({"horizon": "a"}, "horizon 'a' was given"),
+        ({"horizon": float("inf")}, "horizon inf was given"),
         ({"turn_deg": "a"}, "turn_deg 'a' was given"),
         ({"first_trial": "x"}, "seed of x"),
     ],
