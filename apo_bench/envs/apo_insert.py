@@ -12,7 +12,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Outcome, Poses, Snapshot
-from apo_bench.envs.episode import asked_options
+from apo_bench.envs.episode import asked_options, check_flag
 from apo_bench.envs.spaces import PIXELS, as_seen, insert_space
 from apo_bench.envs.starts import Begun, RobotSettings, Trials, judged
 from apo_bench.errors import InputError, require, unknown
@@ -142,7 +142,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
             is_count = isinstance(count, Real) and math.isfinite(count) and count == int(count) > 0
             require(is_count, f"{name} {count!r} was given; a whole number above 0 is allowed.")
         for name, flag in (("residual", residual), ("pixels", pixels)):
-            require(isinstance(flag, bool | np.bool_), f"{name} {flag!r} was given; True or False is allowed.")
+            check_flag(name, flag)
         check("seed", first_trial)
         check("careless", careless)
         self.render_mode = render_mode

@@ -8,10 +8,10 @@ from numpy.typing import NDArray
 
 from apo_bench.assembly import Observation, Outcome, ReplayResult, Step
 from apo_bench.envs.apo_replay import APOReplay
-from apo_bench.envs.episode import VERDICTS, step_info, verdicts
+from apo_bench.envs.episode import VERDICTS, check_flag, step_info, verdicts
 from apo_bench.envs.spaces import Seen, packed, track_spaces
 from apo_bench.envs.tracking import Act, Policy, Tracked, exactly_at, first_seen
-from apo_bench.errors import InputError, require
+from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import judge
 from apo_bench.records import Criteria, sentence
@@ -64,7 +64,7 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
 
     def __init__(self, scenario: Any = "stick_in_tower", replay: bool = True, **of_replay: Any) -> None:
         self._base = APOReplay(scenario, **of_replay)
-        require(isinstance(replay, bool | np.bool_), f"replay {replay!r} was given; True or False is allowed.")
+        check_flag("replay", replay)
         self._replay = replay
         self.render_mode = self._base.render_mode
         n = len(self._base.assembly)
