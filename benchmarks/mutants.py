@@ -25,16 +25,25 @@ import time
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from benchmarks.faults import ROOT, Ran, copy, provenance
 from benchmarks.mutant_draw import Mutant, changed, drawn, placed, rooms_of, starts_of
 from benchmarks.mutant_switch import LONGEST_S
 
+ROOT = Path(__file__).parents[1]
 CACHE = re.compile(r"^(functools\.)?(cache|lru_cache|cached_property)\b")
 """Decorators that keep what was computed."""
+
+
+class Ran(NamedTuple):
+    """What came of the tests of a room."""
+
+    passed: bool
+    by: str
+    """The test that failed first; how they ended where none did."""
+    seconds: float
 
 
 def main() -> None:
@@ -65,6 +74,25 @@ def summary(root: Path, kept: Sequence[dict[str, object]]) -> dict[str, object]:
         "noticed": len(kept) - len(survivors),
         "not_noticed": survivors,
     }
+
+
+def provenance(root: Path) -> dict[str, str]:
+    """The command that runs, and the commit of the checkout that it tries."""
+    head = subprocess.run(["git", "rev-parse", "HEAD"], cwd=root, capture_output=True, text=True, check=False)
+    return {
+        "command": "python -m benchmarks." + " ".join([Path(sys.argv[0]).stem, *sys.argv[1:]]),
+        "commit": head.stdout.strip(),
+    }
+
+
+def copy(root: Path, place: Path) -> None:
+    """All files that git knows, and new ones that it does not ignore."""
+    command = ["git", "ls-files", "--cached", "--others", "--exclude-standard", "-z"]
+    said = subprocess.run(command, cwd=root, capture_output=True, text=True, check=True).stdout
+    for name in filter(None, said.split("\0")):
+        if (root / name).is_file():
+            (place / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy2(root / name, place / name)
 
 
 def outcomes(root: Path, mutants: Sequence[Mutant], rooms: Sequence[str], work: Path) -> list[Ran]:

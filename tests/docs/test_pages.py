@@ -48,7 +48,7 @@ PARSED_ONLY: Mapping[str, str] = {
     r"(view |replay .*--view)": "opens a window or serves a page until somebody ends it; tests/show steps through",
     r"part import ": "needs a CAD file; tests/cad runs it",
     r"scenario new .*\.step ": "needs the extra cad; tests/cad runs it",
-    r"recording import tracker|(correct|plan|replay) clamp": "needs STEP files; benchmarks/from_step.py runs it",
+    r"recording import tracker|(correct|plan|replay) clamp": "needs STEP files; tests/cad reads such files",
     r"scenario check ": "trials of seconds each; tests/drafting runs it without",
     r"(score|leaderboard) ": "minutes: many trials; tests/scoring runs small ones",
     r"noise card ": "1000 observations; tests/observation/test_plain.py prints cards",

@@ -32,7 +32,7 @@ from apo_bench.correction.robust.views import looked_again, views_of
 from apo_bench.geometry import Array
 
 TEMPERATURE = 3.0
-"""At which weights hold, of scenes that are in no benchmark: `python -m benchmarks.weights`."""
+"""At which weights hold, of scenes that are in no benchmark."""
 UNNAMED = 0.02
 """How often none of the hypotheses is right there: what the weights of all leave to 1."""
 _LITTLE = 0.005

@@ -24,7 +24,7 @@ from apo_bench.simulation.scene.geoms import add_pieces, set_mass
 from apo_bench.simulation.scene.world import World, has_failed, initial_state, part_pose, place, world
 
 LIFT_M = 0.0
-"""How far above where it was seen a part is let go, tuned by `python benchmarks/tune.py` of the repository."""
+"""How far above where it was seen a part is let go, tuned."""
 CLEARANCE_M = 0.25e-3
 """Play per side of fit faces where none is stated, since parts without any cannot be put together."""
 _DENSITY = 600.0
