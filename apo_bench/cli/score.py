@@ -8,7 +8,7 @@ from __future__ import annotations
 import shlex
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -87,7 +87,7 @@ def score_command(
     tracks = read_tracks(track or ([] if estimator is None else [_OF_ESTIMATORS]))
     if estimator is not None:
         tracks = tuple(seen_by(each, str(estimator)) for each in tracks)
-    how = {
+    how: dict[str, Any] = {
         "quick": quick,
         "workers": cores() if workers is None and backend == "local" else workers,
         "backend": backend,
