@@ -14,8 +14,8 @@ import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from apo_bench.scoring.entry import Entry, read_entry
-from apo_bench.scoring.leaderboard import leaderboard_table, ranked, write_leaderboard
+from apo_bench.scoring.entry import Entry
+from apo_bench.scoring.leaderboard import leaderboard_table, ranked, read_entries, write_leaderboard
 from benchmarks.made_with import with_mujoco
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -31,7 +31,11 @@ BEST = 3
 
 
 def entries() -> list[Entry]:
-    return [read_entry(path) for path in sorted(ENTRIES.glob("*.json"))]
+    """Those that are committed, of which none is left out."""
+    of, left_out = read_entries(ENTRIES)
+    if left_out:
+        raise SystemExit("\n".join(left_out))
+    return of
 
 
 def for_regression(of: Sequence[Entry]) -> Iterator[str]:
@@ -57,7 +61,7 @@ def in_readme(text: str) -> str:
 
 def write_page(page: Path) -> None:
     """The page and its figure, and what the rows were simulated with."""
-    write_leaderboard(ENTRIES, page)
+    write_leaderboard(entries(), page)
     versions = sorted({entry.versions["mujoco"] for entry in entries()})
     page.write_text(with_mujoco(page.read_text(encoding="utf-8"), versions), encoding="utf-8")
 

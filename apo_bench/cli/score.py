@@ -8,7 +8,7 @@ from __future__ import annotations
 import shlex
 import sys
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -16,6 +16,7 @@ from apo_bench.cli.printing import print_answer, print_json
 from apo_bench.cli.setting_options import AsJson, CorrectorLimit, check_writable, completion, cores, path_given
 from apo_bench.cli.sweep import interrupted
 from apo_bench.errors import InputError, require
+from apo_bench.io import brief, clean
 from apo_bench.records import CORRECTOR_LIMIT_S
 
 _OF_ESTIMATORS = "measured"
@@ -43,7 +44,9 @@ def score_command(
     ] = None,
     answers: Annotated[
         Path | None,
-        typer.Option(parser=path_given, metavar="<path>", help="Goals made elsewhere for the requests of --export."),
+        typer.Option(
+            parser=path_given, metavar="<path>", help="Goals made elsewhere, one answer for each request of --export."
+        ),
     ] = None,
     export: Annotated[
         Path | None,
@@ -71,7 +74,7 @@ def score_command(
 ) -> None:
     """Run a method over tracks of fixed trials, resumed where they were left: one number for each, and one over all."""
     from apo_bench.scoring.entrants import entrant, exported
-    from apo_bench.scoring.entry import form_of, read_entry, write_entry
+    from apo_bench.scoring.entry import check_name, form_of, read_entry, write_entry
     from apo_bench.scoring.score import score
     from apo_bench.scoring.track import Track, read_tracks, seen_by
     from apo_bench.show.score_text import entry_lines
@@ -84,7 +87,8 @@ def score_command(
     tracks = read_tracks(track or ([] if estimator is None else [_OF_ESTIMATORS]))
     if estimator is not None:
         tracks = tuple(seen_by(each, str(estimator)) for each in tracks)
-    how = {
+    how: dict[str, Any] = {
+        "quick": quick,
         "workers": cores() if workers is None and backend == "local" else workers,
         "backend": backend,
         "address": address,
@@ -93,7 +97,7 @@ def score_command(
     }
     if export is not None:
         check_writable(export, "--export", (".jsonl",))
-        count = exported(tracks, export, quick=quick, **how)
+        count = exported(tracks, export, **how)
         typer.echo(f"{count} requests in {export}; answer each, and give the answers to --answers.")
         return
     if out is None:
@@ -104,18 +108,20 @@ def score_command(
         read_entry(out)  # an entry is made anew; what is none is kept
     rows = out.with_suffix("")
 
+    name = name or command or (None if answers is None else answers.name)
+    check_name("entry", name or method or "")
+
     def said(track: Track) -> None:
         if not as_json:
             typer.echo(f"{track.name}: {track.title}", err=True)
 
     try:
-        with entrant(method, command, answers, rows) as found:
+        with entrant(method, command, answers, rows, tracks, **how) as (found, how):
             entry = score(
                 found,
                 tracks,
                 rows,
-                name=name or command or (None if answers is None else answers.name),
-                quick=quick,
+                name=name,
                 command=shlex.join(["apo-bench", *sys.argv[1:]]),
                 said=said,
                 **how,
@@ -137,12 +143,15 @@ def leaderboard_command(
         typer.Option(help="Hash of a salt that you drew trials with: entries of it are verified; may be said again."),
     ] = None,
 ) -> None:
-    """Write a table of entries, with paired differences and one figure of all tracks."""
-    from apo_bench.scoring.leaderboard import write_leaderboard
+    """Write a table of entries, and one figure of all tracks; a file that is not an entry is named and left out."""
+    from apo_bench.scoring.leaderboard import read_entries, write_leaderboard
 
     check_writable(out, "--out", (".md",))
-    count = write_leaderboard(folder, out, frozenset(salt or ()))
-    typer.echo(f"{count} entries in {out}")
+    entries, left_out = read_entries(folder)
+    write_leaderboard(entries, out, frozenset(salt or ()))
+    for sentence in left_out:
+        typer.echo(f"left out: {brief(clean(sentence))}", err=True)
+    typer.echo(f"{len(entries)} entries in {out}")
 
 
 _MOST_PICTURES = 100

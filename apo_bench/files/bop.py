@@ -176,7 +176,8 @@ def _numbers(text: str, count: int, place: str) -> list[float]:
     raise InputError(f"{place}: {what} of at most {LARGEST_MM:g} is needed, {stands}.")
 
 
-LARGEST_TRUTH_BYTES = 8_000_000
+LARGEST_TRUTH_BYTES = 64_000_000
+"""A scene of a video in the BOP format has up to some 20 MB."""
 
 
 def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) -> PoseRows:

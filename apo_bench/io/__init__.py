@@ -28,7 +28,18 @@ from apo_bench.io.ordinary_files import (
 )
 from apo_bench.io.processes import SAFE_PATH, descendants, end_descendants, environment, flush, redirect_output
 from apo_bench.io.strict_csv import Columns, CsvRow, check_separator, read_csv, write_columns, write_csv
-from apo_bench.io.words import CONTROL, UNSHOWN, brief, clean, columns, direction, grouped, listed_words, with_article
+from apo_bench.io.words import (
+    CONTROL,
+    UNSHOWN,
+    brief,
+    clean,
+    columns,
+    direction,
+    grouped,
+    listed_words,
+    markdown,
+    with_article,
+)
 
 __all__ = (
     "CONTROL",
@@ -60,6 +71,7 @@ __all__ = (
     "is_whole",
     "listed_words",
     "load_matplotlib",
+    "markdown",
     "opened",
     "parse_json",
     "put_back",

@@ -1,5 +1,7 @@
 """Figures of matplotlib: drawn as it comes, whatever a `matplotlibrc` in the current folder or at home says.
 
+Text is drawn letter by letter: `$` in the name of somebody's method begins no formula.
+
 Matplotlib reads that of the current folder when it is first imported: its settings change every picture, a file that is
 no text is an exception, and a pipe is waited for.
 """
@@ -25,6 +27,7 @@ def default_looks(settings: Mapping[str, Any] | None = None) -> Iterator[Any]:
     matplotlib = load_matplotlib()
     with matplotlib.rc_context():
         matplotlib.rcdefaults()
+        matplotlib.rcParams["text.parse_math"] = False
         matplotlib.rcParams.update(settings or {})
         yield matplotlib
 

@@ -1,6 +1,7 @@
-"""A table of entries: scores with intervals, paired differences from row to row, one figure of all tracks, hashes."""
+"""A table of entries: scores with intervals, one figure of all tracks, hashes of what was run."""
 
-import re
+import warnings
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from functools import partial
 from pathlib import Path
@@ -8,11 +9,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.errors import require
-from apo_bench.io import clean, default_looks, save_figure
+from apo_bench.errors import InputError, require
+from apo_bench.io import default_looks, grouped, save_figure
 from apo_bench.report.tables.table import Column, Table
-from apo_bench.scoring.entry import EXCLUDED, RIGHT, Entry, TrackScore, read_entry
-from apo_bench.statistics import Results, contrast, points
+from apo_bench.scoring.entry import Entry, TrackScore, read_entry
+from apo_bench.scoring.track import read_track, track_names
 
 _PROVES = (
     "`self-reported` proves nothing: public seeds can be drawn again by whoever has the package. `verified` entries "
@@ -20,17 +21,17 @@ _PROVES = (
     "ran in a process of its own that was given observations and nothing else. Entries marked `quick` ran a few "
     "trials, which are no score."
 )
-_PAIRED = (
-    "Score minus that of the row above, in points, over the trials that both have, of all tracks that both entered; "
-    "trials of one seed are not independent, and the 95 % interval is one over seeds. Methods that know the truth have "
-    "no trial in common with others."
-)
 _EVERY = (
     "Success rate in percent, mean over the cells of a track, with its 95 % interval over seeds; in brackets that of "
     "the plans that were carried out, where some were not."
 )
 _SQUARE_IN = (0.72, 0.42)
 _MARGIN_IN = (2.2, 1.1)
+_MOST_SQUARES = 50
+"""Entries, or tracks, that the figure shows; the tables have all."""
+_USUAL_LABEL, _LONGEST_LABEL = 20, 40
+"""Characters of a name in the figure: the margins have room for the first number, and grow up to the second."""
+_LETTER_IN = 0.08
 
 
 class Line(NamedTuple):
@@ -38,20 +39,11 @@ class Line(NamedTuple):
 
     place: int
     entry: Entry
-    above: Entry | None
-    """The entry of the row above."""
     verified: bool
 
     @property
     def status(self) -> str:
         return ("verified" if self.verified else "self-reported") + ", quick" * self.entry.quick
-
-    @property
-    def difference(self) -> str | None:
-        """To the row above."""
-        if self.above is None or (pair := contrast(_results(self.entry), _results(self.above))) is None:
-            return None
-        return points(pair.difference, pair.interval)
 
 
 def ranked(entries: Sequence[Entry], salts: frozenset[str] = frozenset()) -> list[Line]:
@@ -62,73 +54,120 @@ def ranked(entries: Sequence[Entry], salts: frozenset[str] = frozenset()) -> lis
     """
     count = {id(e): sum(track.overall for track in e.tracks.values()) for e in entries}
     order = sorted(entries, key=lambda e: (-count[id(e)], -(e.overall or (0.0,))[0], e.name))
-    return [
-        Line(i + 1, entry, order[i - 1] if i else None, _is_verified(entry, salts)) for i, entry in enumerate(order)
-    ]
+    return [Line(i, entry, _is_verified(entry, salts)) for i, entry in enumerate(order, start=1)]
 
 
-def write_leaderboard(folder: str | Path, out: str | Path, salts: frozenset[str] = frozenset()) -> int:
-    """Write the page, in Markdown, and its figure beside it; return how many entries it has.
+def read_entries(folder: str | Path) -> tuple[list[Entry], list[str]]:
+    """The entries of a folder (`*.json`), and a sentence for each file that is left out.
 
-    Args:
-        folder: Entries, `*.json`.
+    A file is left out if it is not an entry, or is of another version of a track than most entries are.
 
     Raises:
-        InputError: No entry, one that cannot be read, or entries of different files of one track.
+        InputError: No file is an entry.
     """
-    entries = [read_entry(path) for path in sorted(Path(folder).glob("*.json"))]
-    require(entries, f"'{folder}' has no entry; give a folder of files that `apo-bench score --out` wrote.")
+    found: dict[Path, Entry] = {}
+    left_out: list[str] = []
+    for path in sorted(Path(folder).glob("*.json")):
+        try:
+            found[path] = read_entry(path)
+        except InputError as error:
+            left_out.append(str(error))
+    used = _used_versions(list(found.values()))
+    entries: list[Entry] = []
+    for path, entry in found.items():
+        other = next((name for name, track in entry.tracks.items() if _version(track) != used[name]), None)
+        if other is None:
+            entries.append(entry)
+        else:
+            left_out.append(
+                f"{path}: the entry is of another version of the track {other} ({entry.tracks[other].track}, not "
+                f"{used[other][0]}); score the method again."
+            )
+    require(
+        entries,
+        left_out[0] if left_out else f"'{folder}' has no entry; give a folder of files that `score --out` wrote.",
+    )
+    return entries, left_out
+
+
+def write_leaderboard(entries: Sequence[Entry], out: str | Path, salts: frozenset[str] = frozenset()) -> None:
+    """Write the page, in Markdown, and its figure next to it.
+
+    Args:
+        entries: At least one, as `read_entries` gives them.
+
+    Raises:
+        InputError: The figure cannot be written.
+    """
     tracks = _tracks(entries)
     lines = ranked(entries, salts)
     out = Path(out)
     picture = out.with_suffix(".png")
-    _draw(lines, tracks, picture)
+    _draw(lines[:_MOST_SQUARES], tracks[:_MOST_SQUARES], picture)
     out.write_text("\n".join(_page(lines, tracks, picture.name)) + "\n", encoding="utf-8")
-    return len(entries)
 
 
 def leaderboard_table(lines: Sequence[Line]) -> Table:
-    """One line for each entry: its score over all tracks that count, and to the row above."""
+    """One line for each entry: its score over all tracks that count."""
     return Table(
         lines,
         (
             Column("place", "#"),
-            Column("name", "entry", lambda line: _plain(line.entry.name), words=True),
+            Column("name", "entry", lambda line: line.entry.name, words=True),
             Column("score", "score", lambda line: _overall(line.entry)),
             Column("tracks", "tracks", lambda line: sum(track.overall for track in line.entry.tracks.values())),
-            Column("difference", "to the row above"),
             Column("status", "status", words=True),
         ),
     )
 
 
+_Version = tuple[str, bool]
+"""Hash of a track's file, and whether the track counts in the score over all."""
+
+
+def _version(track: TrackScore) -> _Version:
+    return track.track, track.overall
+
+
+def _used_versions(entries: Sequence[Entry]) -> dict[str, _Version]:
+    """The version of each track that most entries are of; of equally many that of the package, else the first."""
+    stated = grouped((name, _version(track)) for entry in entries for name, track in entry.tracks.items())
+    used = {}
+    for name, versions in stated.items():
+        count = Counter(versions)
+        most = [version for version in count if count[version] == max(count.values())]
+        own = _own_version(name) if len(most) > 1 else None
+        used[name] = own if own in most else most[0]
+    return used
+
+
+def _own_version(name: str) -> _Version | None:
+    """That of a track that comes with the package."""
+    if name not in track_names():
+        return None
+    track = read_track(name)
+    return track.hash, track.overall
+
+
 def _tracks(entries: Sequence[Entry]) -> list[str]:
     """Names of all tracks, those that count first."""
-    files: dict[str, TrackScore] = {}
-    for entry in entries:
-        for name, track in entry.tracks.items():
-            first = files.setdefault(name, track)
-            require(
-                (first.track, first.overall) == (track.track, track.overall),
-                f"the entry '{entry.name}' is of another version of the track {name} ({track.track}, not "
-                f"{first.track}); score it anew, or leave it out.",
-            )
-    return sorted(files, key=lambda name: (not files[name].overall, name))
+    overall = {name: track.overall for entry in entries for name, track in entry.tracks.items()}
+    return sorted(overall, key=lambda name: (not overall[name], name))
 
 
 def _page(lines: Sequence[Line], tracks: Sequence[str], picture: str) -> Iterator[str]:
     yield from ("# Leaderboard", "", "Written by `apo-bench leaderboard`.", "", _PROVES, "")
     yield from leaderboard_table(lines).markdown()
-    yield from ("", f"![Scores of all entries in all tracks]({picture})", "", _PAIRED, "", "## Every track", "")
+    yield from ("", f"![Scores of entries in tracks]({picture})", "", "## Every track", "")
     yield from (_EVERY, "")
     columns = [Column(name, name, partial(_cell_in, name)) for name in tracks]
-    yield from Table(lines, (Column("name", "entry", lambda x: _plain(x.entry.name), words=True), *columns)).markdown()
+    yield from Table(lines, (Column("name", "entry", lambda line: line.entry.name, words=True), *columns)).markdown()
     yield from ("", "## Promises", "")
     promising = [(line.entry, name) for line in lines for name in tracks if _promises(line.entry.tracks.get(name))]
     yield from Table(
         promising,
         (
-            Column("entry", "entry", lambda pair: _plain(pair[0].name), words=True),
+            Column("entry", "entry", lambda pair: pair[0].name, words=True),
             Column("track", "track", lambda pair: pair[1], words=True),
             Column("promised", "promised", lambda pair: _percent(pair[0].tracks[pair[1]].promised)),
             Column("score", "score", lambda pair: f"{pair[0].tracks[pair[1]].score:.1f}"),
@@ -141,30 +180,39 @@ def _page(lines: Sequence[Line], tracks: Sequence[str], picture: str) -> Iterato
     yield from Table(
         runs,
         (
-            Column("entry", "entry", lambda run: _plain(run[0].name), words=True),
+            Column("entry", "entry", lambda run: run[0].name, words=True),
             Column("track", "track", lambda run: run[1], words=True),
             Column("trials", "trials", lambda run: run[2].trials),
-            Column("file", "track file", lambda run: f"`{run[2].track}`", words=True),
-            Column("code", "code", lambda run: f"`{run[2].code}`", words=True),
-            Column("rows", "rows", lambda run: f"`{run[2].rows}`", words=True),
+            Column("file", "track file", lambda run: run[2].track, words=True),
+            Column("code", "code", lambda run: run[2].code, words=True),
+            Column("rows", "rows", lambda run: run[2].rows, words=True),
         ),
     ).markdown()
     yield ""
-    for line in lines:
-        versions = ", ".join(f"{name} {version}" for name, version in line.entry.versions.items())
-        command = _plain(line.entry.command, ticks="'")
-        yield f"- {_plain(line.entry.name)}: `{command}`; {_plain(versions)}; {_plain(line.entry.machine)}"
+    yield from Table(
+        [line.entry for line in lines],
+        (
+            Column("name", "entry", words=True),
+            Column("command", "command", words=True),
+            Column("versions", "versions", _versions_text, words=True),
+            Column("machine", "machine", words=True),
+        ),
+    ).markdown()
 
 
 def _draw(lines: Sequence[Line], tracks: Sequence[str], out: Path) -> None:
     """A square for every entry and track, darker where more trials succeeded, with its number."""
-    with default_looks({"font.size": 9.0}):
+    with default_looks({"font.size": 9.0}), warnings.catch_warnings():
+        warnings.filterwarnings("ignore", "Glyph .* missing")  # a box stands for a letter that the font does not have
         from matplotlib.figure import Figure
 
-        size = [
-            n * step + margin for n, step, margin in zip((len(tracks), len(lines)), _SQUARE_IN, _MARGIN_IN, strict=True)
-        ]
-        figure = Figure(figsize=(size[0], size[1]), layout="constrained")
+        names, methods = list(map(_label, tracks)), [_label(line.entry.name) for line in lines]
+        more = _LETTER_IN * max(0, max(map(len, (*names, *methods))) - _USUAL_LABEL)
+        width, height = (
+            n * step + margin + more
+            for n, step, margin in zip((len(tracks), len(lines)), _SQUARE_IN, _MARGIN_IN, strict=True)
+        )
+        figure = Figure(figsize=(width, height), layout="constrained")
         axes = figure.subplots()
         scores = [[_score(line.entry.tracks.get(name)) for name in tracks] for line in lines]
         filled = np.array(scores, dtype=float)  # what was not entered is nan
@@ -173,31 +221,18 @@ def _draw(lines: Sequence[Line], tracks: Sequence[str], out: Path) -> None:
             for x, value in enumerate(row):
                 if value is not None:
                     axes.text(x, y, f"{value:.0f}", ha="center", va="center", color="white" if value > 60 else "black")
-        axes.set_xticks(range(len(tracks)), tracks, rotation=35, ha="right")
-        axes.set_yticks(range(len(lines)), [line.entry.name for line in lines])
+        axes.set_xticks(range(len(tracks)), names, rotation=35, ha="right")
+        axes.set_yticks(range(len(lines)), methods)
         figure.colorbar(shown, label="success [%]", shrink=0.8)
         save_figure(figure, out, dpi=110)
 
 
-def _plain(text: str, ticks: str = "\\`") -> str:
-    """What somebody wrote, on one line of a table, without meaning to Markdown or HTML."""
-    line = " ".join(clean(text).split()).replace("`", ticks)
-    return re.sub(r"([|*_<>\[\]])", r"\\\1", line) if ticks != "'" else line.replace("|", "/")
+def _label(name: str) -> str:
+    return name if len(name) <= _LONGEST_LABEL else f"{name[: _LONGEST_LABEL - 1]}…"
 
 
 def _is_verified(entry: Entry, salts: frozenset[str]) -> bool:
-    return bool(entry.tracks) and all(track.salt in salts for track in entry.tracks.values())
-
-
-def _results(entry: Entry) -> Results:
-    """Track and cell, and number of the trial -> success."""
-    return {
-        (name, cell, number): letter == RIGHT
-        for name, track in entry.tracks.items()
-        for cell, trials in track.cells.items()
-        for number, letter in enumerate(trials)
-        if letter != EXCLUDED
-    }
+    return all(track.salt in salts for track in entry.tracks.values())
 
 
 def _overall(entry: Entry) -> str | None:
@@ -223,3 +258,7 @@ def _promises(track: TrackScore | None) -> bool:
 
 def _percent(share: float | None) -> str | None:
     return None if share is None else f"{100.0 * share:.1f}"
+
+
+def _versions_text(entry: Entry) -> str:
+    return ", ".join(f"{name} {version}" for name, version in entry.versions.items())

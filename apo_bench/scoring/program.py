@@ -8,7 +8,9 @@ part, radii where it is round), `fixed` parts, and an `id`. The answer is `{"goa
 
 import hashlib
 import json
+import os
 import subprocess
+import tempfile
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -20,11 +22,19 @@ from apo_bench.assembly import Observation
 from apo_bench.errors import InputError, require
 from apo_bench.files.json_forms import observation_form
 from apo_bench.geometry import Array, Face, RoundFace, pose
-from apo_bench.io import JsonNode, decoded, parse_json, read_text
+from apo_bench.io import JsonNode, decoded, end_descendants, opened, parse_json, read_json
 
 REQUEST = "apo-bench/request/1"
 _HEX = 32
 _MM = 1e3
+LARGEST_ANSWER_BYTES = 16_000_000
+"""A program that writes more is ended."""
+LARGEST_ANSWERS_BYTES = 256_000_000
+"""A file of answers; those for all tracks have 3 MB."""
+_LONGEST_LINE = 1_000_000
+"""Bytes of one answer in a file."""
+_ENVIRONMENT = ("PATH", "LANG")
+"""All that a program finds in its environment; `env NAME=value program` as command gives it more."""
 
 
 def request_form(observation: Observation) -> dict[str, Any]:
@@ -63,41 +73,53 @@ class Program:
         Raises:
             InputError: It cannot be started, fails, or answers something else.
         """
-        line = request_line(observation)
-        try:
-            done = subprocess.run(
-                self.command, input=f"{line}\n".encode(), stdout=subprocess.PIPE, cwd=self.folder, check=False
-            )
-        except OSError as error:
-            raise InputError(f"the program '{self.command[0]}' cannot be run ({error}).") from error
-        answer = f"the answer of '{self.command[0]}'"
-        require(done.returncode == 0, f"the program '{self.command[0]}' ended with exit code {done.returncode}.")
-        require(done.stdout.strip(), f"the program '{self.command[0]}' wrote no answer; one line of JSON is needed.")
-        return goals_of(parse_json(decoded(done.stdout, answer, "JSON"), answer), len(observation.goals))
+        answer = self._run(f"{request_line(observation)}\n".encode())
+        require(answer.strip(), f"the program '{self.command[0]}' wrote no answer; one line of JSON is needed.")
+        where = f"the answer of '{self.command[0]}'"
+        return goals_of(parse_json(decoded(answer, where, "JSON"), where), len(observation.goals))
+
+    def _run(self, request: bytes) -> bytes:
+        """What the program writes when it is given a request."""
+        program = f"the program '{self.command[0]}'"
+        environment = {name: os.environ[name] for name in _ENVIRONMENT if name in os.environ}
+        with tempfile.TemporaryFile() as stdin:  # a file and no pipe: a program may write before it has read all
+            stdin.write(request)
+            stdin.seek(0)
+            try:
+                process = subprocess.Popen(
+                    self.command, stdin=stdin, stdout=subprocess.PIPE, cwd=self.folder, env=environment
+                )
+            except OSError as error:
+                raise InputError(f"{program} cannot be run ({error}).") from error
+        with process:
+            assert process.stdout is not None
+            answer = process.stdout.read(LARGEST_ANSWER_BYTES + 1)
+            if len(answer) > LARGEST_ANSWER_BYTES:
+                end_descendants(process.pid)
+                process.kill()
+                raise InputError(
+                    f"{program} wrote more than {LARGEST_ANSWER_BYTES / 1e6:g} MB and was ended; "
+                    "one line of JSON is needed."
+                )
+        require(process.returncode == 0, f"{program} ended with exit code {process.returncode}.")
+        return answer
 
 
 @final
 @dataclass(frozen=True)
 class Answers:
-    """A corrector whose goals stand in a file: JSON lines with `id` and `goals`."""
+    """A corrector whose goals stand in a folder, one file `ID.json` for each request."""
 
-    path: str
+    folder: str
 
     def __call__(self, observation: Observation) -> Array:
-        """The goals that the file has for this observation, (n, 4, 4), [m].
+        """The goals that the folder has for this observation, (n, 4, 4), [m].
 
         Raises:
             InputError: It has none.
         """
-        asked = json.loads(request_line(observation))["id"]
-        for number, line in enumerate(read_text(self.path, "answers").splitlines(), start=1):
-            if asked in line:
-                document = parse_json(line, f"{Path(self.path).name}, line {number}")
-                if isinstance(document.value, dict) and document.value.get("id") == asked:
-                    return goals_of(document, len(observation.goals))
-        raise InputError(
-            f"{Path(self.path).name} has no answer for the request {asked}; answer every line of the export."
-        )
+        path = Path(self.folder) / f"{json.loads(request_line(observation))['id']}.json"
+        return goals_of(read_json(path), len(observation.goals))
 
 
 @final
@@ -118,14 +140,40 @@ class Export:
         raise InputError("the request was written, and nothing was corrected.")
 
 
-def goals_of(document: JsonNode, n: int) -> Array:
-    """The goals of an answer, (n, 4, 4), [m].
+def read_answers(path: Path) -> dict[str, str]:
+    """The lines of a file of answers, by the `id` of their request.
+
+    Raises:
+        InputError: It cannot be read, is too large, a line is no answer, or a request has two.
+    """
+    answers: dict[str, str] = {}
+    with opened(path, "file of answers") as file:
+        require(
+            os.fstat(file.fileno()).st_size <= LARGEST_ANSWERS_BYTES,
+            f"{path}: a file of answers has at most {LARGEST_ANSWERS_BYTES / 1e6:g} MB; answer fewer tracks at a time.",
+        )
+        for number, line in enumerate(iter(lambda: file.readline(_LONGEST_LINE + 1), b""), start=1):
+            place = f"{path}, line {number}"
+            require(len(line) <= _LONGEST_LINE, f"{place}: an answer has at most {_LONGEST_LINE:,} bytes.")
+            if not line.strip():
+                continue
+            text = decoded(line, place, "file of answers")
+            answer = parse_json(text, place)
+            request = answer.fields(("id", "goals"))["id"].text()
+            require(request not in answers, f"{place}: a second answer for the request {request[:_HEX]}; keep one.")
+            goals_of(answer)
+            answers[request] = text
+    return answers
+
+
+def goals_of(document: JsonNode, n: int | None = None) -> Array:
+    """The goals of an answer, (n, 4, 4), [m]; `n` is how many it must have, None for any number.
 
     Raises:
         InputError: It is none.
     """
     poses = document.fields(("goals",), ("id",))["goals"].items("goal", n)
-    return np.array([_pose_of(entry) for entry in poses]).reshape(n, 4, 4)
+    return np.array([_pose_of(entry) for entry in poses]).reshape(-1, 4, 4)
 
 
 def _pose_of(node: JsonNode) -> Array:

@@ -10,12 +10,12 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from apo_bench.io import grouped
+from apo_bench.io import brief, clean, grouped
 from apo_bench.records import SETTINGS, Row
 from apo_bench.records.run.run_file import read_run
-from apo_bench.scoring.entry import EXCLUDED, RIGHT, SCHEMA, WRONG, Entry, TrackScore, mean_of
+from apo_bench.scoring.entry import EXCLUDED, RIGHT, SCHEMA, WRONG, Entry, TrackScore, check_name, score_of
 from apo_bench.scoring.track import Track
-from apo_bench.statistics import NOT_EXECUTED, Place, place_of, pooled_rate
+from apo_bench.statistics import NOT_EXECUTED, Place, place_of
 from apo_bench.sweeps.sweep import run_sweep
 
 _HEX = 16
@@ -48,6 +48,10 @@ def score(
     Raises:
         InputError, RuntimeError, KeyboardInterrupt: As `run_sweep`; what had ended is kept.
     """
+    name = name or method
+    check_name("entry", name)
+    for track in tracks:
+        check_name("track", track.name)
     scores = {}
     versions: Mapping[str, str] = {}
     for track in tracks:
@@ -62,9 +66,9 @@ def score(
         scores[track.name] = _scored(track, runs, run)
     return Entry(
         schema=SCHEMA,
-        name=name or method,
+        name=name,
         method=(SETTINGS["method"].spelled or str)(method),
-        command=command,
+        command=brief(clean(command)),
         quick=quick,
         versions=dict(sorted(versions.items())),
         machine=platform.platform(),
@@ -80,15 +84,13 @@ def _scored(track: Track, runs: Mapping[str, Sequence[Row]], run: Mapping[str, A
     carried = [row for row in counted if row["failure_stage"] not in NOT_EXECUTED]
     errors = [(p - bool(row["success"])) ** 2 for p, row in promises if row["failure_stage"] not in NOT_EXECUTED]
     cells = _cells(rows)
-    value = mean_of(cells)
-    results = {(_cell(row), row["seed"]): bool(row["success"]) for row in counted}
-    low, high = pooled_rate(results).interval if results else (0.0, 1.0)
+    value, low, high = score_of(cells)
     return TrackScore(
         track=track.hash,
         overall=track.overall,
         score=value,
-        low=min(100.0 * low, value),
-        high=max(100.0 * high, value),
+        low=low,
+        high=high,
         trials=len(counted),
         executed=len(carried),
         promised=_mean([p for p, _ in promises]),

@@ -97,6 +97,11 @@ def read_track(given: str | Path) -> Track:
     require(quick >= 1, f"{path}, {TABLE}, quick_trials: a whole number from 1 is needed, {quick} was given.")
     arms = [arm.text() for arm in said["arms"].items("arm")] if "arms" in said else [TrialSettings.arm]
     require(arms, f"{path}, {TABLE}, arms: at least one is needed; leave the key out for the usual one.")
+    grids = read_sweep(path, besides=(TABLE,))
+    require(
+        len({grid.seed for grid in grids}) == 1,
+        f"{path}: all grids of a track begin with the same seed; remove the key 'seed' below [[also]].",
+    )
     return Track(
         name=path.stem,
         title=said["title"].text(),
@@ -104,7 +109,7 @@ def read_track(given: str | Path) -> Track:
         quick_trials=quick,
         arms=tuple(arms),
         hash=hashlib.sha256(read_bytes(path, "track file")).hexdigest()[:_HEX],
-        grids=read_sweep(path, besides=(TABLE,)),
+        grids=grids,
     )
 
 

@@ -245,6 +245,12 @@ def test_truth_that_is_too_large_or_no_json(tmp_path: Path, monkeypatch: pytest.
         read_truth(path, estimates)
 
 
+def test_truth_of_a_long_video_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "scene_gt.json"
+    path.write_text(json.dumps({"7": [ENTRY]}) + " " * 20_000_000, encoding="utf-8")
+    assert len(read_truth(path, read_results(written(tmp_path, HEADER, ROW)), 1).where) == 1
+
+
 @pytest.mark.parametrize("case", ["missing column", "nan", "not a rotation", "empty"])
 def test_the_command_ends_with_2_and_one_sentence(
     case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -8,7 +8,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
-from apo_bench.io import write_columns, write_csv
+from apo_bench.io import markdown, write_columns, write_csv
 from apo_bench.records import knows_truth
 from apo_bench.statistics import Interval, Place, Rate, cell_place, level_label, setting_of
 
@@ -77,9 +77,9 @@ class Table:
         return [(heading, [[c.said(item) for c in self.beside] for item in own]) for heading, own in together]
 
     def markdown(self) -> list[str]:
-        """The table as lines of Markdown, or the sentence where there is none."""
+        """The table as lines of Markdown, in which no cell has markup, or the sentence where there is none."""
         heads = [column.head for column in self.shown]
-        lines = [f"| {' | '.join(cells)} |" for cells in (heads, *self.lines)]
+        lines = [f"| {' | '.join(map(markdown, cells))} |" for cells in (heads, *self.lines)]
         return [lines[0], "|" + "---|" * len(heads), *lines[1:]] if self.items else [self.empty]
 
     def write(self, path: Path) -> Path:

@@ -90,7 +90,7 @@ def _node(axes: Any, layout: GraphLayout, node: Node, stands: bool, color: tuple
     )
     ink = {"ha": "center", "va": "center", "color": _INK if stands else _GONE, "zorder": 4}
     axes.text(box.x, box.y + 0.1, node.part, fontsize=9.5, fontweight="bold", **ink)
-    axes.text(box.x, box.y - 0.11, _formula(node), fontsize=9.5, **ink)
+    axes.text(box.x, box.y - 0.11, _formula(node), fontsize=9.5, parse_math=True, **ink)
 
 
 def _arrow(axes: Any, layout: GraphLayout, i: int, arc: Arc, text: str, alarming: bool) -> None:
