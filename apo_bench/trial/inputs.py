@@ -26,6 +26,7 @@ from apo_bench.records.run.replay_command import DATA_PREFIXES, is_own_code
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario, scenario_path
 
+_CHUNK = 1 << 20
 ARM = "arm"
 WEIGHTS = "learned weights"
 """Pieces that no demonstration depends on."""
@@ -85,7 +86,10 @@ def digest_files(paths: Iterable[Path]) -> str:
     found = []
     for path in paths:
         with opened(path, "input file") as file:
-            found.append(hashlib.file_digest(file, "sha256").digest())
+            whole = hashlib.sha256()
+            while chunk := file.read(_CHUNK):
+                whole.update(chunk)
+        found.append(whole.digest())
     return digest(b"".join(found))
 
 

@@ -19,6 +19,7 @@ from apo_bench.records import (
     RANGE,
     RECOGNISED,
     USUAL_WRENCH,
+    Predicted,
     Row,
     TrialSettings,
     knows_relations,
@@ -220,10 +221,11 @@ def _row(
         assert planned.failure is not None
         row = result(planned.failure, success=False)
     else:
-        said = _said_before(settings, scene, corrector_input, planned.plan, planned.correction)
+        predicted, promised = _say_before(settings, scene, corrector_input, planned.plan, planned.correction)
         # What is carried out are goals; which contacts they make, the truth says.
         plan = replace(planned.plan, assembly=observation.assembly)
-        row = _carried_out(settings, scene, said["promised"], plan, reference, truth, watch, cache) | said
+        row = _carry_out(settings, scene, promised, plan, reference, truth, watch, cache)
+        row |= {"predicted": predicted, "promised": promised}
     row |= method_columns(planned) | confidence_columns(planned, observation, corrector_input, truth)
     if planned.correction is not None:
         row |= {"seen_again": look.seen_again if look else 0}
@@ -244,20 +246,20 @@ def _corrector_input(settings: TrialSettings, observation: Observation, truth: A
     return with_relations(observation, make_relations(settings.relations), truth, rng)
 
 
-def _said_before(
+def _say_before(
     settings: TrialSettings, scene: Scene, given: Observation, plan: Plan, correction: Correction | None
-) -> Row:
-    """What a plan says of itself before anything moves.
+) -> tuple[Predicted, float]:
+    """What a plan says of itself before anything moves: what will fail, and how likely it succeeds.
 
     Args:
         given: What the planner was given; the plan has the same contacts.
     """
     _, searches, by_touch = parsed(settings.method)
     promised = promised_success(plan, given, correction, scene, settings.robot_error, searches, by_touch)
-    return {"predicted": predicted_outcome(plan, scene, searches), "promised": promised}
+    return predicted_outcome(plan, scene, searches), promised
 
 
-def _carried_out(
+def _carry_out(
     settings: TrialSettings,
     scene: Scene,
     promised: float,

@@ -202,7 +202,9 @@ def test_every_file_that_a_trial_opens_is_in_its_identity(
 
 def test_a_sweep_is_not_continued_with_a_part_of_another_density(tmp_path: Path) -> None:
     write_home(tmp_path)
-    grid = SweepSettings((str(tmp_path / "scenario.toml"),), trials=1, levels=(5.0,), methods=("none",))
+    grid = SweepSettings(
+        (str(tmp_path / "scenario.toml"),), trials=1, levels=(5.0,), careless=(0.0,), methods=("none",)
+    )
     assert len(run_sweep(grid, tmp_path / "out")) == 1
     beside = tmp_path / "own_peg.toml"
     beside.write_text(beside.read_text().replace("density = ", "density = 1"))
