@@ -166,12 +166,12 @@ def runtime_files(names: Names) -> dict[str, Path]:
     )
     here = Path.cwd()
     own = [Path(path) for path in _installed()]
-    own_files = {}
+    below = {}
     for path in files:
         whole = Path(os.path.normpath(here / path))
         if whole.is_relative_to(here) and not any(map(whole.is_relative_to, own)):
-            own_files[whole.relative_to(here).as_posix()] = whole
-    return dict(sorted(own_files.items()))
+            below[whole.relative_to(here).as_posix()] = whole
+    return dict(sorted(below.items()))
 
 
 def _of_parts(scenario: Scenario) -> Iterator[Path]:
