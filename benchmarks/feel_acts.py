@@ -165,7 +165,7 @@ def trial(case: Case) -> Line:
         return first | {"success": None, "code": simulated.demonstration.code}
     truth = simulated.layout.goals
     seen = observe_demonstration(simulated, noise_of(settings, scene, simulated), case.seed)
-    planned = apply_method(parsed(case.method).plan, seen, truth, seen, None, scene)
+    planned = apply_method(parsed(case.method).plan, seen, truth, where=scene)
     if planned.plan is None:
         assert planned.failure is not None
         return first | {"success": False, "code": planned.failure.code, "sentence": planned.failure.sentence}

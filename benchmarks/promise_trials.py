@@ -162,11 +162,11 @@ def _trial(
 ) -> tuple[str, str, str]:
     """Success, code and score, as they are saved."""
     seen: Observation = observe_demonstration(simulated, noise_of(settings, scene, simulated), settings.seed)
-    made = apply_method(settings.method, seen, None, seen, None, scene)
+    made = apply_method(settings.method, seen, None, where=scene)
     if made.plan is None:
         return "0", NO_PLAN, ""
     explained = explanations(made.correction, seen, made.plan.goals)
-    score = plan_score(made.plan, seen.assembly, explained, scene, settings.robot_error)
+    score = plan_score(made.plan, explained, scene, settings.robot_error)
     error = draw_robot_error(settings.robot_error, scene, settings.seed)
     truth = simulated.layout.goals
     attempt = replay_and_judge(made.plan, scene, truth, None, settings.fidelity, cache, error=error)

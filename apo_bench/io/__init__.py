@@ -13,6 +13,7 @@ from apo_bench.io.documents import (
     read_whole,
 )
 from apo_bench.io.figures import default_looks, load_matplotlib, save_figure
+from apo_bench.io.named_files import named_files
 from apo_bench.io.ordinary_files import (
     check_folders,
     check_target,
@@ -72,6 +73,7 @@ __all__ = (
     "listed_words",
     "load_matplotlib",
     "markdown",
+    "named_files",
     "opened",
     "parse_json",
     "put_back",

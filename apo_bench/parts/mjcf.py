@@ -12,6 +12,7 @@ import numpy as np
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, Box, Cylinder, Piece, all_boxes, cylinder_hull
+from apo_bench.io import named_files
 from apo_bench.parts.allowed import MOST_BOXES, MOST_CORNERS_IN_ALL, WIDEST_M, read_tree
 from apo_bench.parts.meshes import checked_hull, dress_picture, is_picture
 from apo_bench.parts.stated import USUAL_DENSITY, StatedPart, read_stated_part
@@ -47,6 +48,12 @@ class PartFile:
     """[kg/m^3]."""
     xml: str
     """The part as MJCF, written anew: all that a simulator may be told of it."""
+
+
+def part_files_of(path: Path) -> tuple[Path, ...]:
+    """The files that a part is made of: its part file, the picture that this names, and the file beside it."""
+    beside = path.with_suffix(".toml")
+    return (*named_files(path), *([beside] if beside.is_file() else []))
 
 
 def read_part(path: Path) -> PartFile:

@@ -46,7 +46,8 @@ from apo_bench.sweeps.progress import progress
 from apo_bench.sweeps.work.dispatch import Executor, check_limit
 from apo_bench.sweeps.work.environment_lock import Check, EnvironmentLock, Names, Unit, environment_lock, listening
 from apo_bench.sweeps.work.worker import Timing, row_within_limit
-from apo_bench.trial.fingerprint import code_files, content_pieces, spec_hash
+from apo_bench.trial.fingerprint import code_files, spec_hash
+from apo_bench.trial.inputs import content_pieces
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations
 
 _LARGEST_WORKERS = 256

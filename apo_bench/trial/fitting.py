@@ -4,7 +4,7 @@ A plan that fits is left as it is. So is one whose contacts are off, which no fr
 no choice was found. What is believed of contacts is what the corrector was told.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple, final
 
@@ -68,33 +68,24 @@ class FittingPlan:
         return f"moved where contacts leave it free: {', '.join(named)}; otherwise {self.why}"
 
 
-def fitting_plan(
-    correction: Correction,
-    observation: Observation,
-    where: Scene | Scenario,
-    corrector_input: Observation | None = None,
-) -> FittingPlan:
+def fitting_plan(correction: Correction, observation: Observation, where: Scene | Scenario) -> FittingPlan:
     """What the robot is to do after a correction, with free directions chosen so that it fits.
 
     Args:
+        observation: What the corrector was given.
         where: The scene that the plan is to be carried out in. Of a scenario, which is compiled if need be, a plan that
             is foretold to fit counts as in reach.
-        corrector_input: What the corrector was given in place of the observation, where its relations are wrong.
 
     Raises:
         InputError: The correction did not converge.
     """
     plan = correction.plan(observation)
-    corrector_input = observation if corrector_input is None else corrector_input
-    believed_plan = (
-        plan if corrector_input.assembly is plan.assembly else replace(plan, assembly=corrector_input.assembly)
-    )
     if isinstance(where, Scenario):
-        if not predict(believed_plan, where.clearance_mm, where.thresholds, where.attach).fails:
+        if not predict(plan, where.clearance_mm, where.thresholds, where.attach).fails:
             return FittingPlan(plan)
         where = build_scene(where)
-    why = _fault(where, believed_plan)
-    goals = _goals_that_fit(believed_plan, correction.believed or corrector_input, where) if why else None
+    why = _fault(where, plan)
+    goals = _goals_that_fit(plan, correction.believed or observation, where) if why else None
     if why is None or goals is None:
         return FittingPlan(plan)
     return FittingPlan(plan.with_goals(goals), _moves(plan.goals, goals), why)

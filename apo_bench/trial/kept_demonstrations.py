@@ -24,7 +24,8 @@ from apo_bench.errors import InputError, require
 from apo_bench.io import parse_json, read_text, write_whole
 from apo_bench.records import RANGE, TrialSettings
 from apo_bench.simulation.scene import Scene
-from apo_bench.trial.fingerprint import code_files, content_pieces
+from apo_bench.trial.fingerprint import code_files
+from apo_bench.trial.inputs import ARM, WEIGHTS, content_pieces
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 
 SCHEMA = "apo-bench/kept-demonstration/1"
@@ -106,8 +107,8 @@ def demonstration_key(settings: TrialSettings, scene: Scene) -> str:
     pieces = content_pieces(scene.scenario, settings.scenario, scene.arm.files)
     salt = None if settings.salt is None else settings.salt.hash
     deciding = [scene.clearance_mm, scene.physics.timestep_s, settings.careless, settings.seed, salt]
-    del pieces["arm"]
-    return _hash(json.dumps([_made_with(), sorted(pieces.items()), deciding]))
+    shown = sorted((name, found) for name, found in pieces.items() if name not in (ARM, WEIGHTS))
+    return _hash(json.dumps([_made_with(), shown, deciding]))
 
 
 def decides(path: str) -> bool:

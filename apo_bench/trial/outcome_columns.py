@@ -119,7 +119,7 @@ def confidence_columns(
     right = observation.assembly
     given_assembly = corrector_input.assembly
     wrong: Row = {"wrong_relation": None if given_assembly is right else culprit(right, given_assembly)}
-    return wrong | _test(result.correction) | _truth(result, corrector_input, truth)
+    return wrong | _test(result.correction) | _truth(result, right, corrector_input, truth)
 
 
 def _test(correction: Correction | None) -> Row:
@@ -138,12 +138,12 @@ def _test(correction: Correction | None) -> Row:
     }
 
 
-def _truth(result: MethodResult, corrector_input: Observation, truth: Array | None) -> Row:
+def _truth(result: MethodResult, right: Assembly, corrector_input: Observation, truth: Array | None) -> Row:
     if truth is None:
         return {}
     correction = result.correction
     plan = result.plan
-    fixed, free = (None, None) if plan is None else goal_errors(plan.assembly, plan.start, truth, plan.goals)
+    fixed, free = (None, None) if plan is None else goal_errors(right, plan.start, truth, plan.goals)
     return {
         "inside_95": contains_truth(corrector_input, correction, truth) if correction and correction.ok else None,
         "planned_error_fixed_mm": finite(fixed),

@@ -97,7 +97,6 @@ def apply_method(
     method: Any,
     observation: Observation,
     truth: Array | None,
-    corrector_input: Observation | None = None,
     look: Look | None = None,
     where: Scene | Scenario | None = None,
 ) -> MethodResult:
@@ -106,9 +105,8 @@ def apply_method(
     Args:
         method: `oracle` takes the truth, `none` what was seen, `by-heart` the goals of the scenario of `where`;
             anything else is a corrector or names one; what is named as `module:name` runs in a process of its own.
+        observation: As the planner has it: its contacts may be missed, false or recognised, and are those of the plan.
         truth: (n, 4, 4) goals of the layout; only the oracle looks at them.
-        corrector_input: What a corrector gets in place of `observation`, where its relations are wrong. The plan has
-            the right ones all the same: what is executed are goals.
         look: What a corrector that can ask sees operations again by.
         where: What the plan of a corrector is to be carried out in: what contacts leave free is chosen so that it fits
             there. None: it stays as the corrector left it.
@@ -119,13 +117,12 @@ def apply_method(
         return _uncorrected(observation, observation.goals, observation_failure(observation))
     if isinstance(method, str) and method == "by-heart" and where is not None:
         return _by_heart(observation, where)
-    believed = observation if corrector_input is None else corrector_input
-    correction = correct_named(believed, with_simulated(method), look)
+    correction = correct_named(observation, with_simulated(method), look)
     if not correction.ok:
         failure = Outcome("correct", correction.status, None, correction.sentence)
         return MethodResult(None, failure, correction.gap_before_m, math.nan, correction)
     plan = correction.plan(observation)
-    fitting = FittingPlan(plan) if where is None else fitting_plan(correction, observation, where, believed)
+    fitting = FittingPlan(plan) if where is None else fitting_plan(correction, observation, where)
     after_m = largest_gap(plan.assembly, plan.start, fitting.plan.goals) if fitting.moves else correction.gap_after_m
     return MethodResult(fitting.plan, None, correction.gap_before_m, after_m, correction, fitting)
 

@@ -97,6 +97,7 @@ def promised_success(
     """The probability that a plan succeeds; the same for the same arguments.
 
     Args:
+        plan: With the contacts that the planner was given.
         believed: What the planner was given: what was seen, with the contacts that it was told.
         correction: What the corrector made of it; None where none was asked, or a plan is nobody's correction.
         where: What the plan is to be carried out in. Of a scenario, everything counts as in reach.
@@ -105,7 +106,7 @@ def promised_success(
         feels: The robot touches first, and makes up for its errors: what is left is how parts slip in its hand.
     """
     explained = explanations(correction, believed, plan.goals)
-    score = plan_score(plan, believed.assembly, explained, where, robot_error, searches, feels)
+    score = plan_score(plan, explained, where, robot_error, searches, feels)
     return float(np.interp(score, SCORES, RATES))
 
 
@@ -124,7 +125,6 @@ def abstained(promised: float, least: float) -> Outcome:
 
 def plan_score(
     plan: Plan,
-    told: Assembly,
     explained: Sequence[Explanation],
     where: Scene | Scenario,
     robot_error: str = NO_ROBOT_ERROR,
@@ -134,7 +134,7 @@ def plan_score(
     """How near to certain it is that a plan fits, from 0 to 1: what the table turns into a probability.
 
     Args:
-        told: The assembly with the contacts that the planner was told.
+        plan: With the contacts that the planner was given.
         where, robot_error, searches, feels: As in `promised_success`.
     """
     ends, arm = ((), ()) if isinstance(where, Scenario) else _by_arm(plan, where, robot_error, searches, feels)
@@ -144,7 +144,7 @@ def plan_score(
     fits = dict[tuple[str, ...], float]()
     score = 0.0
     for each in explained:
-        assembly = _without(told, each.dropped)
+        assembly = _without(plan.assembly, each.dropped)
         if each.dropped not in fits:
             fits[each.dropped] = _fit_share(replace(plan, assembly=assembly), where, arm, ends)
         truths = drawn_truths(each, max(1, round(TRUTHS * each.weight)), rng)

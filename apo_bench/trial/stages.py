@@ -140,6 +140,7 @@ def predicted_outcome(plan: Plan, scene: Scene, searches: bool = False) -> Predi
     """What plan and arm say before it is carried out, as it stands in a row: operations from 1, mm.
 
     Args:
+        plan: With the contacts that the planner was given; which are the true ones is not known here.
         searches: As in `replay_and_judge`.
     """
     arm = arm_moves(plan, scene, searches)

@@ -3,9 +3,10 @@
 How the robot of a trial feels: what it believes of itself before it touches anything, and what its wrist is like.
 """
 
+from dataclasses import replace
 from typing import Any, cast
 
-from apo_bench.assembly import Observation, Plan
+from apo_bench.assembly import Correction, Observation, Plan
 from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.correction.own_code.own import CorrectorLost
 from apo_bench.correction.touches import UNSTATED, believe, slip_sigmas
@@ -18,6 +19,7 @@ from apo_bench.records import (
     RANGE,
     RECOGNISED,
     USUAL_WRENCH,
+    Predicted,
     Row,
     TrialSettings,
     knows_relations,
@@ -40,7 +42,7 @@ from apo_bench.trial.outcome_columns import (
     replay_columns,
     result,
 )
-from apo_bench.trial.planning import MethodResult, apply_method, nominal_where_seen
+from apo_bench.trial.planning import apply_method, nominal_where_seen
 from apo_bench.trial.promise import abstained, promised_success
 from apo_bench.trial.recognised_contacts import count_contacts, with_recognised_contacts
 from apo_bench.trial.stages import (
@@ -214,9 +216,17 @@ def _row(
         reference: (n, 4, 4) goals that are right for the judge.
         truth: (n, 4, 4) goals of the layout; None if they are not known.
     """
-    planned = apply_method(method or parsed(settings.method).plan, observation, truth, corrector_input, look, scene)
-    row = _outcome(settings, scene, corrector_input, planned, reference, truth, watch, cache)
-    row |= confidence_columns(planned, observation, corrector_input, truth)
+    planned = apply_method(method or parsed(settings.method).plan, corrector_input, truth, look, scene)
+    if planned.plan is None:
+        assert planned.failure is not None
+        row = result(planned.failure, success=False)
+    else:
+        predicted, promised = _say_before(settings, scene, corrector_input, planned.plan, planned.correction)
+        # What is carried out are goals; which contacts they make, the truth says.
+        plan = replace(planned.plan, assembly=observation.assembly)
+        row = _carry_out(settings, scene, promised, plan, reference, truth, watch, cache)
+        row |= {"predicted": predicted, "promised": promised}
+    row |= method_columns(planned) | confidence_columns(planned, observation, corrector_input, truth)
     if planned.correction is not None:
         row |= {"seen_again": look.seen_again if look else 0}
     if knows_relations(settings.method):
@@ -236,34 +246,45 @@ def _corrector_input(settings: TrialSettings, observation: Observation, truth: A
     return with_relations(observation, make_relations(settings.relations), truth, rng)
 
 
-def _outcome(
+def _say_before(
+    settings: TrialSettings, scene: Scene, given: Observation, plan: Plan, correction: Correction | None
+) -> tuple[Predicted, float]:
+    """What a plan says of itself before anything moves: what will fail, and how likely it succeeds.
+
+    Args:
+        given: What the planner was given; the plan has the same contacts.
+    """
+    _, searches, by_touch = parsed(settings.method)
+    promised = promised_success(plan, given, correction, scene, settings.robot_error, searches, by_touch)
+    return predicted_outcome(plan, scene, searches), promised
+
+
+def _carry_out(
     settings: TrialSettings,
     scene: Scene,
-    believed: Observation,
-    planned: MethodResult,
+    promised: float,
+    plan: Plan,
     reference: Array,
     truth: Array | None,
     watch: Any,
     cache: ReplayCache | None,
 ) -> Row:
-    """Carry out the plan, if there is one that promises enough."""
-    if planned.plan is None:
-        assert planned.failure is not None
-        return result(planned.failure, success=False) | method_columns(planned)
-    _, searches, by_touch = parsed(settings.method)
-    wrong = settings.robot_error
-    promised = promised_success(planned.plan, believed, planned.correction, scene, wrong, searches, by_touch)
-    said: Row = {"predicted": predicted_outcome(planned.plan, scene, searches), "promised": promised}
+    """What came of a plan, if it promises enough.
+
+    Args:
+        plan: With the right contacts.
+    """
     if promised < settings.abstain:
-        return result(abstained(promised, settings.abstain), success=False) | method_columns(planned) | said
+        return result(abstained(promised, settings.abstain), success=False)
+    _, searches, by_touch = parsed(settings.method)
     error = draw_robot_error(settings.robot_error, scene, settings.seed, settings.salt)
-    feels = _feels(settings, planned.plan, scene) if by_touch else None
+    feels = _feels(settings, plan, scene) if by_touch else None
     attempt = replay_and_judge(
-        planned.plan, scene, reference, watch, settings.fidelity, cache, searches, error=error, feels=feels
+        plan, scene, reference, watch, settings.fidelity, cache, searches, error=error, feels=feels
     )
     end = result(trial_outcome(attempt), success=attempt.verdict.success)
     driven: Row = {"joint_control": scene.arm.control}
-    return end | method_columns(planned) | said | driven | replay_columns(attempt, planned.plan, truth)
+    return end | driven | replay_columns(attempt, plan, truth)
 
 
 def _feels(settings: TrialSettings, plan: Plan, scene: Scene) -> Feels:

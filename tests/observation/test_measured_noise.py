@@ -25,7 +25,8 @@ from apo_bench.observation.models.isotropic import COVARIANCE_FLOOR
 from apo_bench.observation.models.residuals import Residuals, match_residuals
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.noise_file import noise_text, presets, read_noise
-from apo_bench.trial.fingerprint import noise_content, spec_hash
+from apo_bench.trial.fingerprint import spec_hash
+from apo_bench.trial.inputs import noise_content
 from apo_bench.trial.planning import apply_method
 from tests import bop_made as made_of
 from tests import scenes

@@ -264,11 +264,19 @@ def test_files_below_the_current_folder_travel_and_no_others(
     (own / "deep").mkdir()
     (own / "deep" / "mine.toml").write_text(text.replace('file = "block"', 'file = "../part.xml"'))
     shutil.copy(folder("assets") / "parts" / "block.xml", own / "part.xml")
+    (own / "part.toml").write_text("")
     shutil.copy(folder("assets") / "noise" / "megapose-lmo.toml", own / "noise.toml")
     scenarios = ("deep/mine.toml", str(far))
     spec = replace(SPEC, scenarios=scenarios, methods=("code_of_mine:raises",), noises=("noise.toml", "camera"))
     travel = runtime_files(names_of([spec]))
-    assert set(travel) == {"deep/mine.toml", "part.xml", "noise.toml", "code_of_mine.py", "helper_of_mine.py"}
+    assert set(travel) == {
+        "deep/mine.toml",
+        "part.xml",
+        "part.toml",
+        "noise.toml",
+        "code_of_mine.py",
+        "helper_of_mine.py",
+    }
     assert all((own / name).samefile(path) for name, path in travel.items())
 
 

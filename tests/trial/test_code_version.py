@@ -9,16 +9,16 @@ import pytest
 
 from apo_bench import TrialSettings, load_scenario
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.trial import fingerprint
+from apo_bench.trial import fingerprint, inputs
 from apo_bench.trial.fingerprint import (
     ROOMS_WITHOUT_TRIALS,
     code_files,
     content_hash,
     counts,
-    own_content,
     sources,
     spec_hash,
 )
+from apo_bench.trial.inputs import own_content
 
 PACKAGE = Path(fingerprint.__file__).parents[1]
 
@@ -121,5 +121,5 @@ def test_ones_own_code_counts_where_it_makes_noise_relations_or_arms(
     assert own_content("relations", "shifted:3", "given") == own_content("noise", "empirical:x.csv") == {}
     assert own_content("arm", "no_such_module:arm") == own_content("noise", "builtins:print") == {}
     first = spec_hash(TrialSettings("block_on_block", noise="own_noise_1:blur"), "ab")
-    monkeypatch.setattr(fingerprint, "_module_hash", lambda module: "other")
+    monkeypatch.setattr(inputs, "_module_digest", lambda module: "other")
     assert spec_hash(TrialSettings("block_on_block", noise="own_noise_1:blur"), "ab") != first

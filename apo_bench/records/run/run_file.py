@@ -89,17 +89,18 @@ def check_same(folder: Path, run: Mapping[str, Any]) -> None:
         _refuse(folder, f"it had {count} grids, now {len(now['grids'])}")
     for i, (old, new) in enumerate(zip(grids, now["grids"], strict=True), start=1):
         _refuse_other(folder, f"grid {i}" if len(grids) > 1 else "grid", old, new)
-    _refuse_other_code(folder, before.get("code"), now["code"])
-    for key in ("versions", "content"):
-        _refuse_other(folder, key, before.get(key), now[key])
+    _refuse_changed(folder, "code: apo_bench/{} changed", before.get("code"), now["code"])
+    _refuse_other(folder, "versions", before.get("versions"), now["versions"])
+    _refuse_changed(folder, "inputs changed: {}", before.get("content"), now["content"])
 
 
-def _refuse_other_code(folder: Path, before: Any, now: Mapping[str, str]) -> None:
+def _refuse_changed(folder: Path, what: str, before: Any, now: Mapping[str, str]) -> None:
+    """Nothing that has a hash may differ."""
     before = before if isinstance(before, dict) else {}
-    changed = sorted(file for file in {*before, *now} if before.get(file) != now.get(file))
+    changed = sorted(name for name in {*before, *now} if before.get(name) != now.get(name))
     if changed:
         more = f" and {len(changed) - 1} more" if len(changed) > 1 else ""
-        _refuse(folder, f"code: apo_bench/{changed[0]}{more} changed")
+        _refuse(folder, what.format(f"{changed[0]}{more}"))
 
 
 def _refuse_other(folder: Path, what: str, before: Any, now: Mapping[str, Any]) -> None:

@@ -181,16 +181,17 @@ def _errors(scene: Scene) -> tuple[tuple[TipError, ...], float, tuple[float, flo
     robot = Robot(scene, scene.scenario.start)
     errors = []
     try:
-        rise(robot, 0.3)
-        for i, speed in enumerate(SPEEDS):
-            way = WAY_M if speed > SPEEDS[0] else WAY_M / 10
-            end = shifted(robot.T, np.array([0.0, 1.0 if i % 2 else -1.0, 0.0]), way)
-            line = smooth(robot.T, end, speed) if speed == SPEEDS[-1] else steady(robot.T, end, speed)
-            errors.append(error_on(line, robot.trace(line), speed))
-            robot.wait(STAND_S)
-        rest = float(np.linalg.norm(_pushed(robot, np.zeros(3)) - robot.T[:3, 3]))
-        before = _pushed(robot, np.zeros(3))
-        x, y, z = (1e3 * abs(float((_pushed(robot, _PUSH_N * a) - before) @ a)) / _PUSH_N for a in np.eye(3))
+        with robot.watch_stability():
+            rise(robot, 0.3)
+            for i, speed in enumerate(SPEEDS):
+                way = WAY_M if speed > SPEEDS[0] else WAY_M / 10
+                end = shifted(robot.T, np.array([0.0, 1.0 if i % 2 else -1.0, 0.0]), way)
+                line = smooth(robot.T, end, speed) if speed == SPEEDS[-1] else steady(robot.T, end, speed)
+                errors.append(error_on(line, robot.trace(line), speed))
+                robot.wait(STAND_S)
+            rest = float(np.linalg.norm(_pushed(robot, np.zeros(3)) - robot.T[:3, 3]))
+            before = _pushed(robot, np.zeros(3))
+            x, y, z = (1e3 * abs(float((_pushed(robot, _PUSH_N * a) - before) @ a)) / _PUSH_N for a in np.eye(3))
     except Halt:
         return (), np.nan, (np.nan, np.nan, np.nan)
     return tuple(errors), 1e3 * rest, (x, y, z)

@@ -66,10 +66,11 @@ def motion_error(scene: Scene, speed: float = SPEEDS[1]) -> TipError | None:
     """
     robot = Robot(scene, scene.scenario.start)
     try:
-        rise(robot, SPEEDS[-1])
-        way = WAY_M if speed > SPEEDS[0] else WAY_M / 10
-        line = steady(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), way), speed)
-        return error_on(line, robot.trace(line), speed)
+        with robot.watch_stability():
+            rise(robot, SPEEDS[-1])
+            way = WAY_M if speed > SPEEDS[0] else WAY_M / 10
+            line = steady(robot.T, shifted(robot.T, np.array([0.0, 1.0, 0.0]), way), speed)
+            return error_on(line, robot.trace(line), speed)
     except Halt:
         return None
 

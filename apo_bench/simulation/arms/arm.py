@@ -13,7 +13,7 @@ import numpy as np
 
 from apo_bench.errors import require
 from apo_bench.geometry import Array, copyable, freeze, frozen, pose
-from apo_bench.io import JsonNode, read_toml
+from apo_bench.io import JsonNode, named_files, read_toml
 from apo_bench.scenario.contacts import read_pose
 
 _GRADED = 0.6
@@ -142,13 +142,13 @@ class Arm:
     limits: ArmLimits = ArmLimits()
     """What it can do."""
     files: tuple[Path, ...] = ()
-    """All files that it was made of; none: `mjcf` alone."""
+    """All files that it was made of; none: `mjcf` and what that names."""
     control: str = "own position actuators"
     """What moves the joints, and how much stronger than in the model the drive of the gripper is, if it is."""
 
     def __post_init__(self) -> None:
         freeze(self, home=(len(self.joints),))
-        object.__setattr__(self, "files", self.files or (self.mjcf,))
+        object.__setattr__(self, "files", self.files or named_files(self.mjcf))
 
     def finger_joints(self, opening: float) -> Array:
         """Where the joints of `fingers` are at an opening of the empty hand, (k,)."""

@@ -141,10 +141,11 @@ def run_schedule(
     kept_states, grip = cache.resume(keys, robot, progress)
     if not kept_states:
         try:
-            robot.wait(_AT_FIRST_S)
-            if feeling is not None:
-                find_out(robot, feeling)
-                todo = prepared(feeling.residual)
+            with robot.watch_stability():
+                robot.wait(_AT_FIRST_S)
+                if feeling is not None:
+                    find_out(robot, feeling)
+                    todo = prepared(feeling.residual)
         except Halt as halt:
             if halt.stage == "touch":
                 why = f": {halt.why}" if halt.why else ""
@@ -156,25 +157,27 @@ def run_schedule(
         robot.step = step
         robot.hooks.before_step(step)
         try:
-            if kept_states <= 2 * i:
-                grip = take(robot, transfer, again=feeling is not None and "square" in feeling.acts)
-                robot.slip(step.operation)
-                cache.keep(keys[2 * i], robot, grip, progress)
-            lay = None
-            if feeling is not None:
-                feeling.taken(step.operation)
-                if transfer.flush is not None:
-                    lay = partial(lay_down, robot, feeling, step.operation)
-            bring(robot, transfer, grip, lay)
-            _note_hold(robot, step)
-            until_rest(robot)
+            with robot.watch_stability():
+                if kept_states <= 2 * i:
+                    grip = take(robot, transfer, again=feeling is not None and "square" in feeling.acts)
+                    robot.slip(step.operation)
+                    cache.keep(keys[2 * i], robot, grip, progress)
+                lay = None
+                if feeling is not None:
+                    feeling.taken(step.operation)
+                    if transfer.flush is not None:
+                        lay = partial(lay_down, robot, feeling, step.operation)
+                bring(robot, transfer, grip, lay)
+                _note_hold(robot, step)
+                until_rest(robot)
+                reached = None if step.undo else snapshot(robot.scene.work, robot.data, plan.start)
         except Halt as halt:
             if halt.code != "unstable_simulation":
                 _note_hold(robot, step)
             if halt.code == "force_stop" and not step.undo:
                 progress.after[step.operation] = snapshot(robot.scene.work, robot.data, plan.start)
             return _outcome(plan, halt.stage, halt.code, step.operation, halt.part)
-        progress.after[step.operation] = None if step.undo else snapshot(robot.scene.work, robot.data, plan.start)
+        progress.after[step.operation] = reached
         progress.timeline.append((step, float(robot.data.time)))
         cache.keep(keys[2 * i + 1], robot, 0, progress)
         robot.hooks.after_step(step)
@@ -210,8 +213,9 @@ def until_rest(robot: Robot) -> None:
 
 def _settled(robot: Robot, plan: Plan) -> Snapshot | None:
     try:
-        robot.wait(_SETTLE_S)
-        until_rest(robot)
+        with robot.watch_stability():
+            robot.wait(_SETTLE_S)
+            until_rest(robot)
     except Halt as halt:
         if halt.code == "unstable_simulation":
             return None

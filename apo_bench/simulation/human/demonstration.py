@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, final
 
+import mujoco
 import numpy as np
 
 from apo_bench.assembly import Assembly, Demonstration, Layout, Poses, Reached, Snapshot, placements
@@ -18,11 +19,18 @@ from apo_bench.insertion.macros import UP
 from apo_bench.insertion.surroundings import OVER_M, ends_of, slide_directions
 from apo_bench.judging.verdict import judge
 from apo_bench.records import sentence
-from apo_bench.scenario import Carelessness, Scenario, careless_covariance, nominal_operations, spread_error
+from apo_bench.scenario import (
+    Carelessness,
+    Scenario,
+    careless_covariance,
+    nominal_operations,
+    spread_error,
+)
+from apo_bench.scenario.scenario import ErrorSpread
 from apo_bench.simulation.hooks import Hooks
-from apo_bench.simulation.human.hands import Hands
+from apo_bench.simulation.human.hands import Hands, PartLost
 from apo_bench.simulation.robot import Trajectory, minimum_jerk, shifted, smooth, with_height
-from apo_bench.simulation.scene import Scene, has_failed, left_out, sleeping, snapshot
+from apo_bench.simulation.scene import Scene, has_failed, is_unstable, left_out, sleeping, snapshot
 
 _SIDE_M = 0.002
 """A part comes down this far beside one that it will lie against, and leaves it by as much before it is lifted."""
@@ -233,34 +241,50 @@ def demonstrate(
     """
     scenario = scene.scenario
     error = spread_error(scenario, layout, _draw(scenario.careless, human_error, rng))
-    stages = (layout.start, *placements(scenario.assembly, layout.start, layout.goals))
     hands = Hands(scene, layout.start, watch)
-    goals = []
-    after = []
-    with sleeping(scene.shown, True), left_out(scene.shown):
-        hands.wait(0.05)
-        for k, operation in enumerate(scenario.assembly.operations):
-            hands.begin(k)
-            target = layout.goals[k] @ pose.exp(np.concatenate([error.offsets[k], np.zeros(3)]))
-            late = error.left if k == len(scenario.assembly) - 1 else ()
-            perform(hands, act(scenario, k, target, stages, late), 1e-3 * scene.clearance_mm)
-            after.append(snapshot(scene.shown, hands.data, layout.start))
-            goals.append(after[-1].poses[operation.main])
-            hands.end(k)
-        hands.wait(STAND_STILL_S)
-    final = snapshot(scene.shown, hands.data, layout.start)
-    why = "the simulation became unstable" if has_failed(hands.data) else _wrong(scene, layout, after, final)
+    try:
+        after = _assemble(scene, layout, hands, error)
+    except (PartLost, mujoco.FatalError, ArithmeticError, ValueError) as failure:
+        if not isinstance(failure, PartLost) and not is_unstable(failure, hands.data):
+            raise
+        after = []
+    if not after or has_failed(hands.data):
+        # Where the parts are is not known any more, and nobody asks.
+        why, goals, final = "the simulation became unstable", layout.goals, layout.start
+    else:
+        why = _wrong(scene, layout, after)
+        mains = [operation.main for operation in scenario.assembly.operations]
+        goals = np.array([reached.poses[main] for reached, main in zip(after, mains, strict=False)])
+        final = after[-1].poses
     return Demonstration(
         assembly=scenario.assembly,
         start=layout.start,
-        goals=np.array(goals),
-        final=final.poses,
+        goals=goals,
+        final=final,
         careless=careless_covariance(scenario, human_error),
         code="demonstration_failed" if why else "ok",
         why=why,
         gap_m=1e-3 * scenario.gap_mm,
         play_m=1e-3 * scene.clearance_mm,
     )
+
+
+def _assemble(scene: Scene, layout: Layout, hands: Hands, error: ErrorSpread) -> list[Snapshot]:
+    """Do all operations; what stands where after each, and when all is done."""
+    scenario = scene.scenario
+    stages = (layout.start, *placements(scenario.assembly, layout.start, layout.goals))
+    after = []
+    with sleeping(scene.shown, True), left_out(scene.shown):
+        hands.wait(0.05)
+        for k in range(len(scenario.assembly)):
+            hands.begin(k)
+            target = layout.goals[k] @ pose.exp(np.concatenate([error.offsets[k], np.zeros(3)]))
+            late = error.left if k == len(scenario.assembly) - 1 else ()
+            perform(hands, act(scenario, k, target, stages, late), 1e-3 * scene.clearance_mm)
+            after.append(snapshot(scene.shown, hands.data, layout.start))
+            hands.end(k)
+        hands.wait(STAND_STILL_S)
+    return [*after, snapshot(scene.shown, hands.data, layout.start)]
 
 
 def _draw(how: Carelessness | None, human_error: float, rng: np.random.Generator) -> Array:
@@ -272,9 +296,9 @@ def _draw(how: Carelessness | None, human_error: float, rng: np.random.Generator
     return human_error * sign * (how.low_m + size * (how.high_m - how.low_m)) * how.axis
 
 
-def _wrong(scene: Scene, layout: Layout, after: list[Snapshot], final: Snapshot) -> str:
+def _wrong(scene: Scene, layout: Layout, after: list[Snapshot]) -> str:
     """What is wrong with what the human built, empty if nothing is; that late adjustments pushed a part is no fault."""
-    reached = Reached(after=tuple(after), final=final)
+    reached = Reached(after=tuple(after[:-1]), final=after[-1])
     demonstrated = judge(scene.scenario.assembly, reached, layout.goals, scene.criteria).demonstrated
     fault = next((fault for fault, there in demonstrated.conditions.items() if there and fault != "pushed"), None)
     if fault is None:

@@ -20,10 +20,16 @@ _TRAIL_S = 0.019
 _RUN_UP_S = 0.08
 """A motion is simulated from so long before it comes near: what trails wrongly by 0.3 mm is in place by then."""
 _NEAR_M = (0.0005, 0.002)
+_REACH_M = 10.0
+"""A part that is farther from the middle of the table cannot be taken any more."""
 _NO_TURN = 1e-9
 """Lines that turn less are straight, [rad]."""
 _LOOK_STEPS = 10
 """While it waits it looks so often whether everything sleeps."""
+
+
+class PartLost(Exception):
+    """A part is farther away than any hand reaches: the simulation has thrown it there."""
 
 
 class Hands:
@@ -57,8 +63,14 @@ class Hands:
         return part_pose(self.world, self.data, part)
 
     def grab(self, hand: int, part: str) -> Array:
-        """Take a part where it is, at its frame; returns its pose."""
+        """Take a part where it is, at its frame; returns its pose.
+
+        Raises:
+            PartLost: It is not near the table.
+        """
         T = self.pose(part)
+        if np.abs(T[:3, 3]).max() > _REACH_M:
+            raise PartLost(part)
         self._at[hand] = T
         self._put(self.data, hand, T)
         self._hold(hand, part, np.eye(4))

@@ -8,7 +8,8 @@ or sets poses of parts is the simulation's own: `_look` and `slip` shift them in
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import mujoco
@@ -24,7 +25,7 @@ from apo_bench.simulation.robot.paths import Trajectory, smooth
 from apo_bench.simulation.robot.reach import along, at_end, led, way_there, within_speed
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.robot.wrist import WRIST_S, ForceSensors, Guard, WristSensor
-from apo_bench.simulation.scene import Scene, has_failed, initial_state, part_pose, timestep, unfelt
+from apo_bench.simulation.scene import Scene, has_failed, initial_state, is_unstable, part_pose, timestep, unfelt
 
 _REST_RAD_S = 2e-3
 _REST_M_S = 3e-3
@@ -96,6 +97,16 @@ class Robot:
         self.data.ctrl[self._drives] = self.q + self._off
         self._fingers.command(self.data, self.arm.opening_m)
         self.forces = ForceSensors(scene.work, self.data.sensordata)
+
+    @contextmanager
+    def watch_stability(self) -> Iterator[None]:
+        """Give up, `unstable_simulation`, where MuJoCo or arithmetic raises an error as the simulation has failed."""
+        try:
+            yield
+        except (mujoco.FatalError, ArithmeticError, ValueError) as error:
+            if is_unstable(error, self.data):
+                raise Halt(self.stage, "unstable_simulation") from error
+            raise
 
     def follow(self, line: Trajectory, guard: Guard | None = None) -> float:
         """Bring the tip along a line; returns how much of it is left, [m]: not zero if the guard stopped it.

@@ -167,8 +167,10 @@ def dress(
     """
     body = spec.worldbody.bodies[0]
     lining = body.add_body(name=f"{body.name}_lining") if any(map(is_lining, bits.values())) else body
+    pictures = {geom.meshname for geom in spec.geoms if geom.name not in pieces}
     for mesh in spec.meshes:
-        spec.delete(mesh)
+        if mesh.name not in pictures:
+            spec.delete(mesh)
     for name, several in pieces.items():
         geom = spec.geom(name)
         surface = {key: np.array(getattr(geom, key)) for key in _SURFACE}

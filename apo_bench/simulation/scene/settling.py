@@ -58,7 +58,10 @@ def settle(observation: Observation, *, lift_m: float = LIFT_M) -> Correction | 
     data = initial_state(scene, observation.start)
     for k, operation in enumerate(observation.assembly.operations):
         _put(scene, data, operation.moves, pose.at((0.0, 0.0, lift_m)) @ observation.goals[k])
-        _rest(scene, data)
+        try:
+            _rest(scene, data)
+        except mujoco.FatalError:
+            break
         if has_failed(data):
             break
         goals[k] = part_pose(scene, data, operation.main)

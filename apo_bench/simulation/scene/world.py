@@ -92,6 +92,11 @@ def has_failed(data: Any) -> bool:
     return bool(data.warning.number.any()) or not math.isfinite(data.qpos.sum())
 
 
+def is_unstable(error: Exception, data: Any) -> bool:
+    """Whether an error is that of a simulation that has failed: of MuJoCo itself, or of numbers that are not finite."""
+    return isinstance(error, mujoco.FatalError) or has_failed(data)
+
+
 def sleeping(world: World, allowed: bool) -> AbstractContextManager[None]:
     """Whether parts that rest and that nothing moves against are left as they are, for a while."""
     flags = int(world.model.opt.enableflags)

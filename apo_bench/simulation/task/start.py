@@ -135,16 +135,17 @@ def _held(
     if not t.into.level and t.mouths:
         t = replace(t, in_last=True, slow=max(t.slow, max(t.mouths) + WALL_MARGIN_M))
     try:
-        i = take(robot, t, again=feeling is not None and "square" in feeling.acts)
-        robot.slip(k)
-        laying = None
-        if feeling is not None:
-            feeling.taken(k)
-            laying = None if t.flush is None else partial(lay, robot, feeling, k)
-        grip, second = before_attach(robot, t, i, laying)
-        wrist = wrist_of(robot, wrench[0], np.random.default_rng(wrench[1]))
-        wrist.hold(*part_loads(robot.scene, {t.part: pose.inverse(grip.T_part_tip)}))
-        zero(robot, wrist)
+        with robot.watch_stability():
+            i = take(robot, t, again=feeling is not None and "square" in feeling.acts)
+            robot.slip(k)
+            laying = None
+            if feeling is not None:
+                feeling.taken(k)
+                laying = None if t.flush is None else partial(lay, robot, feeling, k)
+            grip, second = before_attach(robot, t, i, laying)
+            wrist = wrist_of(robot, wrench[0], np.random.default_rng(wrench[1]))
+            wrist.hold(*part_loads(robot.scene, {t.part: pose.inverse(grip.T_part_tip)}))
+            zero(robot, wrist)
     except Halt as halt:
         return Outcome(halt.stage, halt.code, k, sentence(halt.code, part=halt.part or t.part, operation=k))
     return Start(

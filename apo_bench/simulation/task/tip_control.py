@@ -135,7 +135,8 @@ class TipControl:
         """
         robot = self.robot
         t = self.start.transfer
-        with sleeping(robot.scene.work, robot.scene.grasp == "friction"), left_out(robot.scene.work):
+        work = robot.scene.work
+        with sleeping(work, robot.scene.grasp == "friction"), left_out(work), robot.watch_stability():
             robot.stand()
             if self.arrived:
                 at_end = shifted(robot.T, t.into.way, -float(self._off(robot.T)[2]))
@@ -144,7 +145,7 @@ class TipControl:
                 release(robot, t, self.start.grip)
                 depart(robot, t)
             until_rest(robot)
-            return snapshot(robot.scene.work, robot.data, self.start.parts)
+            return snapshot(work, robot.data, self.start.parts)
 
     def sigmas(self, covariance: Array) -> Array:
         """Standard deviations in the frame of the way in, of the front and of the turn, (6,), [m, rad].
@@ -189,8 +190,10 @@ class TipControl:
 
     @contextmanager
     def _stepping(self) -> Iterator[None]:
-        work = self.robot.scene.work
-        with sleeping(work, self.robot.scene.grasp == "friction"), left_out(work), wrist_felt(work.model):
+        robot = self.robot
+        work = robot.scene.work
+        asleep = sleeping(work, robot.scene.grasp == "friction")
+        with asleep, left_out(work), wrist_felt(work.model), robot.watch_stability():
             yield
 
     def _move(self, shift: Array, turn: Array) -> None:

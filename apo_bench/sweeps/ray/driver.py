@@ -6,14 +6,13 @@ it has a process of its own. What is worth saying goes through a pipe to the swe
 
 import os
 import pickle
-import re
 import shutil
 import site
 import sys
 import sysconfig
 import tempfile
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +20,8 @@ from typing import Any, final
 
 from apo_bench.errors import InputError
 from apo_bench.observation.noise_file import noise_path
+from apo_bench.parts import part_files_of
+from apo_bench.scenario import Scenario
 from apo_bench.scenario.file import is_named, load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps.local.pool import GRACE_S
@@ -29,6 +30,7 @@ from apo_bench.sweeps.ray.pool import DEATHS, FALSE_STARTS_OF_TASKS, RayPool
 from apo_bench.sweeps.ray.task import made_task
 from apo_bench.sweeps.work.dispatch import Dispatch
 from apo_bench.sweeps.work.environment_lock import EnvironmentLock, Message, Names, Unit, last_message
+from apo_bench.trial.inputs import own_files
 
 _OBJECT_STORE = 100 * 2**20
 """Bytes, of a cluster that is started here; rows are small."""
@@ -145,34 +147,35 @@ def _spread(plan: ClusterPlan, say: Callable[..., None], pipe: Any) -> None:
             deadline = time.monotonic() + GRACE_S
 
 
-_NAMED_FILE = re.compile(r"""\bfile\s*=\s*["']([^"']+)["']""")
-"""In MJCF: meshes, textures and what is included."""
-_NAMED_FOLDER = re.compile(r"""\b(?:mesh|texture|asset)dir\s*=\s*["']([^"']+)["']""")
-
-
 def runtime_files(names: Names) -> dict[str, Path]:
     """The user's files below the current folder: path from there -> file. What lies elsewhere does not travel.
 
-    Scenario files and their parts, noise files, arms, and every Python module that importing what is named brought in.
+    Scenario files and the files of their parts, noise files, arms, the modules of what is given as `module:name`, and
+    every Python module that importing these brought in.
     """
     brought = names.check()
     arm = find_arm(names.arm)
     files = (
         *(Path(name) for name in names.scenarios if not is_named(name)),
-        *(part for name in names.scenarios if not is_named(name) for part in load_scenario(name).part_files.values()),
+        *(file for name in names.scenarios if not is_named(name) for file in _of_parts(load_scenario(name))),
         *(path for name in names.noises if (path := noise_path(name)) is not None),
-        *(_with_named(arm.mjcf) if arm.model is None else arm.files),
+        *arm.files,
+        *(file for name in (*names.noises, *names.relations, *names.methods, names.arm) for file in own_files(name)),
         *(Path(path) for module in list(sys.modules.values()) if (path := getattr(module, "__file__", None))),
         *(path for name in brought if (path := Path(name)).is_file()),
     )
     here = Path.cwd()
     own = [Path(path) for path in _installed()]
-    own_files = {}
+    below = {}
     for path in files:
         whole = Path(os.path.normpath(here / path))
         if whole.is_relative_to(here) and not any(map(whole.is_relative_to, own)):
-            own_files[whole.relative_to(here).as_posix()] = whole
-    return dict(sorted(own_files.items()))
+            below[whole.relative_to(here).as_posix()] = whole
+    return dict(sorted(below.items()))
+
+
+def _of_parts(scenario: Scenario) -> Iterator[Path]:
+    return (file for part in scenario.part_files.values() for file in part_files_of(part))
 
 
 def _installed() -> set[str]:
@@ -187,11 +190,3 @@ def _installed() -> set[str]:
         *(str(Path(str(apo_bench.__file__)).parent), str(folder("assets")), str(folder("scenarios"))),
         *([] if main is None else [str(Path(main).absolute())]),
     }
-
-
-def _with_named(mjcf: Path) -> list[Path]:
-    """An arm's file, and the files that it names, beside it or in a folder that it names for them."""
-    text = mjcf.read_text(encoding="utf-8", errors="replace")
-    folders = [mjcf.parent, *(mjcf.parent / name for name in _NAMED_FOLDER.findall(text))]
-    named = (folder / name for folder in folders for name in _NAMED_FILE.findall(text))
-    return [mjcf, *(path for path in named if path.is_file())]

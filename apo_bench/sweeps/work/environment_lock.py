@@ -31,7 +31,8 @@ from apo_bench.observation.relations import make_relations
 from apo_bench.records import CORRECTOR_LIMIT_S, RECOGNISED, TrialSettings, parsed, with_simulated
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.finding import find_arm
-from apo_bench.trial.fingerprint import content_hash, noise_content, own_content
+from apo_bench.trial.fingerprint import content_hash
+from apo_bench.trial.inputs import noise_content, own_content
 
 _PACKAGES = (
     *("apo_bench", "mujoco", "mink", "daqp", "gymnasium"),

@@ -1,0 +1,125 @@
+"""A simulation that fails is a result with a code, whatever MuJoCo raises, and nothing of it is left in the scene."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+
+from apo_bench import Scene, TrialSettings
+from apo_bench.assembly import Observation
+from apo_bench.simulation.human.hands import Hands
+from apo_bench.simulation.scene import settling
+from apo_bench.simulation.scene.settling import settle
+from apo_bench.trial.stages import (
+    SimulatedDemonstration,
+    demonstration_failure,
+    observe_demonstration,
+    scene_of,
+    simulate_demonstration,
+)
+from apo_bench.trial.trial import noise_of, run_trial
+
+SETTINGS = TrialSettings("block_on_block", method="none", level_mm=0.5, level_deg=0.5, seed=1)
+TICKS = 40
+"""After so many looks something happens."""
+
+
+@cache
+def scene() -> Scene:
+    return scene_of(SETTINGS)
+
+
+@cache
+def simulated() -> SimulatedDemonstration:
+    return simulate_demonstration(scene(), SETTINGS.careless, SETTINGS.seed)
+
+
+@pytest.fixture(autouse=True)
+def folder_of_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """MuJoCo writes its warnings into the current folder."""
+    monkeypatch.chdir(tmp_path)
+
+
+def disturb(change: Callable[[Any], None]) -> Callable[[Any], None]:
+    """Change the state of a simulation once."""
+    looks = 0
+
+    def watch(data: Any) -> None:
+        nonlocal looks
+        looks += 1
+        if looks == TICKS:
+            change(data)
+
+    return watch
+
+
+def hurl(data: Any) -> None:
+    data.qvel[-6:] = 1e7
+
+
+def lose(data: Any) -> None:
+    data.qpos[-7:-4] = np.nan
+
+
+def fail(*_: Any) -> None:
+    raise mujoco.FatalError("mj_sleep: found sleeping tree 0 in island 0")
+
+
+@pytest.mark.parametrize("change", [hurl, lose])
+def test_a_replay_that_becomes_unstable_is_a_failure_with_its_code(change: Callable[[Any], None]) -> None:
+    before = run_trial(SETTINGS, scene(), simulated=simulated())
+    row = run_trial(SETTINGS, scene(), simulated=simulated(), watch=disturb(change))
+    assert (row["success"], row["failure_code"], row["failure_operation"]) == (False, "unstable_simulation", 1)
+    assert row["failure_stage"] in ("pick", "lift", "carry", "attach", "release", "depart")
+    assert row["sentence"] == "the simulation became unstable in operation 1"
+    assert row["reached"] is None
+    assert run_trial(SETTINGS, scene(), simulated=simulated()) == before
+
+
+def test_an_error_of_mujoco_ends_a_replay_as_unstable(monkeypatch: pytest.MonkeyPatch) -> None:
+    prepared = simulated()
+    monkeypatch.setattr(mujoco, "mj_step", fail)
+    row = run_trial(SETTINGS, scene(), simulated=prepared)
+    assert (row["failure_stage"], row["failure_code"]) == ("pick", "unstable_simulation")
+
+
+def test_any_other_error_is_not_taken_for_an_unstable_simulation() -> None:
+    def wrong(data: Any) -> None:
+        raise ValueError("a watch of somebody else is wrong")
+
+    with pytest.raises(ValueError, match="somebody else"):
+        run_trial(SETTINGS, scene(), simulated=simulated(), watch=disturb(wrong))
+
+
+@pytest.mark.parametrize("change", [hurl, lose, fail])
+def test_a_demonstration_that_becomes_unstable_has_failed(
+    change: Callable[[Any], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    step = Hands._step
+    steps = 0
+
+    def disturbed(hands: Hands, n: int) -> None:
+        nonlocal steps
+        steps += 1
+        if steps == TICKS:
+            change(hands.data)
+        step(hands, n)
+
+    monkeypatch.setattr(Hands, "_step", disturbed)
+    demonstration = simulate_demonstration(scene(), SETTINGS.careless, SETTINGS.seed).demonstration
+    assert demonstration.code == "demonstration_failed"
+    assert demonstration_failure(demonstration).sentence.endswith(": the simulation became unstable")
+    assert np.isfinite(demonstration.goals).all()
+
+
+def test_where_settling_fails_goals_stay_as_they_were_seen(monkeypatch: pytest.MonkeyPatch) -> None:
+    seen: Observation = observe_demonstration(simulated(), noise_of(SETTINGS, scene(), simulated()), SETTINGS.seed)
+    assert not np.array_equal(np.asarray(settle(seen)), seen.goals)
+    monkeypatch.setattr(settling.mujoco, "mj_step", fail)
+    np.testing.assert_array_equal(np.asarray(settle(seen)), seen.goals)

@@ -1,0 +1,66 @@
+"""What a plan says of itself before it is carried out follows from what its planner was given, not from the truth."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from apo_bench import TrialSettings
+from apo_bench.assembly import Observation
+from apo_bench.geometry import Array
+from apo_bench.records import UNCORRECTED
+from apo_bench.simulation.scene import Scene
+from apo_bench.trial import trial
+from apo_bench.trial.stages import observe_demonstration, scene_of, simulate_demonstration
+
+MISSED = TrialSettings(
+    "peg_in_hole", method="contact-robust", relations="missed", level_mm=1.0, level_deg=1.0, seed=839900, abstain=1.0
+)
+SAID = (
+    "predicted",
+    "promised",
+    "gap_before_mm",
+    "gap_after_mm",
+    "free_moved",
+    "freed",
+    "tried",
+    "chi_square",
+    "sentence",
+)
+
+
+@pytest.fixture(scope="module")
+def given() -> tuple[Scene, Observation, Array]:
+    scene = scene_of(MISSED)
+    simulated = simulate_demonstration(scene, MISSED.careless, MISSED.seed)
+    seen = observe_demonstration(simulated, trial.noise_of(MISSED, scene, simulated), MISSED.seed)
+    return scene, seen, simulated.layout.goals
+
+
+def test_another_truth_changes_no_word_of_a_plan(given: tuple[Scene, Observation, Array]) -> None:
+    scene, seen, truth = given
+    told = trial._corrector_input(MISSED, seen, truth)
+    missed = replace(seen, assembly=told.assembly)
+    assert len(told.assembly.relations()) == len(seen.assembly.relations()) - 1
+    said: list[dict[str, Any]] = []
+    for right in (seen, missed):
+        row: Any = trial._row(MISSED, scene, right, told, truth, truth, None, None, None, None)
+        said.append({name: row[name] for name in SAID})
+    assert said[0] == said[1]
+    assert (said[0]["predicted"]["fails"], said[0]["predicted"]["code"]) == (False, "ok")
+
+
+def test_a_contact_that_was_missed_is_not_foreseen_to_fail(given: tuple[Scene, Observation, Array]) -> None:
+    scene, *_ = given
+    row: Any = trial.run_trial(MISSED, scene)
+    assert row["promised"] > 0.9
+    assert not row["predicted"]["fails"]
+    assert row["contacts_missed"] == 1
+
+
+@pytest.mark.parametrize("method", UNCORRECTED)
+def test_what_is_not_corrected_keeps_the_right_contacts(method: str, given: tuple[Scene, Observation, Array]) -> None:
+    _, seen, truth = given
+    assert trial._corrector_input(replace(MISSED, method=method), seen, truth) is seen
