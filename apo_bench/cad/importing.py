@@ -16,6 +16,7 @@ from apo_bench.cad.meshes.crossings import uncrossed
 from apo_bench.cad.meshes.mesh_file import CadFile, read_meshes
 from apo_bench.cad.meshes.shells import CROSSED_A_LITTLE, ROUGH_MM, check_uncrossed, closed_solids
 from apo_bench.cad.pieces.cutting import Cut, cut
+from apo_bench.cad.solids.drawn import keep_drawn
 from apo_bench.cad.solids.naming import title_of, with_names
 from apo_bench.cad.solids.raw_solid import RawSolid, without_copies
 from apo_bench.cad.step.step_file import STEP_SUFFIXES, read_step
@@ -157,14 +158,15 @@ def import_part(
                 refused[face.name] = reason
         body = _without(replace(body, flats=tuple(flats)), refused)
         _check_touches(source, body.flats, body.rounds)
-        color = {"color": raw.places[0].color} if raw.places[0].color else {}
+        color: dict[str, Any] = {"color": raw.places[0].color} if raw.places[0].color else {}
+        title = title_of(raw.name) if raw.name != name else ""
 
         def write(body: Body) -> Path:
-            title = title_of(raw.name) if raw.name != name else ""
-            matter = {"density": density, "source": source, "licence": "as that file", "title": title}
-            return write_part(name, body, folder, **matter, **color)
+            known = {"source": source, "licence": "as that file", "title": title}
+            return write_part(name, body, folder, density=density, **known, **color)
 
         path, solid = _as_read(write, body, refused, source)
+        keep_drawn(raw.mesh, path)
         free = {wall.name: 1e3 * _free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
         return Imported(path, raw, solid, pieces, refused, shares, free)
 

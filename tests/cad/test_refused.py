@@ -276,7 +276,7 @@ def test_the_command_says_what_it_did_and_names_as_asked(tmp_path: Path, capsys:
         "free radius of bore",
     ):
         assert words in said
-    assert {each.suffix for each in out.iterdir()} == {".xml", ".toml", ".png"}
+    assert {each.suffix for each in out.iterdir()} == {".xml", ".toml", ".png", ".npz"}
     assert main(["part", "import", str(path), "--name", "hole7=bore", "--out", str(out)]) == 2
     assert "unknown face 'hole7'" in capsys.readouterr().err
 

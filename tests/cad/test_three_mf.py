@@ -170,7 +170,7 @@ def box(number: int, x: float, y: float, z: float, kind: str = "") -> str:
     vertices = "".join(f'<vertex x="{a}" y="{b}" z="{c}"/>' for a, b, c in corners)
     triangles = "".join(f'<triangle v1="{q[0]}" v2="{q[k]}" v3="{q[k + 1]}"/>' for q in quads for k in (1, 2))
     mesh = f"<mesh><vertices>{vertices}</vertices><triangles>{triangles}</triangles></mesh>"
-    return f'<object id="{number}"{kind and f' type="{kind}"'}>{mesh}</object>'
+    return f'<object id="{number}" type="{kind or "model"}">{mesh}</object>'
 
 
 def several(**models: str) -> bytes:

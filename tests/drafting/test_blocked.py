@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from apo_bench.cad.solids.drawn import keep_drawn
+from apo_bench.cad.solids.raw_solid import Mesh
 from apo_bench.drafting.draft import NoOrder
 from apo_bench.drafting.posed import PosedPart
 from apo_bench.drafting.touching import clashes
@@ -58,10 +60,20 @@ def test_what_touches_nothing_is_said_with_what_is_nearest(tmp_path: Path) -> No
         drafted(parts, "z")
 
 
-def test_parts_that_are_inside_each_other_are_named_with_the_depth(tmp_path: Path) -> None:
+def test_overlaps_are_those_of_the_solids_as_drawn(tmp_path: Path) -> None:
     a, b = made(tmp_path, a=(CORE, (0, 0, 0)), b=(CORE, (0, 0, 14)))
-    (sentence,) = clashes({"a": a.solid, "b": b.solid}, {"a": a.T, "b": b.T}, 0.25)
-    assert sentence.startswith("'a' and 'b' are 1 mm inside each other, and parts are rigid")
+    solids, poses = {"a": a.solid, "b": b.solid}, {"a": a.T, "b": b.T}
+    files = {"a": a.file, "b": b.file}
+    (plain,) = clashes(solids, poses, 0.25, files)
+    assert plain.startswith("'a' and 'b' are 1 mm inside each other, and parts are rigid")
+    corners = np.array([[x, y, z] for x in (-10, 10) for y in (-10, 10) for z in (0, 15)], float)
+    triangles = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    faces = np.array([[q[0], *q[i : i + 2]] for q in triangles for i in (1, 2)])
+    for low, said in ((0.3, "0.7 mm inside each other as drawn, deepest at ("), (1.0, "an error of the import")):
+        keep_drawn(Mesh(corners, faces), a.file)
+        keep_drawn(Mesh(np.maximum(corners, (-99, -99, low)), faces), b.file)
+        (sentence,) = clashes(solids, poses, 0.25, files)
+        assert said in sentence
 
 
 def test_another_side_goes_up_where_there_is_no_order_with_z(tmp_path: Path) -> None:
