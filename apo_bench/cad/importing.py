@@ -162,8 +162,9 @@ def import_part(
         title = title_of(raw.name) if raw.name != name else ""
 
         def write(body: Body) -> Path:
-            known = {"source": source, "licence": "as that file", "title": title}
-            return write_part(name, body, folder, density=density, **known, **color)
+            return write_part(
+                name, body, folder, density=density, source=source, licence="as that file", title=title, **color
+            )
 
         path, solid = _as_read(write, body, refused, source)
         keep_drawn(raw.mesh, path)

@@ -124,7 +124,7 @@ def test_what_is_no_mesh_is_refused_in_one_sentence_and_little_memory(case: str,
     (tmp_path / "cube.drawn.npz").write_bytes(WRONG[case]())
     tracemalloc.start()
     try:
-        with pytest.raises(InputError, match="no mesh that an import kept|larger than 20 MB") as raised:
+        with pytest.raises(InputError, match=r"no mesh that an import kept|larger than 20 MB") as raised:
             drawn_mesh(part)
         _, peak = tracemalloc.get_traced_memory()
     finally:
