@@ -178,6 +178,7 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
     "Files beside parts": {
         "": {
             "schema": "`apo-bench/part/1`",
+            "title": "what a person calls the part, in any letters",
             "source": "where the shape comes from",
             "licence": "what may be done with it",
             "density": "in kg/m^3, 1 to 25000; else 1000",

@@ -9,9 +9,10 @@ import numpy as np
 
 from apo_bench.cad.importing import Imported
 from apo_bench.cad.meshes.mesh_file import CadFile
-from apo_bench.cad.solids.naming import free_name, part_name
+from apo_bench.cad.solids.naming import part_name, title_of
 from apo_bench.cad.solids.raw_solid import RawSolid, Region, SolidPlace
 from apo_bench.geometry import pose
+from apo_bench.parts.making import quoted
 
 _KIND_WORDS = {
     "plane": ("flat", "flat"),
@@ -21,9 +22,10 @@ _KIND_WORDS = {
 }
 
 
-def unit_line(file: CadFile) -> str:
-    """`unit mm, taken from the size; the file states none`."""
-    return f"unit {file.unit}, {file.unit_from}"
+def file_lines(path: Path, file: CadFile) -> Iterator[str]:
+    """`part.stl: unit mm, taken from the size; the file states none`, and what a user must know of how it was read."""
+    yield f"{path}: unit {file.unit}, {file.unit_from}"
+    yield from (f"{path}: {each}" for each in file.said)
 
 
 def import_lines(part: Imported) -> Iterator[str]:
@@ -31,6 +33,8 @@ def import_lines(part: Imported) -> Iterator[str]:
     raw = part.raw
     size = np.ptp(raw.mesh.corners, axis=0)
     yield f"{part.path.stem}: {_numbers(size, ' x ')} mm, {len(raw.mesh.triangles):,} triangles, watertight"
+    if part.path.stem != raw.name:
+        yield f"  title: {title_of(raw.name)}"
     for mended in raw.mended:
         yield f"  mended: {mended}"
     for k, (_, T, _) in enumerate(raw.places, start=1):
@@ -98,6 +102,7 @@ def report_form(file: CadFile, path: Path, parts: Sequence[Imported], poses: Pat
         "file": str(path),
         "unit": file.unit,
         "unit_from": file.unit_from,
+        "warnings": list(file.said),
         "parts": [_part_form(each) for each in parts],
         "poses": None if poses is None else str(poses),
     }
@@ -107,6 +112,7 @@ def _part_form(part: Imported) -> dict[str, Any]:
     raw = part.raw
     return {
         "part": part.path.stem,
+        "title": title_of(raw.name),
         "written": str(part.path),
         "size_mm": np.ptp(raw.mesh.corners, axis=0).tolist(),
         "triangles": len(raw.mesh.triangles),
@@ -155,7 +161,7 @@ def named_places(parts: Mapping[str, Iterable[SolidPlace]]) -> list[tuple[str, s
     copies = []
     for part, places in parts.items():
         for place in places:
-            name = free_name(part_name(place.name), used)
+            name = part_name(place.name, used)
             used.add(name)
             copies.append((part, name, place))
     return copies
@@ -166,7 +172,9 @@ def write_places(places: Iterable[tuple[str, str, SolidPlace]], folder: Path, so
     lines = [f"# where {source} has its parts".replace("\n", " ")]
     for part, name, place in places:
         packed = pose.pack(place.T)
-        lines += ["", "[[pose]]", f'part = "{part}"', f'name = "{name}"', f"at_mm = {_list(packed[:3])}"]
+        lines += ["", "[[pose]]", f'part = "{part}"', f'name = "{name}"']
+        lines += [f"title = {quoted(title_of(place.name))}"] * (name != place.name)
+        lines.append(f"at_mm = {_list(packed[:3])}")
         lines.append(f"quaternion_wxyz = {_list(packed[3:])}")
         if place.color is not None:
             lines.append(f"color = {_list(np.round(place.color, 4))}")

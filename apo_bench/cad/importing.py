@@ -17,7 +17,7 @@ from apo_bench.cad.meshes.mesh_file import CadFile, read_meshes
 from apo_bench.cad.meshes.shells import CROSSED_A_LITTLE, ROUGH_MM, check_uncrossed, closed_solids
 from apo_bench.cad.pieces.cutting import Cut, cut
 from apo_bench.cad.solids.drawn import keep_drawn
-from apo_bench.cad.solids.naming import with_names
+from apo_bench.cad.solids.naming import title_of, with_names
 from apo_bench.cad.solids.raw_solid import RawSolid, without_copies
 from apo_bench.cad.step.step_file import STEP_SUFFIXES, read_step
 from apo_bench.cad.time_limit import limit_of, time_limit
@@ -135,6 +135,7 @@ def import_part(
                 f"{source}: the convex pieces of the part have {corners:,} corners; {MOST_CORNERS_IN_ALL:,} are the "
                 "most, so leave out small holes and fillets."
             )
+        _check_volume(source, raw, pieces)
         refused |= dict.fromkeys(pieces.filled, _FILLED)
         rounds = [wall for wall in rounds if wall.name not in refused]
         if len(flats) + len(rounds) > MOST_FACES:
@@ -157,15 +158,30 @@ def import_part(
                 refused[face.name] = reason
         body = _without(replace(body, flats=tuple(flats)), refused)
         _check_touches(source, body.flats, body.rounds)
-        color = {"color": raw.places[0].color} if raw.places[0].color else {}
+        color: dict[str, Any] = {"color": raw.places[0].color} if raw.places[0].color else {}
+        title = title_of(raw.name) if raw.name != name else ""
 
         def write(body: Body) -> Path:
-            return write_part(name, body, folder, density=density, source=source, licence="as that file", **color)
+            return write_part(
+                name, body, folder, density=density, source=source, licence="as that file", title=title, **color
+            )
 
         path, solid = _as_read(write, body, refused, source)
         keep_drawn(raw.mesh, path)
         free = {wall.name: 1e3 * _free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
         return Imported(path, raw, solid, pieces, refused, shares, free)
+
+
+def _check_volume(source: str, raw: RawSolid, pieces: Cut) -> None:
+    """Raise an `InputError` if pieces of a solid with flat faces only do not fill the volume that the file has."""
+    if any(region.kind != "plane" for region in raw.regions):
+        return
+    filled = moments_of_pieces(pieces.pieces).size * 1e9
+    if abs(filled - raw.mesh.volume) > _SLIVERS * raw.mesh.volume:
+        raise InputError(
+            f"{source}: the file has {raw.mesh.volume:.6g} mm^3, and the convex pieces of the part {filled:.6g} mm^3; "
+            "save the part again from where it was drawn, or as STEP."
+        )
 
 
 def _check_touches(source: str, flats: Sequence[Face], rounds: Sequence[RoundFace]) -> None:

@@ -15,6 +15,8 @@ import typer
 from apo_bench.cli.printing import group, print_json, say
 from apo_bench.cli.setting_options import AsJson, check_outputs, path_given, writing
 from apo_bench.errors import InputError, require
+from apo_bench.io import read_text
+from apo_bench.parts.allowed import LARGEST_PART_BYTES
 from apo_bench.scenario.file import load_scenario
 
 if TYPE_CHECKING:
@@ -42,7 +44,7 @@ def part_import(
     as_json: AsJson = False,
 ) -> None:
     """Make part files from a CAD file: find its faces, cut it into convex pieces, and say what was done."""
-    from apo_bench.cad.import_report import named_places, report_form, unit_line, write_places
+    from apo_bench.cad.import_report import file_lines, named_places, report_form, write_places
     from apo_bench.cad.importing import raw_solids
     from apo_bench.cad.solids.naming import renamed
 
@@ -59,7 +61,7 @@ def part_import(
     raws = [renamed(raw, names) for raw in raws]
     with writing(f"--out {out}"):
         out.mkdir(parents=True, exist_ok=True)
-        say(f"{file}: {unit_line(source)}", as_json)
+        say("\n".join(file_lines(file, source)), as_json)
         imported, left_out = _written(file, raws, out, density, as_json)
         left_out = [*source.left_out, *left_out]
         places = named_places({each.path.stem: each.raw.places for each in imported})
@@ -78,13 +80,13 @@ def _written(
     from apo_bench.cad.import_report import import_lines
     from apo_bench.cad.importing import import_part
     from apo_bench.cad.part_picture import draw_part
-    from apo_bench.cad.solids.naming import free_name, part_name
+    from apo_bench.cad.solids.naming import part_name, title_of
 
     imported: list[Imported] = []
     left_out: list[str] = []
     used: set[str] = set()
     for raw in raws:
-        called = free_name(part_name(raw.name), used)
+        called = part_name(raw.name, used | _of_others(out, title_of(raw.name)))
         used.add(called)
         try:
             each = import_part(raw, called, out, file.name, density)
@@ -100,6 +102,17 @@ def _written(
         draw_part(raw, frozenset(each.refused), called, picture)
         say(f"Wrote {each.path} and {picture}", as_json)
     return imported, left_out
+
+
+def _of_others(out: Path, title: str) -> set[str]:
+    """Numbered parts in a folder that have another title: an import of another file does not replace them."""
+    files = sorted(out.glob("part_*.xml"))
+    texts = {file: read_text(file, "part file", LARGEST_PART_BYTES) for file in files}
+    for file in files:
+        stated = file.with_suffix(".toml")
+        if stated.exists():
+            texts[file] += read_text(stated, "file that states the faces of a part", LARGEST_PART_BYTES)
+    return {file.stem for file, text in texts.items() if title not in text}
 
 
 def _pairs(renamings: list[str]) -> Mapping[str, str]:

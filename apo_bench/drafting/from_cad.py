@@ -10,7 +10,8 @@ import numpy as np
 from apo_bench.cad.assembled import coming_near, mates_of
 from apo_bench.cad.import_report import named_places, write_places
 from apo_bench.cad.importing import import_part, raw_solids
-from apo_bench.cad.solids.naming import free_name, part_name
+from apo_bench.cad.meshes.mesh_file import CadFile
+from apo_bench.cad.solids.naming import part_name, title_of
 from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, Region, SolidPlace
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
@@ -42,7 +43,12 @@ def import_assembly(files: Sequence[Path], folder: Path, unit: str | None = None
     Raises:
         InputError: A file cannot be read, a solid makes no part, or there is one alone.
     """
-    found = [(file.name, raw) for file in files for raw in solids_at(file, unit)]
+    found: list[tuple[str, RawSolid]] = []
+    of_files: list[str] = []
+    for file in files:
+        source, solids = _solids_of(file, unit)
+        of_files += (f"{file.name}: {each}" for each in source.said)
+        found += [(file.name, raw) for raw in solids]
     if sum(len(raw.places) for _, raw in found) < 2:
         raise InputError(
             f"{files[0]}: the file holds one solid; an assembly of at least two is needed, in this file or in further "
@@ -50,12 +56,13 @@ def import_assembly(files: Sequence[Path], folder: Path, unit: str | None = None
         )
     parts: dict[str, ImportedSolid] = {}
     raws = [raw for _, raw in found]
-    for (source, raw), others, mates in zip(found, coming_near(raws), mates_of(raws), strict=True):
-        part = import_solid(raw, others, folder, source, parts, mates)
+    for (name, raw), others, mates in zip(found, coming_near(raws), mates_of(raws), strict=True):
+        part = import_solid(raw, others, folder, name, parts, mates)
         parts[part.name] = part
     copies = named_places({name: part.places for name, part in parts.items()})
     sources = ", ".join(file.name for file in files)
-    return write_places(copies, folder, sources), tuple(said for part in parts.values() for said in part.said)
+    of_parts = [said for part in parts.values() for said in part.said]
+    return write_places(copies, folder, sources), (*of_files, *of_parts)
 
 
 def solids_at(file: Path, unit: str | None = None, places: Sequence[Array] = (np.eye(4),)) -> list[RawSolid]:
@@ -64,13 +71,17 @@ def solids_at(file: Path, unit: str | None = None, places: Sequence[Array] = (np
     Raises:
         InputError: The file cannot be read, or a solid of it makes no part.
     """
+    return [
+        replace(raw, places=tuple(place._replace(T=T @ place.T) for T in places for place in raw.places))
+        for raw in _solids_of(file, unit)[1]
+    ]
+
+
+def _solids_of(file: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
     source, raws = raw_solids(file, unit)
     if source.left_out:
         raise InputError(f"{file}: {len(source.left_out)} of its solids can be no parts: {' '.join(source.left_out)}")
-    return [
-        replace(raw, places=tuple(place._replace(T=T @ place.T) for T in places for place in raw.places))
-        for raw in raws
-    ]
+    return source, raws
 
 
 def import_solid(
@@ -90,11 +101,13 @@ def import_solid(
         InputError: It makes no part.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    name = free_name(part_name(raw.name), used)
+    name = part_name(raw.name, used)
     foot = _foot(raw)
     mates = None if mates is None else mates.translate(-foot)
-    part = import_part(_shifted(raw, -foot), name, folder, f"{source}, {raw.name}", others=others - foot, mates=mates)
-    said = [f"{name}: {len(part.solid.faces)} flat and {len(part.solid.rounds)} round faces"]
+    called = title_of(raw.name)
+    part = import_part(_shifted(raw, -foot), name, folder, f"{source}, {called}", others=others - foot, mates=mates)
+    title = f" ({called})" if raw.name != name else ""
+    said = [f"{name}{title}: {len(part.solid.faces)} flat and {len(part.solid.rounds)} round faces"]
     said += [f"{name}.{face} can make no contact: {why}" for face, why in part.refused.items()]
     return ImportedSolid(name, [place._replace(T=place.T @ pose.at(foot)) for place in raw.places], said)
 

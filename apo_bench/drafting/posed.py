@@ -34,6 +34,8 @@ class PosedPart:
     color: tuple[float, ...] | None = None
     fit: Mapping[str, float] = field(default_factory=dict)
     """Faces that recede although the file does not say so, and by how much before the clearance, [mm]."""
+    title: str = ""
+    """What the CAD file calls it, where that cannot be its name."""
 
 
 def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
@@ -68,7 +70,7 @@ def _posed(
         solids: Those that were read before; is added to.
         used: Names that other parts have.
     """
-    keys = node.fields(("part", "at_mm"), ("name", "quaternion_wxyz", "color"))
+    keys = node.fields(("part", "at_mm"), ("name", "title", "quaternion_wxyz", "color"))
     part = keys["part"].text()
     file = paths.get(part, folder / f"{part}.xml")
     if file not in solids:
@@ -80,7 +82,8 @@ def _posed(
     turn = keys["quaternion_wxyz"].quaternion() if "quaternion_wxyz" in keys else (1.0, 0.0, 0.0, 0.0)
     T = pose.unpack(np.concatenate([1e-3 * keys["at_mm"].numbers(3), turn]))
     color = tuple(np.clip(keys["color"].numbers(3), 0.0, 1.0).tolist()) if "color" in keys else None
-    return PosedPart(name, file, solids[file], T, color)
+    title = keys["title"].text() if "title" in keys else ""
+    return PosedPart(name, file, solids[file], T, color, title=title)
 
 
 def on_the_table(parts: Sequence[PosedPart], up: str = "z") -> tuple[PosedPart, ...]:

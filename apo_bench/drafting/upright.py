@@ -50,7 +50,13 @@ def drafted(
                 break
     if not tried:
         first = next(iter(failed.values()))
-        raise first if up else type(first)(f"{str(first).rstrip('.')}; nor is there one with another axis up.")
+        # What is wrong with a file is wrong with any axis up.
+        is_of_file = isinstance(first, InputError) and len({str(error) for error in failed.values()}) == 1
+        raise (
+            first
+            if up or is_of_file
+            else type(first)(f"{str(first).rstrip('.')}; nor is there one with another axis up.")
+        )
     tried = {axis: replace(made, notes=(*said, *more, *made.notes)) for axis, made in tried.items()}
     best = min(tried, key=lambda axis: len(tried[axis].unfit))
     if up or best == "z":

@@ -13,6 +13,7 @@ from apo_bench.drafting.nests import nest_xml
 from apo_bench.drafting.ordering import Placing
 from apo_bench.drafting.posed import TABLE, PosedPart
 from apo_bench.geometry import Array, Solid, pose
+from apo_bench.io import clean
 from apo_bench.parts import part_names, part_path
 from apo_bench.records import Thresholds
 from apo_bench.scenario.scenario import Grasp
@@ -101,7 +102,7 @@ def draft_lines(draft: Draft) -> Iterator[str]:
 
 
 def _part(draft: Draft, each: PosedPart, folder: Path) -> Iterator[str]:
-    yield f"[parts.{each.name}]"
+    yield f"[parts.{each.name}]" + (f"  # {clean(each.title)}" if each.title else "")
     yield f"file = {json.dumps(_file_key(each.file, folder), ensure_ascii=False)}"
     if each.color is not None:
         yield "color = [" + ", ".join(f"{c:.3g}" for c in each.color) + "]"

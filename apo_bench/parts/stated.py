@@ -43,6 +43,8 @@ class StatedPart:
     """Sliding, and then turning and rolling, as in MJCF; empty if unsaid."""
     source: str
     licence: str
+    title: str
+    """What a person calls the part; empty if unsaid."""
 
 
 def read_stated_part(path: Path) -> StatedPart:
@@ -52,7 +54,9 @@ def read_stated_part(path: Path) -> StatedPart:
         InputError: Anything in the file that is not as described, naming file and place.
     """
     top = read_toml(path, "file that states the faces of a part", LARGEST_PART_BYTES).fields_of(
-        PART_SCHEMA, ("faces", "volume_mm3", "centroid_mm", "inertia_mm5"), ("density", "friction", "source", "licence")
+        PART_SCHEMA,
+        ("faces", "volume_mm3", "centroid_mm", "inertia_mm5"),
+        ("title", "density", "friction", "source", "licence"),
     )
     faces = [_face(name, node) for name, node in _named(top["faces"])]
     return StatedPart(
@@ -65,6 +69,7 @@ def read_stated_part(path: Path) -> StatedPart:
         friction=_friction(top["friction"]) if "friction" in top else (),
         source=top["source"].text() if "source" in top else "",
         licence=top["licence"].text() if "licence" in top else "",
+        title=top["title"].text() if "title" in top else "",
     )
 
 

@@ -12,7 +12,7 @@ from manifold3d import Manifold
 from scipy.spatial import ConvexHull
 
 from apo_bench import InputError
-from apo_bench.cad.import_report import import_lines, unit_line
+from apo_bench.cad.import_report import file_lines, import_lines
 from apo_bench.cad.importing import _why_not, import_part, raw_solids
 from apo_bench.cad.pieces.corners import corners_of, without_near
 from apo_bench.cad.step.from_brep import raw_of
@@ -60,14 +60,14 @@ def test_a_part_of_three_metres_is_refused(tmp_path: Path) -> None:
         raw_solids(write_stl(block(30, 30, 30), tmp_path / "a.stl", 0.1), "m")
 
 
-def test_a_corner_that_is_not_there_is_refused_and_logs_stay_as_they_were(tmp_path: Path) -> None:
-    path = tmp_path / "a.obj"
-    path.write_text("v 0 0 0\nv 10 0 0\nv 0 10 0\nv 0 0 10\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 5\n")
+def test_a_text_stl_without_its_corners_is_refused_and_logs_stay_as_they_were(tmp_path: Path) -> None:
+    path = tmp_path / "a.stl"
+    path.write_text("solid a\nfacet normal 0 0 1\nouter loop\nvertex 0 0 x\nendloop\nendfacet\nendsolid a\n")
     log = logging.getLogger("trimesh")
     before = log.level
     log.setLevel(logging.WARNING)
     try:
-        with pytest.raises(InputError, match="no OBJ file that can be read"):
+        with pytest.raises(InputError, match="no STL file that can be read"):
             raw_solids(path, "mm")
         assert log.level == logging.WARNING
     finally:
@@ -151,7 +151,7 @@ def test_free_radius_of_a_blind_hole_and_volume_of_its_part(tmp_path: Path) -> N
 def test_what_an_import_did_is_said_in_lines(tmp_path: Path) -> None:
     path = write_stl(block(40.125, 30, 10) - rod(4, 10, n=32), tmp_path / "lid.stl")
     file, (raw,) = raw_solids(path, None)
-    assert unit_line(file) == "unit mm, taken from the size; the file states none"
+    assert list(file_lines(path, file)) == [f"{path}: unit mm, taken from the size; the file states none"]
     assert raw_solids(path, "mm")[0][:2] == ("mm", "as asked")
     lines = list(import_lines(import_part(raw, "lid", tmp_path, "lid.stl")))
     assert lines[0].startswith("lid: 40.125 x 30 x 10 mm, ")

@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+import os
+import tracemalloc
+from collections.abc import Callable
+from io import BytesIO
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
@@ -71,6 +76,67 @@ def test_a_mesh_is_kept_beside_its_part_file(tmp_path: Path) -> None:
     assert kept is not None
     assert (kept.corners == CUBE.corners).all()
     assert (kept.triangles == CUBE.triangles).all()
-    (tmp_path / "cube.drawn.npz").write_bytes(b"no archive")
-    with pytest.raises(InputError, match="no mesh that an import kept"):
-        drawn_mesh(part)
+
+
+def packed(corners: Any, triangles: Any) -> bytes:
+    out = BytesIO()
+    np.savez_compressed(out, corners=corners, triangles=triangles)
+    return out.getvalue()
+
+
+def claims(shape: str) -> bytes:
+    """An archive whose triangles state another shape than they have."""
+    raw = packed(CUBE.corners, CUBE.triangles.astype(np.int32))
+    out = BytesIO()
+    with ZipFile(BytesIO(raw)) as old, ZipFile(out, "w") as new:
+        for name in old.namelist():
+            new.writestr(name, old.read(name).replace(b"(12, 3)", shape.encode()))
+    return out.getvalue()
+
+
+INDEX = CUBE.triangles.astype(np.int32)
+WRONG: dict[str, Callable[[], bytes]] = {
+    "no archive": lambda: b"no archive",
+    "nothing": lambda: b"",
+    "text": lambda: packed(np.array([["a", "b", "c"]]), INDEX),
+    "objects": lambda: packed(np.array([[1, "b", None]], dtype=object), INDEX),
+    "no triangles": lambda: packed(CUBE.corners, INDEX[:0]),
+    "no corners": lambda: packed(CUBE.corners[:0], INDEX),
+    "a corner that is not there": lambda: packed(CUBE.corners, INDEX + 1),
+    "a corner before the first": lambda: packed(CUBE.corners, INDEX - 1),
+    "no number": lambda: packed(np.full_like(CUBE.corners, np.nan), INDEX),
+    "fractions": lambda: packed(CUBE.corners, CUBE.triangles.astype(float)),
+    "pairs": lambda: packed(CUBE.corners[:, :2], INDEX),
+    "one number": lambda: packed(np.float64(1.0), INDEX),
+    "other names": lambda: packed(CUBE.corners, INDEX).replace(b"triangles.npy", b"triangle1.npy"),
+    "a shape of a terabyte": lambda: claims("(99999999999, 3)"),
+    "a negative shape": lambda: claims("(-1, 3)"),
+    "a shape that is no shape": lambda: claims("(12, x)"),
+    "60 MB in a small archive": lambda: packed(np.zeros((60_000_000 // 24, 3)), INDEX),
+    "larger than any": lambda: bytes(20_000_001),
+    "cut short": lambda: packed(CUBE.corners, INDEX)[:-30],
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_what_is_no_mesh_is_refused_in_one_sentence_and_little_memory(case: str, tmp_path: Path) -> None:
+    part = tmp_path / "cube.xml"
+    (tmp_path / "cube.drawn.npz").write_bytes(WRONG[case]())
+    tracemalloc.start()
+    try:
+        with pytest.raises(InputError, match=r"no mesh that an import kept|larger than 20 MB") as raised:
+            drawn_mesh(part)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert "\n" not in str(raised.value)
+    assert peak < 45e6
+
+
+def test_a_pipe_or_a_link_to_nothing_is_refused_at_once(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "a.drawn.npz")
+    with pytest.raises(InputError, match="a pipe was given"):
+        drawn_mesh(tmp_path / "a.xml")
+    (tmp_path / "b.drawn.npz").symlink_to(tmp_path / "nothing")
+    with pytest.raises(InputError, match="cannot be read"):
+        drawn_mesh(tmp_path / "b.xml")

@@ -122,6 +122,25 @@ def test_an_assembly_keeps_copies_names_and_colours(tmp_path: Path, capsys: pyte
     assert all(name.startswith("copy ") for name in names)
 
 
+@pytest.mark.parametrize("kind", ["UTF-8", "UTF-8 written byte by byte", "X2"])
+def test_names_that_are_not_latin_are_titles(kind: str, tmp_path: Path) -> None:
+    from build123d import Box, Compound, Pos
+
+    plate, pin = Box(40, 30, 10), Pos(0, 0, 12) * Box(10, 9, 24)
+    plate.label, pin.label = "plate", "pin"
+    path = write_step(Compound(label="jig", children=[plate, pin]), tmp_path / "a.step")
+    raw = path.read_bytes()
+    for latin, own in (("plate", "底板"), ("pin", "销钉")):
+        written = own.encode("utf-8")
+        if kind == "X2":
+            written = b"\\X2\\" + own.encode("utf-16-be").hex().upper().encode() + b"\\X0\\"
+        elif kind != "UTF-8":
+            written = written.decode("latin-1").encode("utf-8")
+        raw = raw.replace(f"'{latin}'".encode(), b"'" + written + b"'")
+    path.write_bytes(raw)
+    assert {solid.name for solid in solids_of(path)} == {"底板", "销钉"}
+
+
 def test_units_are_those_of_the_file(tmp_path: Path) -> None:
     path = write_step(brep_made("cuboid").mesh, tmp_path / "a.step")
     text = path.read_text().replace("SI_UNIT(.MILLI.,.METRE.)", "SI_UNIT(.CENTI.,.METRE.)")

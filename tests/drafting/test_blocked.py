@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from apo_bench import InputError
 from apo_bench.cad.solids.drawn import keep_drawn
 from apo_bench.cad.solids.raw_solid import Mesh
 from apo_bench.drafting.draft import NoOrder
@@ -74,6 +75,13 @@ def test_overlaps_are_those_of_the_solids_as_drawn(tmp_path: Path) -> None:
         keep_drawn(Mesh(np.maximum(corners, (-99, -99, low)), faces), b.file)
         (sentence,) = clashes(solids, poses, 0.25, files)
         assert said in sentence
+
+
+def test_a_kept_mesh_that_cannot_be_read_is_named_and_nothing_is_said_of_axes(tmp_path: Path) -> None:
+    parts = made(tmp_path, a=(CORE, (0, 0, 0)), b=(CORE, (0, 0, 14)))
+    (tmp_path / "a.drawn.npz").write_text("no archive")
+    with pytest.raises(InputError, match=r"a\.drawn\.npz: .* or import the part again\.$"):
+        drafted(parts)
 
 
 def test_another_side_goes_up_where_there_is_no_order_with_z(tmp_path: Path) -> None:

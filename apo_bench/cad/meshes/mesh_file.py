@@ -1,12 +1,12 @@
-"""Files of triangles become meshes: STL and OBJ by trimesh, 3MF by the objects that its build names."""
+"""Files of triangles become meshes in mm: STL, OBJ and 3MF, with the unit that is stated or taken."""
 
-import logging
-from io import BytesIO
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
+from apo_bench.cad.meshes.obj import read_obj
+from apo_bench.cad.meshes.stl import read_stl
 from apo_bench.cad.meshes.three_mf import read_3mf
 from apo_bench.cad.solids.raw_solid import Mesh
 from apo_bench.errors import InputError
@@ -18,6 +18,8 @@ _LARGEST_BYTES = 60_000_000
 MOST_CAD_TRIANGLES = 400_000
 SMALLEST_PART_MM = 1.0
 _OPEN_BELOW_MM = 10.0
+_UNUSUAL_BELOW_MM = 30.0
+"""Of the longest side of all parts of a file: below this mm are taken with a warning."""
 LARGEST_PART_MM = 2000.0
 """Of the longest side of what a file holds: smaller and larger ones are no parts; where a file states no unit, mm is
 taken between the last two."""
@@ -31,6 +33,8 @@ class CadFile(NamedTuple):
     """Who says so."""
     left_out: tuple[str, ...] = ()
     """Why some of its solids are not read."""
+    said: tuple[str, ...] = ()
+    """What a user must know of how it was read, one sentence each."""
 
 
 def read_cad_bytes(path: Path, kind: str) -> bytes:
@@ -63,11 +67,7 @@ def read_meshes(path: Path, unit: str | None = None) -> tuple[CadFile, list[tupl
     if unit is not None and unit not in _UNITS_MM:
         raise InputError(f"--unit {unit} was given; {', '.join(_UNITS_MM)} are allowed.")
     raw = read_cad_bytes(path, suffix[1:].upper())
-    stated, meshes = (
-        read_3mf(path, raw, MOST_CAD_TRIANGLES)
-        if suffix == ".3mf"
-        else (None, [(path.stem, _by_trimesh(path, raw, suffix[1:]))])
-    )
+    stated, meshes, said = _read(path, raw, suffix)
     count = sum(len(mesh.triangles) for _, mesh in meshes)
     is_finite = all(np.isfinite(mesh.corners).all() for _, mesh in meshes)
     most = f"{MOST_CAD_TRIANGLES:,} are the most, so save it with a coarser one"
@@ -79,13 +79,25 @@ def read_meshes(path: Path, unit: str | None = None) -> tuple[CadFile, list[tupl
         if is_wrong:
             raise InputError(f"{path}: {sentence}.")
     size = np.ptp(np.concatenate([mesh.corners[mesh.triangles.ravel()] for _, mesh in meshes]), axis=0).max()
-    file = _with_unit(path, unit, stated, float(size))
+    file = _with_unit(path, unit, stated, float(size), said)
     scale = _UNITS_MM[file.unit]
     return file, [(name, Mesh(mesh.corners * scale, mesh.triangles)) for name, mesh in meshes]
 
 
-def _with_unit(path: Path, unit: str | None, stated: str | None, size: float) -> CadFile:
-    """Which unit the numbers of a file are in, and who says so."""
+def _read(path: Path, raw: bytes, suffix: str) -> tuple[str | None, list[tuple[str, Mesh]], tuple[str, ...]]:
+    """The unit that a file states, its objects by name, and what a user must know of how they were read."""
+    if suffix == ".3mf":
+        package = read_3mf(path, raw, MOST_CAD_TRIANGLES)
+        other = f"{package.left_out} meshes of the build are supports or other objects that are no parts: left out"
+        return package.unit, package.meshes, (other,) * (package.left_out > 0)
+    if suffix == ".obj":
+        return None, [(path.stem, read_obj(path, raw, MOST_CAD_TRIANGLES))], ()
+    mesh, said = read_stl(path, raw)
+    return None, [(path.stem, mesh)], said
+
+
+def _with_unit(path: Path, unit: str | None, stated: str | None, size: float, said: tuple[str, ...]) -> CadFile:
+    """Which unit the numbers of a file are in, who says so, and a warning where mm are only one of several guesses."""
     used = unit or stated or "mm"
     unit_from = "as asked" if unit else "stated in the file" if stated else "taken from the size; the file states none"
     longest = size * _UNITS_MM[used]
@@ -102,25 +114,15 @@ def _with_unit(path: Path, unit: str | None, stated: str | None, size: float) ->
             f"{SMALLEST_PART_MM:g} mm to {LARGEST_PART_MM / 1000:g} m are allowed, so give another --unit, or scale "
             "the part."
         )
-    return CadFile(used, unit_from)
+    if unit is None and stated is None and longest < _UNUSUAL_BELOW_MM:
+        said = (*said, _doubt(size))
+    return CadFile(used, unit_from, said=said)
 
 
-def _by_trimesh(path: Path, raw: bytes, kind: str) -> Mesh:
-    import trimesh
-
-    log = logging.getLogger("trimesh")
-    before = log.level
-    log.setLevel(logging.CRITICAL)  # its modules print the tracebacks of errors that they then handle
-    try:
-        options: dict[str, Any] = {"skip_materials": True} if kind == "obj" else {}
-        mesh: Any = trimesh.load(BytesIO(raw), file_type=kind, force="mesh", process=False, **options)
-        return Mesh(
-            np.asarray(mesh.vertices, dtype=np.float64).reshape(-1, 3),
-            np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3),
-        )
-    except MemoryError:
-        raise
-    except Exception as error:
-        raise InputError(f"{path}: this is no {kind.upper()} file that can be read; save the part again.") from error
-    finally:
-        log.setLevel(before)
+def _doubt(size: float) -> str:
+    """Which units the numbers of a file may be in that states none."""
+    options = [f"{name} ({size * _UNITS_MM[name]:.4g} mm)" for name in ("cm", "in")]
+    return (
+        f"WARNING: the longest side is {size:.4g} mm if the numbers are mm, which is small for a part that a robot "
+        f"grasps; if they are {' or '.join(options)}, import again with --unit cm or --unit in"
+    )

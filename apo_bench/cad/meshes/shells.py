@@ -15,6 +15,10 @@ from apo_bench.geometry import Array
 
 _MOST_SHELLS = 200
 _PROBES = 12
+_OPPOSED = 1e-9
+"""Normals of neighbours are opposite to each other within this much of a cosine."""
+_NARROWEST = 1e-3
+"""Triangles of less height, in parts of the size of the solid, are noise."""
 _THINNEST = 1e-6
 """Volume over twice the area, in parts of the size: what is thinner is a sheet."""
 NO_SOLID = "the triangles make no solid; save the part as a closed mesh."
@@ -38,6 +42,8 @@ def closed_solids(path: Path, name: str, mesh: Mesh) -> Iterator[RawSolid]:
     whole, united = _united(path, turned)
     mended = (*mended, *united)
     solids = _apart(path, whole)
+    for solid, _ in solids:
+        _check_unfolded(path, solid)
     for i, (solid, flipped) in enumerate(solids, start=1):
         own_name = name if len(solids) == 1 else f"{name}_{i}"
         yield RawSolid(own_name, solid, (SolidPlace(own_name, np.eye(4)),), (*mended, *([INSIDE_OUT] * flipped)))
@@ -73,6 +79,21 @@ def check_uncrossed(path: Path, mesh: Mesh, off: Array | None = None) -> None:
 def _refuse_crossing(path: Path, where: Array) -> NoReturn:
     at = ", ".join(f"{x:.4g}" for x in where)
     raise InputError(f"{path}: the surface crosses itself at ({at}) mm; mend it where it was drawn.")
+
+
+def _check_unfolded(path: Path, mesh: Mesh) -> None:
+    """Raise an `InputError` if two neighbours lie on each other: a concave face that was cut into a fan does so."""
+    i, k = mesh.neighbours.T
+    size = np.linalg.norm(mesh.across, axis=1)
+    length = np.linalg.norm(mesh.corners[mesh.edges[:, 0]] - mesh.corners[mesh.edges[:, 1]], axis=1)
+    opposed = (mesh.across[i] * mesh.across[k]).sum(axis=1) < (_OPPOSED - 1.0) * size[i] * size[k]
+    folded = opposed & (np.minimum(size[i], size[k]) > _NARROWEST * mesh.extent * length)
+    if folded.any():
+        at = mesh.corners[mesh.edges[folded][0]].mean(axis=0)
+        raise InputError(
+            f"{path}: the surface folds back onto itself at ({', '.join(f'{x:.4g}' for x in at)}) mm, as where a "
+            "concave face was cut into a fan of triangles; save the part again from where it was drawn, or as STEP."
+        )
 
 
 def _alike(path: Path, mesh: Mesh) -> Mesh:

@@ -1,16 +1,22 @@
 """What a part was drawn as: the mesh is kept beside the part file, and two of them are measured where they overlap."""
 
+import os
+from io import BytesIO
 from pathlib import Path
 from typing import NamedTuple
-from zipfile import BadZipFile
+from zipfile import ZIP_DEFLATED, ZIP_STORED, ZipFile
 
 import numpy as np
 
 from apo_bench.cad.solids.raw_solid import Mesh
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
+from apo_bench.io import read_bytes
 
 _SUFFIX = ".drawn.npz"
+_LARGEST_BYTES = 20_000_000
+"""Of the file, and of each of its arrays when it is unpacked: twice what the largest part has."""
+_MOST_FILES = 100
 _FINE = 12.0
 _MOST_POINTS = 200
 _AT_ONCE = 1_000_000
@@ -40,15 +46,46 @@ def drawn_mesh(part_file: Path) -> Mesh | None:
         InputError: What is there is no such mesh.
     """
     path = part_file.with_suffix(_SUFFIX)
-    if not path.exists():
+    if not os.path.lexists(path):
         return None
+    raw = read_bytes(path, "mesh that an import kept", _LARGEST_BYTES)
     try:
-        with np.load(path, allow_pickle=False) as kept:
-            return Mesh(kept["corners"].reshape(-1, 3), kept["triangles"].reshape(-1, 3))
-    except (OSError, ValueError, KeyError, EOFError, BadZipFile) as error:
+        if raw.count(b"PK\1\2") > _MOST_FILES:
+            raise ValueError("too many files")
+        with ZipFile(BytesIO(raw)) as archive:
+            corners = _array(archive, "corners.npy", np.dtype("<f8"))
+            triangles = _array(archive, "triangles.npy", np.dtype("<i4"))
+        if not np.isfinite(corners).all() or not len(triangles):
+            raise ValueError("no corners")
+        if triangles.min() < 0 or triangles.max() >= len(corners):
+            raise ValueError("a triangle without its corners")
+    except MemoryError:
+        raise
+    except Exception as error:  # zipfile and NumPy raise a dozen kinds for what is no archive of arrays
         raise InputError(
             f"{path}: this is no mesh that an import kept; delete it, or import the part again."
         ) from error
+    return Mesh(corners, triangles)
+
+
+def _array(archive: ZipFile, name: str, dtype: np.dtype) -> Array:
+    """Rows of three numbers of one type, (n, 3); nothing is unpacked before its size is known.
+
+    Raises:
+        ValueError: It is anything else.
+    """
+    entry = archive.getinfo(name)
+    if entry.file_size > _LARGEST_BYTES or entry.compress_type not in (ZIP_STORED, ZIP_DEFLATED):
+        raise ValueError("too large")
+    file = BytesIO(archive.read(entry))
+    if np.lib.format.read_magic(file) != (1, 0):
+        raise ValueError("another version")
+    shape, is_turned, stated = np.lib.format.read_array_header_1_0(file)
+    rest = file.read()
+    rows = len(rest) // (3 * dtype.itemsize)
+    if stated != dtype or is_turned or shape != (rows, 3) or len(rest) != rows * 3 * dtype.itemsize:
+        raise ValueError("another kind of array")
+    return np.frombuffer(rest, dtype).reshape(rows, 3)
 
 
 def overlap(a: Mesh, T_a: Array, b: Mesh, T_b: Array) -> Overlap | None:

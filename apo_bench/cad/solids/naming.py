@@ -3,13 +3,17 @@
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, count
+from unicodedata import combining, normalize
 
 import numpy as np
 
 from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, Region
 from apo_bench.errors import InputError, unknown
+from apo_bench.io import clean
 from apo_bench.parts.allowed import FACE_OR_PART_NAME, LONGEST_FACE_NAME
 
+_LONGEST_PART_NAME = 48
+_LONGEST_TITLE = 200
 _GRID = 1e-4
 """Places that differ by less, in parts of the size, are in the order of the other ones."""
 
@@ -58,10 +62,32 @@ def renamed(raw: RawSolid, names: Mapping[str, str]) -> RawSolid:
     return replace(raw, regions=tuple(regions))
 
 
-def part_name(text: str) -> str:
-    """A name that a part may have, from any text."""
-    plain = "".join(c if c.isascii() and (c.isalnum() or c == "_") else "_" for c in text)[:48]
-    return plain if plain[:1].isalpha() else f"part_{plain}"
+def part_name(text: str, used: Container[str]) -> str:
+    """A name that a part may have, from any text, and that nothing else has.
+
+    Letters with accents become plain ones. A text with letters that have no Latin form gives `part_1`, `part_2`, ...
+    """
+    plain = _in_latin(text)
+    if plain is None:
+        return next(free for free in (f"part_{n}" for n in count(1)) if free not in used)
+    return free_name(plain if plain[:1].isalpha() else f"part_{plain}", used)
+
+
+def _in_latin(text: str) -> str | None:
+    """A text in letters, digits and underscores; None if a letter has no Latin form, or no letter or digit is left."""
+    plain = ""
+    for c in normalize("NFKD", text):
+        folded = c if c.isascii() else c.casefold()
+        if not folded.isascii() and c.isalnum():
+            return None
+        if not combining(c):
+            plain += "".join(each if each.isascii() and each.isalnum() else "_" for each in folded)
+    return plain[:_LONGEST_PART_NAME] if plain.strip("_") else None
+
+
+def title_of(text: str) -> str:
+    """A name of a CAD file as one line that can be printed."""
+    return clean(text)[:_LONGEST_TITLE]
 
 
 def free_name(name: str, used: Container[str]) -> str:

@@ -101,7 +101,10 @@ def _name(label: Any) -> str:
     attribute = TDataStd.TDataStd_Name()
     if not label.FindAttribute(TDataStd.TDataStd_Name.GetID_s(), attribute):
         return ""
-    text = "".join(c if c.isprintable() else " " for c in attribute.Get().ToExtString()).strip()
+    text = attribute.Get().ToExtString()
+    with suppress(UnicodeError):  # the letters of a UTF-8 file are read, and by some programs written, byte by byte
+        text = text.encode("latin-1").decode("utf-8")
+    text = "".join(c if c.isprintable() else " " for c in text).strip()
     return "" if _NO_NAME.fullmatch(text) else text
 
 

@@ -5,7 +5,7 @@ from apo_bench.parts.making.extrude import Bore, bore, extrude
 from apo_bench.parts.making.frustums import Frustum
 from apo_bench.parts.making.outline import Edge, Outline, circle, polygon, rectangle, rounded, slot
 from apo_bench.parts.making.turned import shaft, turned
-from apo_bench.parts.making.writing import solid_of, write_part
+from apo_bench.parts.making.writing import quoted, solid_of, write_part
 
 __all__ = [
     "Body",
@@ -18,6 +18,7 @@ __all__ = [
     "extrude",
     "join",
     "polygon",
+    "quoted",
     "rectangle",
     "rounded",
     "shaft",

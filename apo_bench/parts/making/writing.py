@@ -88,6 +88,7 @@ def write_part(
     color: tuple[float, float, float] = _STEEL,
     source: str,
     licence: str,
+    title: str = "",
 ) -> Path:
     """Write `NAME.xml` and, unless all of its pieces are boxes, `NAME.toml`, so that `load_part` gives back the solid.
 
@@ -96,17 +97,21 @@ def write_part(
         friction: Sliding, turning, rolling.
         color: Red, green, blue, 0 to 1.
         source: Where the shape comes from.
+        title: What a person calls the part, in any letters.
     """
     solid = solid_of(name, body)
     path = folder / f"{name}.xml"
     boxes = all_boxes(solid.pieces)
     matter = {"density": f"{density:g}", "friction": _words(friction)} if boxes else {}
     root = _tree(solid, {**matter, "rgba": _words((*color, 1.0))})
-    note = f"<!-- {source}; {licence} -->\n" if boxes else ""
+    said = "; ".join(filter(None, (title, source, licence))).replace("--", "- -")  # which would end the comment
+    note = f"<!-- {said} -->\n" if boxes else ""
     indent(root)
     path.write_text(note + tostring(root, encoding="unicode") + "\n", encoding="utf-8")
     if not boxes:
-        path.with_suffix(".toml").write_text(stated_text(solid, density, friction, source, licence), encoding="utf-8")
+        path.with_suffix(".toml").write_text(
+            stated_text(solid, density, friction, source, licence, title), encoding="utf-8"
+        )
     return path
 
 
@@ -152,14 +157,17 @@ def _inside(face: Face) -> Array:
     return inside
 
 
-def stated_text(solid: Solid, density: float, friction: Sequence[float], source: str, licence: str) -> str:
+def stated_text(
+    solid: Solid, density: float, friction: Sequence[float], source: str, licence: str, title: str = ""
+) -> str:
     """The text of `NAME.toml`."""
     assert solid.inertia is not None
     six = 1e15 * solid.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
     lines = [
         f'schema = "{PART_SCHEMA}"',
-        f"source = {_quoted(source)}",
-        f"licence = {_quoted(licence)}",
+        *([f"title = {quoted(title)}"] if title else []),
+        f"source = {quoted(source)}",
+        f"licence = {quoted(licence)}",
         f"density = {float(density)!r}",
         f"friction = {_list(friction)}",
         f"volume_mm3 = {1e9 * solid.volume:.12g}",
@@ -210,5 +218,6 @@ def _number(x: float, digits: int) -> str:
     return "0" if text in ("-0", "") else text
 
 
-def _quoted(text: str) -> str:
+def quoted(text: str) -> str:
+    """A text as a TOML file has it."""
     return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ") + '"'
