@@ -249,15 +249,16 @@ def test_a_part_that_is_hidden_while_others_are_placed_is_where_it_is_seen_again
     assert all(np.linalg.norm(twist[:3]) < 1e-3 for each in later.operations for twist in each.adjusted.values())
 
 
-@pytest.mark.parametrize("share", [0.1, 0.3])
-def test_frames_of_a_part_that_is_flipped_move_no_other_part(share: float) -> None:
+def test_what_moved_before_the_operation_before_had_ended_is_no_error() -> None:
+    """Every other frame of the stick is flipped just before it is taken, so it seems to be taken too early."""
     tracks = seen(NAME, 0.5)
-    tracks["stick"] = flipped(tracks["stick"], np.random.default_rng(2).random(len(tracks["stick"].t)) < share)
+    t = tracks["stick"].t
+    tracks["stick"] = flipped(tracks["stick"], (t > 3.35) & (t < 4.5) & (np.arange(len(t)) % 2 == 0))
     recording = imported(tracks)
+    assert recording.stays["stick"][0].ends < recording.stays["castle2"][1].begins
     off = pose.log(pose.inverse(goals(NAME)) @ recording.observation.goals)
-    assert np.abs(off[:, :3]).max() < 1.5e-3
-    assert np.degrees(np.abs(off[:, 3:]).max()) < 1.5
-    assert np.abs(np.diagonal(recording.observation.covariance, axis1=1, axis2=2)[:, :3]).max() < 1e-5
+    assert np.abs(off[:, :3]).max() < 1e-3
+    assert np.diagonal(recording.observation.covariance, axis1=1, axis2=2)[:, :3].max() < 1e-5
 
 
 def test_a_part_that_is_flipped_for_good_is_named_with_its_symmetry() -> None:
