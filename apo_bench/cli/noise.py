@@ -61,7 +61,9 @@ def print_noise_card(
 @noise.command("fit")
 def noise_fit(
     estimates: Annotated[Path, typer.Option(help="Poses of an estimator, a results file of the BOP format (.csv).")],
-    truth: Annotated[Path, typer.Option(help="Where the parts were: .csv of that format, or a scene_gt.json.")],
+    truth: Annotated[
+        Path, typer.Option(help="Where the parts were: .csv of that format, a scene_gt.json, or a folder of scenes.")
+    ],
     scene_id: Annotated[int | None, typer.Option(help="Only this scene; a scene_gt.json does not say its own.")] = None,
     out: Annotated[Path | None, typer.Option(help="Write the noise file for --noise: .toml.")] = None,
     residuals: Annotated[
@@ -81,7 +83,7 @@ def noise_fit(
     outputs = [(out, "--out", (".toml",)), (residuals, "--residuals", (".csv",)), (picture, "--picture", (".png",))]
     check_outputs(outputs, (estimates, truth))
     seen = read_results(estimates)
-    matched = match_residuals(seen, read_truth(truth, seen, scene_id), scene_id)
+    matched = match_residuals(seen, read_truth(truth, seen, scene_id))
     measured = fit.fit_noise(matched, _printable(source or f"{estimates.name} against {truth.name}"))
     goodness = fit.goodness_of_fit(matched, measured)
     print_answer(fit_form(matched, measured, goodness), fit_lines(matched, measured, goodness), as_json)

@@ -33,7 +33,7 @@ from apo_bench.cli.setting_options import (
     writing,
 )
 from apo_bench.errors import InputError, require
-from apo_bench.records import CORRECTOR_LIMIT_S, in_python
+from apo_bench.records import CORRECTOR_LIMIT_S, FIRST_TRAINING_TRIAL, in_python
 from apo_bench.scenario.file import load_scenario
 
 if TYPE_CHECKING:
@@ -156,8 +156,6 @@ dataset = group(
     "Data to learn from: whole trials as tables.",
     lambda: typer.echo("apo-bench dataset make SCENARIO --episodes 100 --out DIR"),
 )
-_FIRST_SEED = 1_000_000
-"""Seeds below are for what is reported."""
 
 
 @dataset.command("make")
@@ -168,7 +166,7 @@ def dataset_make(
     *,
     out: Annotated[Path, typer.Option(parser=path_given, metavar="<path>", help="A folder that is not there yet.")],
     episodes: Annotated[int, typer.Option(help="Trials of each scenario.")] = 10,
-    seed: Annotated[int, typer.Option(help="First seed; those of tracks and of the headline are small.")] = _FIRST_SEED,
+    seed: Annotated[int, typer.Option(help="First seed; smaller ones are for evaluation.")] = FIRST_TRAINING_TRIAL,
     format: Annotated[str, typer.Option(help="parquet, lerobot or minari.")] = "parquet",
     record: Annotated[str, typer.Option(help="replays, or insertions: APOInsert-v0 led by a policy.")] = "replays",
     policy: Annotated[
@@ -181,6 +179,11 @@ def dataset_make(
     from apo_bench.trial.request import Request, requested_settings
 
     require(record in ("replays", "insertions"), f"--record {record} was given; replays or insertions is allowed.")
+    require(
+        seed >= FIRST_TRAINING_TRIAL,
+        f"--seed {seed} was given; data to learn from begin at {FIRST_TRAINING_TRIAL}, since smaller numbers are "
+        "trials for evaluation.",
+    )
     require(episodes >= 1, f"--episodes {episodes} was given; a whole number from 1 is allowed.")
     require(
         policy is None or record == "insertions",

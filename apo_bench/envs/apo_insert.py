@@ -19,7 +19,18 @@ from apo_bench.errors import InputError, require, unknown
 from apo_bench.geometry import Array
 from apo_bench.names import resolve
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.records import CORRECTOR, CORRECTORS, SIMULATED, USUAL, TrialSettings, check, level_pair, sentence
+from apo_bench.records import (
+    CORRECTOR,
+    CORRECTORS,
+    EVALUATION_STARTS,
+    FIRST_TRAINING_TRIAL,
+    SIMULATED,
+    USUAL,
+    TrialSettings,
+    check,
+    level_pair,
+    sentence,
+)
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.robot import Halt
@@ -35,6 +46,7 @@ LETS_GO = 0.5
 MOST_TRIES = 100
 """So many trials in a row may never come to the operation before `reset()` gives up."""
 _REWARDS = ("judge", "progress")
+_STARTS = ("training", "evaluation")
 _PLANS = ("none", "oracle", "by-heart")
 
 
@@ -73,6 +85,9 @@ class APOInsert(gymnasium.Env[Seen, Action]):
     One of `layouts` trials from `first_trial` on, each made when it is first drawn and kept. Trials that fail before
     the operation begins are passed over. `reset(seed=k)` draws the same, and the same noise of the sensor, whatever
     came before. `reset(options={"trial": t})` is trial t, of which nothing is kept.
+    With `starts="evaluation"`, `reset(seed=k)` begins at trial k, which is in no pool and in no data set; seeds are
+    below 100000, and a trial that fails before the operation begins is replaced by trial k + 100000, or the next so
+    many further. Different seeds begin at different trials.
 
     ## Episode End
     It terminates when the hand lets go: by the learner, by the approach, or after `horizon` actions; where the force
@@ -90,7 +105,8 @@ class APOInsert(gymnasium.Env[Seen, Action]):
     - `horizon`: actions of an episode.
     - `fails_above_n`: see above.
     - `reward`: `judge` or `progress`.
-    - `layouts`, `first_trial`: the pool of starts. What you report should start at 0.
+    - `starts`: `training` or `evaluation`. Report what was reached from starts for evaluation.
+    - `layouts`, `first_trial`: the pool of starts for training.
     - `pixels`: whether pictures are seen; they make a step slow.
     - `render_mode`: `rgb_array`.
 
@@ -125,7 +141,8 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         fails_above_n: float = 60.0,
         reward: str = "judge",
         layouts: int = 16,
-        first_trial: int = 1_000_000,
+        first_trial: int = FIRST_TRAINING_TRIAL,
+        starts: str = "training",
         pixels: bool = False,
         render_mode: str | None = None,
     ) -> None:
@@ -135,6 +152,8 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         )
         if reward not in _REWARDS:
             raise InputError(unknown("reward", str(reward), _REWARDS))
+        if starts not in _STARTS:
+            raise InputError(unknown("kind of starts", str(starts), _STARTS))
         for name, size in (("shift_mm", shift_mm), ("turn_deg", turn_deg), ("fails_above_n", fails_above_n)):
             is_size = isinstance(size, Real) and 0.0 < size < math.inf
             require(is_size, f"{name} {size!r} was given; a number above 0 is allowed.")
@@ -173,6 +192,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         """Of the way in, as a reward."""
         self._layouts = int(layouts)
         self._first = int(first_trial)
+        self._evaluates = starts == "evaluation"
         self._pixels = bool(pixels)
         self._pool: dict[int, Begun | Outcome] = {}
         self._begun: Begun | None = None
@@ -227,10 +247,16 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         for number, called in ((seed, ""), (trial, "trial")):
             if number is not None:
                 check("seed", number, called=called)
-        seed = trial if seed is None else seed
-        super().reset(seed=None if seed is None else int(seed))
+        of_evaluation = self._evaluates and trial is None
+        if of_evaluation and seed is not None:
+            require(
+                seed < EVALUATION_STARTS,
+                f"a seed of {seed} was given to reset(); starts for evaluation have seeds below {EVALUATION_STARTS}.",
+            )
+        chance = trial if seed is None else seed
+        super().reset(seed=None if chance is None else int(chance))
         self._over = True
-        self._begin(self._drawn(trial))
+        self._begin(self._evaluation_start(seed) if of_evaluation else self._drawn(trial))
         return self._seen(), {}
 
     def _begin(self, begun: Begun) -> None:
@@ -302,6 +328,19 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         raise InputError(
             f"{MOST_TRIES} draws of {self._layouts} layouts did not come to this operation, the last one since "
             f"{why}; give more layouts, a lower level or a smaller robot error."
+        )
+
+    def _evaluation_start(self, seed: int | None) -> Begun:
+        """The first of the trials of a seed that comes to the operation; None draws the seed."""
+        first = int(self.np_random.integers(EVALUATION_STARTS)) if seed is None else int(seed)
+        why = ""
+        for number in range(first, FIRST_TRAINING_TRIAL, EVALUATION_STARTS):
+            begun = self._trials.begin(number)
+            if isinstance(begun, Begun):
+                return begun
+            why = begun.sentence
+        raise InputError(
+            f"no trial of seed {first} comes to this operation, the last one since {why}; give a lower level."
         )
 
     def _at_work(self) -> TipControl:

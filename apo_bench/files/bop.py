@@ -185,7 +185,8 @@ def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) 
 
     A `.json` file holds one scene, and does not say which: it is `scene`, else the number of its folder, else the only
     scene that was estimated. It holds all images of that scene, so those with no estimate at all are left out, as they
-    were probably not asked for. Every row of a `.csv` file was asked for.
+    were probably not asked for. A folder holds scenes, as `000001/scene_gt.json`. Every row of a `.csv` file was asked
+    for.
 
     Args:
         scene: Only this one.
@@ -194,7 +195,10 @@ def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) 
         InputError: Anything that is not as described; no image of the truth has an estimate.
     """
     path = Path(path)
-    if path.suffix.lower() == ".json":
+    of_scenes = path.is_dir() or path.suffix.lower() == ".json"
+    if path.is_dir():
+        truth = _read_folder(path, scene)
+    elif of_scenes:
         scene = _which_scene(path, estimates) if scene is None else scene
         truth = _read_scene(path, scene)
     else:
@@ -209,7 +213,7 @@ def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) 
             f"{estimates.file}; the first of the truth is image {i} of scene {s}; give the truth of the "
             "images that were estimated."
         )
-    kept = estimated_rows if path.suffix.lower() == ".json" else np.ones(len(estimated_rows), dtype=np.bool_)
+    kept = estimated_rows if of_scenes else np.ones(len(estimated_rows), dtype=np.bool_)
     if scene is not None:
         kept &= truth.where[:, 0] == scene
     truth = _only(truth, kept)
@@ -233,7 +237,7 @@ def _among(where: Any, known: Any) -> Any:
 
 def _which_scene(path: Path, estimates: PoseRows) -> int:
     folder = path.resolve().parent.name
-    if folder.isascii() and folder.isdigit() and len(folder) <= 9:
+    if _is_number(folder):
         return int(folder)
     scenes = np.unique(estimates.where[:, 0])
     if len(scenes) > 1:
@@ -243,6 +247,35 @@ def _which_scene(path: Path, estimates: PoseRows) -> int:
             "name it with --scene-id."
         )
     return int(scenes[0])
+
+
+def _read_folder(path: Path, scene: int | None) -> PoseRows:
+    """The truth of all scenes in a folder, or of one of them."""
+    found = [file for file in sorted(path.glob("*/scene_gt.json")) if _is_number(file.parent.name)]
+    files = [file for file in found if scene in (None, int(file.parent.name))]
+    require(
+        files,
+        f"{path}: the folder holds no scene_gt.json in a folder that is numbered "
+        f"{'as its scene' if scene is None else scene}, such as 000001; give a folder of scenes, or one scene_gt.json.",
+    )
+    scenes = list[PoseRows]()
+    for file in files:
+        scenes.append(_read_scene(file, int(file.parent.name)))
+        count = sum(len(rows.where) for rows in scenes)
+        require(count <= MOST_ROWS, f"{file}: scenes of at most {MOST_ROWS} parts are needed; choose by --scene-id.")
+    return PoseRows(
+        str(path),
+        where=np.concatenate([rows.where for rows in scenes]),
+        R=np.concatenate([rows.R for rows in scenes]),
+        t_mm=np.concatenate([rows.t_mm for rows in scenes]),
+        place=np.array([f"{rows.where[0, 0]:06}, {at}" for rows in scenes for at in rows.place]),
+        score=np.concatenate([rows.score for rows in scenes]),
+    )
+
+
+def _is_number(name: str) -> bool:
+    """Whether a folder is named by the number of its scene."""
+    return name.isascii() and name.isdigit() and len(name) <= 9
 
 
 def _read_scene(path: Path, scene: int) -> PoseRows:

@@ -79,7 +79,8 @@ def read_tum(path: Path, how: Conventions) -> LogRows:
         place = f"{path}, line {line}"
         require(
             len(words) == 8 or words[0].startswith("#"),
-            f"{place}: timestamp tx ty tz qx qy qz qw are needed, {len(words)} words were given.",
+            f"{place}: eight numbers with spaces between them are needed, timestamp tx ty tz qx qy qz qw; "
+            f"'{one_line(' '.join(words), 40)}' was given.",
         )
         if not words[0].startswith("#"):
             numbers[place] = [finite_number(word, place) for word in words]
@@ -116,6 +117,12 @@ def read_numbers(path: Path, meaning: Callable[[str], LogColumn | None], renamed
         )
     known = [meaning(renamed.get(name.strip().lower(), name)) for name in names]
     columns = {i: each for i, each in enumerate(known) if each is not None}
+    number = next((name for name in names if is_number(name)), None)
+    require(
+        columns or number is None,
+        f"{place}: the names of columns are needed, such as t_s,id,x_mm, and the number {one_line(str(number), 40)} "
+        "was given; let the log begin with a line of names.",
+    )
     for name, count in Counter(each.meaning for each in columns.values()).items():
         require(count <= 1, f"{place}: two columns say '{name}'; keep one, or name the other one otherwise.")
     of_id = next((i for i, each in columns.items() if each.meaning == "id"), None)
@@ -124,7 +131,11 @@ def read_numbers(path: Path, meaning: Callable[[str], LogColumn | None], renamed
     places = list[str]()
     for line, texts in lines:
         places.append(f"{path}, line {line}")
-        require(len(texts) == len(names), f"{places[-1]}: {len(names)} cells are needed, {len(texts)} were given.")
+        require(
+            len(texts) == len(names),
+            f"{places[-1]}: {len(names)} cells are needed, as many as line {first} has, which is read as the names of "
+            f"columns; {len(texts)} were given. Let the log begin with the line of names, and leave out broken rows.",
+        )
         require(len(places) <= MOST_POSES, f"{places[-1]}: a log of at most {MOST_POSES:,} rows is needed; cut it.")
         for i, column_cells in cells.items():
             column_cells.append(finite_number(texts[i], f"{places[-1]}, column {one_line(names[i], 40)}"))
@@ -141,6 +152,14 @@ def _field(name: str) -> LogColumn | None:
     """What a column is, by the last names in it: `field.pose.position.x`, `/vision/pose/position/x`."""
     words = re.split(r"[./]", name.strip().lower().lstrip("%"))
     return _FIELDS.get(".".join(words[-2:])) or _FIELDS.get(words[-1])
+
+
+def is_number(text: str) -> bool:
+    """Whether a cell can be read as a number."""
+    try:
+        return bool(np.isfinite(float(text)))
+    except ValueError:
+        return False
 
 
 def finite_number(text: str, place: str) -> float:
@@ -192,7 +211,11 @@ def read_log(path: str | Path, form: str, how: Conventions) -> Log:
     require(not path.is_dir() or endings, f"{path}: a folder was given; a log of the format {form} is one file.")
     # Of a folder each file is one object.
     files = sorted(file for ending in endings for file in path.glob(f"*{ending}")) if path.is_dir() else [path]
-    require(files, f"{path}: the folder holds no file that ends in {' or '.join(endings)}; give a folder of logs.")
+    require(
+        files,
+        f"{path}: the folder itself holds no file that ends in {' or '.join(endings)}; give a folder with one file for "
+        "each object.",
+    )
     ids, t, T, places, notes = zip(*(read(file, how) for file in files), strict=True)
     poses, more = oriented(np.concatenate(T), how)
     rows = LogRows([*chain(*ids)], np.concatenate(t), poses, [*chain(*places)], [*notes[0], *more])

@@ -13,14 +13,14 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Observation, Poses, SharedError
 from apo_bench.errors import InputError, require, require_known
-from apo_bench.geometry import Array
+from apo_bench.geometry import Array, turned_alike
 from apo_bench.observation.models import UNSEEN_DEVIATION, floored, last_seen, with_shared
 from apo_bench.recording.arranging import CameraPose, arrangement_of, solved_camera, staying
 from apo_bench.recording.averaging import per_axis
-from apo_bench.recording.doubts import check_arrangement, check_direction, unclear
+from apo_bench.recording.doubts import check_arrangement, check_direction, check_moved, hidden, unclear
 from apo_bench.recording.operations import SeenOperation, seen_operation
 from apo_bench.recording.ordering import ContactFit, NoOrder, Stated
-from apo_bench.recording.rests import RestSpan, consecutive, least_rest_s
+from apo_bench.recording.rests import RestSpan, consecutive, least_rest_s, rests_of
 from apo_bench.recording.setup_files import CameraFile, PoseTrack
 from apo_bench.recording.stays import Stay, Stays, all_stays
 from apo_bench.scenario import Scenario, layout_at
@@ -78,8 +78,12 @@ def import_recording(
     stays = all_stays(tracks)
     for part, track in tracks.items():
         if not stays[part]:
+            still = [turned_alike(assembly.solids[part], T, track.T[0]) for T in track.T]
+            spins = ""
+            if rests_of(PoseTrack(track.t, np.array(still))):
+                spins = " but for a turn about its axis of revolution, which the tracker is to hold"
             raise InputError(
-                f"{file}: '{part}' never rests, so nothing is known of it (frames: {len(track.t)}, in "
+                f"{file}: '{part}' never rests{spins}, so nothing is known of it (frames: {len(track.t)}, in "
                 f"{track.t[-1] - track.t[0]:.2f} s); give a log in which it lies still for "
                 f"{least_rest_s(track):.1f} s and more."
             )
@@ -91,10 +95,11 @@ def import_recording(
         least = max(map(least_rest_s, tracks.values()))
         slow = f" At this rate of frames a rest is seen from {least:.1f} s on." if least > _SLOW_S else ""
         raise InputError(f"{file}: {error}{slow}") from error
-    check_arrangement(arrangement, arrange, stays, models or {}, camera, file)
+    check_arrangement(arrangement, arrange, stays, models or {}, camera, assembly, file)
     solved, order, start, whence, _, stays = arrangement
     X = solved.T_world_camera
     operations = tuple(seen_operation(tracks, stays, order.stays, assembly, X, k) for k in range(len(assembly)))
+    check_moved(stays, operations, camera, assembly, file)
     seen = np.array([operation.rest is not None for operation in operations])
     goals = np.array([np.eye(4) if operation.rest is None else X @ operation.rest.T for operation in operations])
     # What frames differ by averages out, what stays does not.
@@ -126,7 +131,7 @@ def import_recording(
         stood=whence,
         fit=arrangement.fit,
         stays_stated=camera.stays is not None,
-        unclear=unclear(stays, arrangement, operations, covariance, assembly),
+        unclear=(*unclear(stays, arrangement, operations, covariance, assembly), *hidden(stays)),
     )
 
 

@@ -87,7 +87,8 @@ def seen_operation(
     track = tracks[operation.main]
     among = (track.t >= begins) & (track.t <= rest.begins)
     path = PoseTrack(track.t[among], T_world_camera @ track.T[among])
-    before = poses_at(stays, begins)
+    # Where an operation before it put a part counts as its place, also if this one began before that was seen to rest.
+    before = poses_at(stays, max([begins, *(earlier.begins for earlier in chosen[:k] if earlier is not None)]))
     after = poses_at(stays, over)
     # What the main part did, as a displacement in the frame of the camera, takes along what stands fast in the hand.
     displacement = after[operation.main] @ pose.inverse(before[operation.main])

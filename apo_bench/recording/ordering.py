@@ -4,7 +4,7 @@ The last operation that moves a part ends with its last stay. Before, a hand may
 choices in the order of the operations, the one is taken whose stays are long and whose contacts are nearly closed.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from functools import cache
 from typing import NamedTuple
 
@@ -13,7 +13,7 @@ import numpy as np
 from apo_bench.assembly import Assembly, Contact, Poses, height, measure_round
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, RoundFace, beside, face_area
-from apo_bench.recording.stays import Stay, Stays, poses_at
+from apo_bench.recording.stays import Stay, Stays, flip_time, poses_at
 
 _LONG_S = 1.0
 _WIDE_MM = 50.0
@@ -105,13 +105,13 @@ def order_of(assembly: Assembly, stays: Stays, start: Poses, T_world_camera: Arr
         left = 0 if carried_on or last[stay.part] != k else len(known) - 1 - known.index(stay)
         return min(stay.seconds, _LONG_S) - min(wrong_mm, _WIDE_MM) / 10.0 - _LEFT_OVER * left
 
-    best = _choices(assembly, stays, worth, unseen)
+    best, why = _choices(assembly, stays, worth, unseen)
     if not best:
         seen = sorted((part for part in stays if len(stays[part]) > 1), key=lambda part: stays[part][-1].begins)
         other = set(seen) == set(last) and seen != sorted(last, key=last.__getitem__)
         raise NoOrder(
-            f"the moves of the log ({moves_text(stays)}) are not the operations of the scenario "
-            f"({', '.join(operation.main for operation in assembly.operations)}); "
+            f"the moves of the log ({moves_text(stays)}) do not follow each other as the operations of the scenario do "
+            f"({', '.join(operation.main for operation in assembly.operations)}): {why}; "
             + (
                 f"in this log they end in the order {', '.join(seen)}, as `scenario new --order` has it; "
                 if other
@@ -162,8 +162,10 @@ def moves_text(stays: Stays) -> str:
 
 def _choices(
     assembly: Assembly, stays: Stays, worth: Callable[[int, Stay], float], unseen: Sequence[int]
-) -> list[tuple[float, Chosen]]:
+) -> tuple[list[tuple[float, Chosen]], str]:
     """The two best choices of stays whose arrivals have the order of the operations, with their worth, the best first.
+
+    Without any, why the first operation that has none has none.
 
     Dynamic programming over operations: what follows depends on a choice so far by its last stay only, but for what was
     carried; so of the choices that end with the same stay the two best are followed.
@@ -178,10 +180,41 @@ def _choices(
             for stay in stays[operation.main][1:]:
                 moved_on = _between(assembly, stays, choice, stay) if stay.begins > t else None
                 if moved_on is not None:
-                    longer = (value + worth(k, stay) - _LEFT_OVER * moved_on, stay.begins, (*choice, stay))
+                    amiss = moved_on + _strangers(stays, operation.moves, t, stay)
+                    longer = (value + worth(k, stay) - _LEFT_OVER * amiss, stay.begins, (*choice, stay))
                     by_end.setdefault(stay, []).append(longer)
+        if not by_end:
+            return [], _why_none(assembly, stays, followed[0][2], k)
         followed = [each for ending in by_end.values() for each in sorted(ending, key=lambda x: -x[0])[:2]]
-    return sorted(((value, choice) for value, _, choice in followed), key=lambda x: -x[0])[:2]
+    return sorted(((value, choice) for value, _, choice in followed), key=lambda x: -x[0])[:2], ""
+
+
+def _strangers(stays: Stays, moved: Collection[str], t: float, stay: Stay) -> int:
+    """How many parts that an operation does not move came to another place after the end of the one before."""
+    return sum(
+        any(t + _OVERLAP_S < other.begins < stay.begins + _OVERLAP_S for other in known[1:])
+        for part, known in stays.items()
+        if part not in moved
+    )
+
+
+def _why_none(assembly: Assembly, stays: Stays, before: Chosen, k: int) -> str:
+    """Why no stay can end operation k, after the best choice of those before it."""
+    main = assembly.operations[k].main
+    flipped = flip_time(assembly.solids[main], stays[main])
+    if flipped is not None:
+        return f"'{main}' is turned at {flipped:.2f} s to where it looks the same, probably flipped by the tracker"
+    *_, final = stays[main]
+    last = next((stay for stay in reversed(before) if stay is not None), None)
+    if len(stays[main]) == 1 or last is None:
+        return f"'{main}', which operation {k + 1} moves, rests at one place only"
+    if final.begins <= last.begins:
+        order = f"at {final.begins:.2f} s, before '{last.part}' rests at {last.begins:.2f} s"
+        return f"'{main}' comes to its last place {order}"
+    return (
+        f"'{main}' was not seen at rest where operation {k + 1} takes it after "
+        f"{taken(assembly, stays, before, final):.2f} s, though '{last.part}' rests only at {last.begins:.2f} s"
+    )
 
 
 def taken(assembly: Assembly, stays: Stays, before: Sequence[Stay | None], stay: Stay) -> float:
@@ -196,9 +229,9 @@ def taken(assembly: Assembly, stays: Stays, before: Sequence[Stay | None], stay:
     since = own[-1][0] + 1 if own else 0
     carried = any(part in operation.carries for operation in assembly.operations[since : len(before)])
     if own and not carried:
-        return own[-1][1].ends
+        return own[-1][1].gone
     earlier = [other for other in stays[part] if other.begins < stay.begins]
-    return earlier[-1 if carried else 0].ends if earlier else 0.0
+    return earlier[-1 if carried else 0].gone if earlier else 0.0
 
 
 def quiet(assembly: Assembly, stays: Stays, chosen: Sequence[Stay | None], k: int) -> float:

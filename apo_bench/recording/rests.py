@@ -56,6 +56,8 @@ class RestSpan:
     begins: float
     ends: float
     """[s]."""
+    gone: float
+    """When the part may have been there last, [s]: later than `ends` where it was hidden then."""
     mean: Mean
 
     @property
@@ -87,8 +89,17 @@ def rests_of(track: PoseTrack) -> tuple[RestSpan, ...]:
     spans = [(stride * a, stride * b) for a, b in ends if t[b] - t[a] >= 0.5 * LEAST_REST_S]
     means = [average(track.T[a : b + 1]) for a, b in spans]
     common = common_scatter(means)
+    last_seen = np.flatnonzero(np.diff(track.t) > least_rest_s(track))
     return tuple(
-        RestSpan(a, b, float(track.t[a]), float(track.t[b]), pooled_mean(mean, common))
+        RestSpan(
+            a,
+            b,
+            float(track.t[a]),
+            float(track.t[b]),
+            # The last frames of a rest may be off by chance, so that it ends a few frames before the part was hidden.
+            max((float(track.t[i + 1]) for i in last_seen if b <= i <= b + 2 * stride), default=float(track.t[b])),
+            pooled_mean(mean, common),
+        )
         for (a, b), mean in zip(spans, means, strict=True)
     )
 

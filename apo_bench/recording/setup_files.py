@@ -71,12 +71,18 @@ def checked_log(file: str, rows: LogRows) -> Log:
     require(len(rows.t), f"{file}: no pose stands in the file; give a log with one row per pose.")
     names, which = np.unique(np.array(rows.ids, dtype=object).astype(str), return_inverse=True)
     tracks = {}
+    # Trackers write the identity for a frame in which they lost a model. A track of nothing else is a model that stays.
+    identity = (np.eye(4) == rows.T).all(axis=(1, 2))
+    lost = 0
     for i, name in enumerate(names.tolist()):
         at = np.flatnonzero(which == i)
         _check_times(rows, name, at)
+        if not identity[at].all():
+            lost += int(identity[at].sum())
+            at = at[~identity[at]]
         tracks[name] = PoseTrack(rows.t[at] - rows.t.min(), rows.T[at])
     # Metres are not to be read as millimetres, nor milliseconds as seconds, nor the other way round.
-    distance = float(np.median(np.linalg.norm(rows.T[:, :3, 3], axis=1)))
+    distance = float(np.median(np.linalg.norm(rows.T[~identity if lost else slice(None), :3, 3], axis=1)))
     if not _NEAR_M <= distance <= _FAR_M:
         fault = "metres that were read as mm" if distance < _NEAR_M else "mm that were read as metres"
         raise InputError(
@@ -89,7 +95,8 @@ def checked_log(file: str, rows: LogRows) -> Log:
         f"{file}: the median time between two frames of a track is {np.median(steps):.3g} s, so its times seem "
         "to be in another unit; state it: a column such as t_ms or t_s, or `time` in the camera file.",
     )
-    return Log(file, MappingProxyType(tracks), tuple(rows.notes))
+    left_out = [f"{lost} poses that are the identity left out as lost frames"] if lost else []
+    return Log(file, MappingProxyType(tracks), (*rows.notes, *left_out))
 
 
 def _check_times(rows: LogRows, name: str, at: NDArray[np.intp]) -> None:

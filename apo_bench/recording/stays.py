@@ -14,7 +14,7 @@ from typing import final
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from apo_bench.geometry import Array, pose
+from apo_bench.geometry import Array, Solid, nearest_alike, pose
 from apo_bench.recording.rests import RestSpan, consecutive, rests_of
 from apo_bench.recording.setup_files import CameraFile, Log, ObjectsFile, PoseTrack
 
@@ -40,6 +40,11 @@ class Stay:
     @property
     def ends(self) -> float:
         return self.rests[-1].ends
+
+    @property
+    def gone(self) -> float:
+        """When the part may have been there last: until it was seen again, if it was hidden."""
+        return self.rests[-1].gone
 
     @property
     def seconds(self) -> float:
@@ -76,8 +81,30 @@ def poses_at(stays: Stays, t: float) -> Mapping[str, Array]:
 
 def _is_adjusted(before: RestSpan, after: RestSpan) -> bool:
     off = pose.log(pose.inverse(before.T) @ after.T)
-    near = np.linalg.norm(off[:3]) < _ADJUSTED_M and np.linalg.norm(off[3:]) < _ADJUSTED_RAD
-    return bool(near and after.begins - before.ends < _ADJUSTED_S)
+    return is_near(off) and after.begins - before.gone < _ADJUSTED_S
+
+
+def is_near(twist: Array) -> bool:
+    """Whether a part that moves by a body twist (6,) is only adjusted."""
+    return bool(np.linalg.norm(twist[:3]) < _ADJUSTED_M and np.linalg.norm(twist[3:]) < _ADJUSTED_RAD)
+
+
+def is_flip(solid: Solid, twist: Array) -> bool:
+    """Whether a part that moves by a body twist (6,) is where it was, but turned by one of its symmetries."""
+    alike = nearest_alike(solid, np.asarray(pose.exp(twist)), np.eye(4))
+    return is_near(pose.log(alike)) and not is_near(twist)
+
+
+def flip_time(solid: Solid, known: Sequence[Stay]) -> float | None:
+    """When a part is seen flipped by one of its symmetries, with nothing between, [s]; None if it never is."""
+    return next(
+        (
+            after.begins
+            for before, after in pairwise(known)
+            if is_flip(solid, pose.log(pose.inverse(before.rests[-1].T) @ after.rests[0].T))
+        ),
+        None,
+    )
 
 
 _FAR_M = 0.03
@@ -205,7 +232,7 @@ def reversed_in_time(stays: Stays) -> Stays:
     end = max(stay.ends for known in stays.values() for stay in known)
 
     def backwards(rest: RestSpan) -> RestSpan:
-        return replace(rest, begins=end - rest.ends, ends=end - rest.begins)
+        return replace(rest, begins=end - rest.gone, ends=end - rest.begins, gone=end - rest.begins)
 
     return {
         part: tuple(Stay(part, tuple(map(backwards, reversed(stay.rests)))) for stay in reversed(known))

@@ -85,6 +85,7 @@ from apo_bench.records.thresholds import (
     Meaning,
     Thresholds,
 )
+from apo_bench.records.trial_numbers import EVALUATION_STARTS, FIRST_TRAINING_TRIAL
 
 __all__ = (
     "CODES",
@@ -92,7 +93,9 @@ __all__ = (
     "CORRECTORS",
     "CORRECTOR_LIMIT_S",
     "ENV_ID",
+    "EVALUATION_STARTS",
     "FAILURES",
+    "FIRST_TRAINING_TRIAL",
     "FOREIGN_ARMS",
     "GIVEN",
     "KEY",

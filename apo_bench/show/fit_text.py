@@ -126,9 +126,10 @@ def fit_notes(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[F
 def _turned(residuals: Residuals, measured: MeasuredNoise) -> str:
     """What is known of inliers that are turned."""
     turned = int(residuals.inlier.sum() - residuals.upright.sum())
+    beside = f" ({residuals.beside} about a point beside the origin)" if residuals.beside else ""
     return (
-        f"{turned} inliers turned by more than {TURNED_DEG:g} deg are right if they look alike so, else wrong, and are "
-        f"not fitted; {_turned_and_off(residuals, measured)} of them are farther off across the ray than "
+        f"{turned} inliers{beside} turned by more than {TURNED_DEG:g} deg are right if they look alike so, else wrong, "
+        f"and are not fitted; {_turned_and_off(residuals, measured)} of them are farther off across the ray than "
         f"{100 * (1 - _RARE):g} % of the others"
     )
 

@@ -108,6 +108,7 @@ def test_the_same_trials_give_the_same_tables_and_one_without_a_plan_has_no_fram
         (["--out", "new", "--episodes", "0"], "a whole number from 1 is allowed"),
         (["--out", "new", "--method", "contcat"], "did you mean 'contact'"),
         (["--out", "new", "--policy", "straight"], "replays have none; say --record insertions as well"),
+        (["--out", "new", "--seed", "999999"], "begin at 1000000, since smaller numbers are trials for evaluation"),
         (["block_on_block", "--out", "new"], "the scenario block_on_block was given twice"),
     ],
 )

@@ -12,8 +12,11 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 
+from apo_bench.assembly import Outcome
 from apo_bench.envs.apo_insert import APOInsert
+from apo_bench.envs.starts import Trials
 from apo_bench.errors import InputError
+from apo_bench.records import FIRST_TRAINING_TRIAL
 
 TRIAL = {"trial": 3}
 STILL = np.zeros(7, dtype=np.float32)
@@ -175,6 +178,7 @@ def test_many_environments_and_a_history() -> None:
         ({"horizon": float("inf")}, "horizon inf was given"),
         ({"turn_deg": "a"}, "turn_deg 'a' was given"),
         ({"first_trial": "x"}, "seed of x"),
+        ({"starts": "test"}, "unknown kind of starts 'test'"),
     ],
 )
 def test_wrong_arguments_are_refused_in_one_sentence(wrong: dict[str, Any], said: str) -> None:
@@ -210,3 +214,25 @@ def test_a_trial_that_is_named_is_the_same_every_time(env: APOInsert) -> None:
     env.reset()
     assert felt(options=TRIAL) == first == felt(seed=TRIAL["trial"], options=TRIAL)
     assert felt(seed=TRIAL["trial"] + 1, options=TRIAL) != first
+
+
+def test_starts_for_evaluation_are_as_many_as_seeds_and_none_is_for_training(monkeypatch: pytest.MonkeyPatch) -> None:
+    evaluated = gymnasium.make("APOInsert-v0", scenario="block_on_block", starts="evaluation").unwrapped
+    assert isinstance(evaluated, APOInsert)
+    begin = Trials.begin
+    failed = Outcome("replay", "lost", None, "it fell")
+    monkeypatch.setattr(Trials, "begin", lambda self, t: failed if t in (2, 100_002) else begin(self, t))
+    trials = []
+    for seed in (0, 1, 2, 3):
+        evaluated.reset(seed=seed)
+        trials.append(evaluated.trial)
+    assert trials == [0, 1, 200_002, 3]
+    evaluated.reset()
+    assert evaluated.trial < FIRST_TRAINING_TRIAL
+    evaluated.reset(options={"trial": 1_000_001})
+    assert evaluated.trial == 1_000_001
+    with pytest.raises(InputError, match=r"a seed of 100000 was given .* have seeds below 100000"):
+        evaluated.reset(seed=100_000)
+    monkeypatch.setattr(Trials, "begin", lambda self, trial: failed)
+    with pytest.raises(InputError, match="no trial of seed 5 comes to this operation, the last one since it fell"):
+        evaluated.reset(seed=5)

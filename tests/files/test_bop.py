@@ -117,7 +117,7 @@ def test_every_part_gets_an_estimate_of_its_own(tmp_path: Path) -> None:
 
 
 def test_false_detections_are_counted(tmp_path: Path, made: Made) -> None:
-    """Of what is there, of what is not in its image, and of images that nobody gave the truth of."""
+    """Of what is there, and of what is not in its image; not those of images that nobody gave the truth of."""
     where = made.where
     R = made.R
     t = made.t
@@ -127,7 +127,7 @@ def test_false_detections_are_counted(tmp_path: Path, made: Made) -> None:
         made_of.results(tmp_path / "e.csv", more, R[rows], t[rows] + 1e-3 * np.arange(len(rows))[:, None])
     )
     found = match_residuals(seen, read_results(made_of.results(tmp_path / "t.csv", where, R, t)))
-    assert (found.surplus, found.absent) == (9, 3)
+    assert (found.surplus, found.absent) == (5, 3)
 
 
 def test_matrices_that_are_nearly_rotations_are_turned_into_the_nearest(tmp_path: Path) -> None:
@@ -265,3 +265,26 @@ def test_the_command_ends_with_2_and_one_sentence(
         assert said.out == ""
         assert said.err.count("\n") == 1
         assert said.err.startswith("apo-bench: ")
+
+
+def test_estimates_of_scenes_without_truth_are_no_false_detections(tmp_path: Path) -> None:
+    made = made_of.draw(90, Known(missed=0.0), np.random.default_rng(3))
+    where = made.where + np.column_stack([np.arange(90) // 30, np.zeros((90, 2), dtype=int)])
+    seen = read_results(made_of.results(tmp_path / "seen.csv", where, made.R_seen, made.t_seen))
+    for scene in (1, 2, 3):
+        folder = tmp_path / "val" / f"{scene:06}"
+        folder.mkdir(parents=True)
+        each = where[:, 0] == scene
+        made_of.scene_gt(folder / "scene_gt.json", where[each], made.R[each], made.t[each])
+        (folder / "scene_gt_cam1.json").write_text("not read", encoding="utf-8")
+    one = match_residuals(seen, read_truth(tmp_path / "val" / "000002" / "scene_gt.json", seen))
+    assert (len(one.where), one.surplus, one.absent) == (30, 0, 0)
+    whole = read_truth(tmp_path / "val", seen)
+    assert match_residuals(seen, whole).surplus == 0
+    assert whole.where.tolist() == where.tolist()
+    assert whole.spot(31).endswith("val, 000002, image 6, entry 2")
+    assert read_truth(tmp_path / "val", seen, 3).where[:, 0].tolist() == [3] * 30
+    with pytest.raises(InputError, match=r"holds no scene_gt\.json in a folder that is numbered 7, such as 000001"):
+        read_truth(tmp_path / "val", seen, 7)
+    with pytest.raises(InputError, match=r"holds no scene_gt\.json in a folder that is numbered as its scene"):
+        read_truth(tmp_path / "val" / "000001", seen)

@@ -121,6 +121,38 @@ def test_parts_that_look_alike_when_turned_do_not_count(tmp_path: Path) -> None:
     assert any(line.startswith("round ") and "objects 3 look alike" in line for line in lines)
 
 
+@pytest.mark.parametrize("turns", ["half", "quarters", "any", "end over end"])
+def test_parts_that_look_alike_about_an_axis_far_from_the_origin_are_no_outliers(turns: str, tmp_path: Path) -> None:
+    """All estimates of object 2 are right; those of the others have their outliers."""
+    rng = np.random.default_rng(8)
+    drawn = made_of.draw(2000, Known(missed=0.0), rng)
+    part, n = drawn.where[:, 2], len(drawn.where)
+    gross = np.linalg.norm(drawn.shift, axis=1) >= 50.0
+    kept = (part != 2) | ~gross
+    angles = {
+        "half": rng.choice([0, 180], n),
+        "quarters": rng.choice([0, 90, 180, 270], n),
+        "any": rng.uniform(0, 360, n),
+    }
+    axes = rng.choice(list("xyz"), n) if turns == "end over end" else np.full(n, "z")
+    turn = np.array(
+        [
+            Rotation.from_euler(axis, angle if of == 2 else 0.0, degrees=True).as_matrix()
+            for axis, angle, of in zip(axes, angles.get(turns, angles["half"]), part, strict=True)
+        ]
+    )
+    centre = np.array([70.0, -20.0, 10.0])
+    t = drawn.t_seen + np.einsum("nij,nj->ni", drawn.R_seen, centre - turn @ centre)
+    seen = made_of.results(tmp_path / "e.csv", drawn.where[kept], (drawn.R_seen @ turn)[kept], t[kept])
+    truth = made_of.results(tmp_path / "truth.csv", drawn.where, drawn.R, drawn.t)
+    residuals = compared_files(seen, truth)
+    assert (residuals.off_mm[residuals.found & (part == 2)] < 60.0).all()
+    assert np.mean(residuals.inlier[residuals.found & (part == 2)]) > 0.98
+    assert residuals.beside > 100
+    others = residuals.found & (part != 2)
+    assert (residuals.inlier[others] == ~gross[others]).all()
+
+
 def test_outlier_rates_by_score_are_those_of_fifths(tmp_path: Path) -> None:
     """Scores that say which fifth of estimates has 60 % outliers, and scores that say nothing."""
     rng = np.random.default_rng(7)

@@ -64,7 +64,9 @@ WRONG: dict[str, tuple[str, str]] = {
     "length": (HEAD + "0.1,a,0,0,900,1,1,0,0\n", "line 2: a quaternion of length 1 is needed, one of length 1.414"),
     "order": ("t_s,id,x_mm,y_mm,z_mm,q0,q1,q2,q3\n" + ROW, 'do not say their order; state `quaternion = "wxyz"`'),
     "unit": ("t_s,id,x,y,z,qw,qx,qy,qz\n" + ROW, "the unit of the column 'x' is not known"),
-    "cells": (HEAD + "0.1,a,0,0\n", "line 2: 9 cells are needed, 4 were given"),
+    "cells": (HEAD + "0.1,a,0,0\n", "line 2: 9 cells are needed, as many as line 1 has, which is read as the names"),
+    "title": ("# mytracker 1.2\n" + HEAD + ROW, "line 2: 1 cells are needed, as many as line 1 has"),
+    "no names": (ROW, "line 1: the names of columns are needed, such as t_s,id,x_mm, and the number 0.1 was given"),
     "euler": ("t_s,id,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\n0.1,a,0,0,900,1,0,0\n", "do not say their order"),
     "no time": ("id,x_mm,y_mm,z_mm,qw,qx,qy,qz\na,0,0,900,1,0,0,0\n", "the column of the time is missing"),
     "milliseconds": (HEAD + ROW + "33.4,a,0,0,900,1,0,0,0\n", "33.3 s, so its times seem to be in another unit"),
@@ -85,6 +87,18 @@ def test_what_is_wrong_with_a_log_is_one_sentence(what: str, tmp_path: Path) -> 
     assert str(error.value).endswith(".")
 
 
+def test_the_identity_among_other_poses_is_a_lost_frame(tmp_path: Path) -> None:
+    lost = "0.{k},a,0,0,0,1,0,0,0\n"
+    log = tmp_path / "log.csv"
+    log.write_text(HEAD + ROW + lost.format(k=2) + lost.format(k=3) + "0.4,a,0,0,900,1,0,0,0\n", encoding="utf-8")
+    read = read_log(log, "csv", Conventions())
+    assert read.tracks["a"].t == pytest.approx([0.0, 0.3])
+    assert read.notes[-1] == "2 poses that are the identity left out as lost frames"
+    # What is there in every frame, such as the base in its own frame, was not lost.
+    log.write_text(HEAD + ROW.replace("a", "b").replace("900", "1900") + lost.format(k=2), encoding="utf-8")
+    assert len(read_log(log, "csv", Conventions()).tracks["a"].t) == 1
+
+
 def test_columns_are_known_by_their_names_however_they_are_written(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(" T_S , Id,X_MM,y_mm, Z_mm,QW,Qx,qy,qz\n" + ROW, encoding="utf-8")
     track = read_log(tmp_path / "log.csv", "csv", Conventions()).tracks["a"]
@@ -94,9 +108,10 @@ def test_columns_are_known_by_their_names_however_they_are_written(tmp_path: Pat
 @pytest.mark.parametrize(
     ("line", "sentence"),
     [
-        ("1 0 0 0.9 0 0 0 1 7", "line 2: timestamp tx ty tz qx qy qz qw are needed, 9 words were given"),
-        ("1 0 0 0.9 0 0 0", "line 2: timestamp tx ty tz qx qy qz qw are needed, 7 words were given"),
+        ("1 0 0 0.9 0 0 0 1 7", "timestamp tx ty tz qx qy qz qw; '1 0 0 0.9 0 0 0 1 7' was given"),
+        ("1 0 0 0.9 0 0 0", "line 2: eight numbers with spaces between them are needed"),
         ("1 0 0 0.9 0 0 1 1", "line 2: a quaternion of length 1 is needed, one of length 1.414"),
+        ("1,0,0,0.9,0,0,0,1", "with spaces between them are needed, timestamp tx ty tz qx qy qz qw; '1,0,0,0.9"),
         ("1 0 0 x 0 0 0 1", "line 2: a finite number is needed, 'x' was given"),
         ("", "no pose stands in the file"),
     ],

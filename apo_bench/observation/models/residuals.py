@@ -22,6 +22,13 @@ _GAP_DEG = 55.0
 _IN_GAP = 1.0 / 30.0
 """Where a part looks alike only when turned by 60 degrees or more, few turns are between `TURNED_DEG` and this: less
 than this part of all, where 14 % are if any turn about an axis is as likely."""
+_FEWEST_ALIKE = 5
+_ALIKE = 0.1
+"""So many gross estimates of an object, and so large a part of those found, have to agree on a point."""
+_NEAR = 4.0
+"""They agree within so many times the median error of estimates that are upright."""
+_MOST_POINTS = 500
+"""Points of so many estimates are tried."""
 MOST_PAIRS = 10_000_000
 _MOST_IN_ONE_IMAGE = "at most 3000 estimates of one object in one image can be matched; leave out those of low score"
 
@@ -34,7 +41,7 @@ class Residuals:
     where: NDArray[np.int64]
     """(n, 3): scene, image, object."""
     shift_mm: Array
-    """(n, 3), from the true to the estimated place: x, y, along the ray."""
+    """(n, 3), from the true to the estimated place: x, y, along the ray; of one that is `beside`, of that point."""
     turn_deg: Array
     """(n, 3), rotation vector from the true to the estimated rotation: about x, about y, about the ray."""
     trace_deg: Array
@@ -42,11 +49,13 @@ class Residuals:
     score: Array
     """(n,), of the estimate."""
     surplus: int = 0
-    """Estimates that were left when every part had one."""
+    """Estimates, in images of the truth, that were left when every part had one."""
     absent: int = 0
     """Those of them whose object is not in the image at all."""
     distance_mm: float = float("nan")
     """Median distance from the camera."""
+    beside: int = 0
+    """Estimates that are turned about a point of the part 25 mm and more from its origin, and else right."""
 
     @cached_property
     def found(self) -> NDArray[np.bool_]:
@@ -96,8 +105,8 @@ class Residuals:
         return np.asarray(np.linalg.norm(self.turn_deg, axis=1))
 
 
-def match_residuals(estimates: PoseRows, truth: PoseRows, scene: int | None = None) -> Residuals:
-    """Match estimates to the truth and say how far off they are; of one scene, estimates of others do not count.
+def match_residuals(estimates: PoseRows, truth: PoseRows) -> Residuals:
+    """Match estimates to the truth and say how far off they are; those of images without truth do not count.
 
     Per image and object, every part that was there gets an estimate of its own so that the distances add up to the
     least (the Hungarian method), however far off: what is gross is told afterwards by `INLIER_MM`. Scores do not count.
@@ -108,7 +117,7 @@ def match_residuals(estimates: PoseRows, truth: PoseRows, scene: int | None = No
     partner = match_rows(estimates, truth)
     found = partner >= 0
     n = len(partner)
-    among_all = len(estimates.where) if scene is None else int(np.sum(estimates.where[:, 0] == scene))
+    in_images = _among(estimates.where[:, :2], truth.where[:, :2])
     # BOP poses are in the frame of the camera, so its own pose is the identity. F^t takes errors into the ray's frame.
     there = np.tile(np.eye(4), (n, 1, 1))
     there[:, :3, 3] = truth.t_mm * 1e-3
@@ -119,7 +128,9 @@ def match_residuals(estimates: PoseRows, truth: PoseRows, scene: int | None = No
     turn = Rotation.from_matrix(pose.nearest_rotations(R_seen) @ np.swapaxes(right, 1, 2)).as_rotvec(degrees=True)
     shift = np.full((n, 3), np.nan)
     turned = np.full((n, 3), np.nan)
-    shift[found] = np.einsum("nji,nj->ni", F, estimates.t_mm[partner[found]] - truth.t_mm[found])
+    moved = estimates.t_mm[partner[found]] - truth.t_mm[found]
+    beside, moved = _about_fixed_points(truth.where[found, 2], moved, right, pose.nearest_rotations(R_seen))
+    shift[found] = np.einsum("nji,nj->ni", F, moved)
     turned[found] = np.einsum("nji,nj->ni", F, turn)
     # trace(R_seen R^t) = 1 + 2 cos(angle).
     trace = np.full(n, np.nan)
@@ -130,16 +141,61 @@ def match_residuals(estimates: PoseRows, truth: PoseRows, scene: int | None = No
         turn_deg=turned,
         trace_deg=trace,
         score=np.where(found, estimates.score[partner], np.nan),
-        surplus=among_all - int(found.sum()),
-        absent=_absent(estimates.where, truth.where, scene),
+        surplus=int(in_images.sum() - found.sum()),
+        absent=int(np.sum(in_images & ~_among(estimates.where, truth.where))),
         distance_mm=float(np.median(np.linalg.norm(truth.t_mm, axis=1))),
+        beside=int(beside.sum()),
     )
 
 
-def _absent(estimates: Any, truth: Any, scene: int | None) -> int:
-    """How many estimates are of objects that are not in their image; those of images without truth do not count."""
-    of_scene = estimates if scene is None else estimates[estimates[:, 0] == scene]
-    return int(np.sum(_among(of_scene[:, :2], truth[:, :2]) & ~_among(of_scene, truth)))
+def _about_fixed_points(
+    objects: NDArray[np.int64], moved: Array, R: Array, R_seen: Array
+) -> tuple[NDArray[np.bool_], Array]:
+    """Which gross estimates only turn a part about a point that is fixed in it, and all shifts, of theirs that point.
+
+    A part that looks the same when turned about an axis beside its origin is seen with its origin far off, though it
+    stands where it is. Every symmetry keeps a point c, so the turned estimates of one object agree on it: (R - I) c + t
+    is as small as the errors of those that are upright.
+
+    Args:
+        objects: (n,), of each estimate.
+        moved: (n, 3), from the true to the estimated origin, camera axes, mm.
+        R: (n, 3, 3), true rotations; R_seen are the estimated ones.
+
+    Returns:
+        (n,) and (n, 3), mm.
+    """
+    off = np.linalg.norm(moved, axis=1)
+    D = np.swapaxes(R, 1, 2) @ R_seen - np.eye(3)
+    t = np.einsum("nji,nj->ni", R, moved)
+    # |R - I| = 2 sqrt(2) sin(angle / 2) for the Frobenius norm.
+    is_turned = np.linalg.norm(D, axis=(1, 2)) >= 2.0 * np.sqrt(2.0) * np.sin(np.radians(TURNED_DEG) / 2.0)
+    beside = np.zeros(len(off), dtype=np.bool_)
+    shifts = np.array(moved)
+    for each in np.unique(objects).tolist():
+        of_it = objects == each
+        upright = of_it & (off < INLIER_MM) & ~is_turned
+        left = np.flatnonzero(of_it & (off >= INLIER_MM) & is_turned)
+        fewest = max(_FEWEST_ALIKE, _ALIKE * of_it.sum())
+        near = _NEAR * float(np.median(off[upright])) if upright.any() else 0.0
+        while len(left) >= fewest:
+            few = left[:_MOST_POINTS]
+            points = -np.einsum("nij,nj->ni", np.linalg.pinv(D[few], rcond=1e-6), t[few])
+            kept = np.array([_point_off(D[left], t[left], c) < near for c in points])
+            agree = left[kept[np.argmax(kept.sum(axis=1))]]
+            if len(agree) < fewest:
+                break
+            c = np.linalg.lstsq(D[agree].reshape(-1, 3), -t[agree].reshape(-1), rcond=0.1)[0]
+            stands = left[_point_off(D[left], t[left], c) < INLIER_MM]
+            shifts[stands] = moved[stands] + (R_seen[stands] - R[stands]) @ c
+            beside[stands] = True
+            left = np.setdiff1d(left, np.union1d(stands, agree))
+    return beside, shifts
+
+
+def _point_off(D: Array, t: Array, c: Array) -> Array:
+    """How far a point c of a part is moved, (n,), by rotations less the identity (n, 3, 3) and shifts (n, 3)."""
+    return np.asarray(np.linalg.norm(D @ c + t, axis=1))
 
 
 def _among(rows: Any, known: Any) -> NDArray[np.bool_]:
