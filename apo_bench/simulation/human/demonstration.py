@@ -22,7 +22,7 @@ from apo_bench.scenario import Carelessness, Scenario, careless_covariance, nomi
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.human.hands import Hands
 from apo_bench.simulation.robot import Trajectory, minimum_jerk, shifted, smooth, with_height
-from apo_bench.simulation.scene import Scene, has_failed, left_out, sleeping, snapshot
+from apo_bench.simulation.scene import Scene, has_failed, sleeping, snapshot
 
 _SIDE_M = 0.002
 """A part comes down this far beside one that it will lie against, and leaves it by as much before it is lifted."""
@@ -237,7 +237,7 @@ def demonstrate(
     hands = Hands(scene, layout.start, watch)
     goals = []
     after = []
-    with sleeping(scene.shown, True), left_out(scene.shown):
+    with sleeping(scene.shown, True):
         hands.wait(0.05)
         for k, operation in enumerate(scenario.assembly.operations):
             hands.begin(k)

@@ -25,7 +25,7 @@ from apo_bench.simulation.execution import (
 )
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.robot import LowPass, Robot, shifted
-from apo_bench.simulation.scene import Scene, left_out, part_pose, sleeping, snapshot, wrist_felt
+from apo_bench.simulation.scene import Scene, part_pose, sleeping, snapshot, wrist_felt
 from apo_bench.simulation.task.start import Start
 
 PERIOD_S = 0.05
@@ -135,7 +135,7 @@ class TipControl:
         """
         robot = self.robot
         t = self.start.transfer
-        with sleeping(robot.scene.work, robot.scene.grasp == "friction"), left_out(robot.scene.work):
+        with sleeping(robot.scene.work, robot.scene.grasp == "friction"):
             robot.stand()
             if self.arrived:
                 at_end = shifted(robot.T, t.into.way, -float(self._off(robot.T)[2]))
@@ -190,7 +190,7 @@ class TipControl:
     @contextmanager
     def _stepping(self) -> Iterator[None]:
         work = self.robot.scene.work
-        with sleeping(work, self.robot.scene.grasp == "friction"), left_out(work), wrist_felt(work.model):
+        with sleeping(work, self.robot.scene.grasp == "friction"), wrist_felt(work.model):
             yield
 
     def _move(self, shift: Array, turn: Array) -> None:

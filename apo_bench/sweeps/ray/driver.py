@@ -161,7 +161,8 @@ def runtime_files(names: Names) -> dict[str, Path]:
         *(Path(name) for name in names.scenarios if not is_named(name)),
         *(part for name in names.scenarios if not is_named(name) for part in load_scenario(name).part_files.values()),
         *(path for name in names.noises if (path := noise_path(name)) is not None),
-        *(_with_named(arm.mjcf) if arm.model is None else arm.files),
+        *arm.files,
+        *(_with_named(arm.mjcf) if arm.model is None else ()),
         *(Path(path) for module in list(sys.modules.values()) if (path := getattr(module, "__file__", None))),
         *(path for name in brought if (path := Path(name)).is_file()),
     )
