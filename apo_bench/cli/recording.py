@@ -192,7 +192,7 @@ def recognise_command(
     deviation_deg: StatedDeg = None,
     relations: Annotated[
         str,
-        typer.Option(help="recognised, recognised-fixed (6 mm and 10 deg), recognised-twice or recognised-jointly."),
+        typer.Option(help="recognised or recognised-jointly."),
     ] = "recognised",
     as_json: AsJson = False,
     **options: Any,

@@ -32,18 +32,14 @@ _BEGINNINGS = 12
 """Candidates that are tried as the first of an operation, at most."""
 
 
-def recognise(
-    observation: Observation, rules: Rules = RULES_BY_NOISE, *, first_seen: Array | None = None
-) -> Recognised:
+def recognise(observation: Observation, rules: Rules = RULES_BY_NOISE) -> Recognised:
     """Find the face contacts of every operation; those that the observation came with are not looked at.
 
     Only what an operation puts somewhere is held against what it does not move, so parts that are carried keep the
     contacts among themselves. Operations that were not seen, and what depends on them, make no contact.
 
     Args:
-        rules: `RULES_BY_NOISE` or `FIXED_RULES` of `apo_bench.recognition.thresholds`, or your own.
-        first_seen: (n, 4, 4), the goals that the evidence calls seen, where those of the observation were corrected
-            already.
+        rules: `RULES_BY_NOISE` of `apo_bench.recognition.thresholds`, or your own.
 
     Raises:
         InputError: Something else was given.
@@ -52,12 +48,12 @@ def recognise(
     assembly = observation.assembly
     belief = initial_belief(observation)
     evidence = list[Evidence]()
-    as_seen = placements(assembly, observation.start, belief.goals if first_seen is None else first_seen)
+    as_seen = placements(assembly, observation.start, belief.goals)
     standing = set(assembly.fixed)
     for k, (operation, poses) in enumerate(zip(assembly.operations, as_seen, strict=True)):
         others = tuple(p for p in assembly.solids if p in standing - set(operation.moves))
         around = _Around(observation, rules, k, others)
-        best = around.fixed(belief) if rules.fixed else around.likeliest(belief)
+        best = around.likeliest(belief)
         belief = best.belief
         evidence += evidence_of(assembly, k, [(c.contact, c.pair, c.most) for c in best.taken], poses)
         standing |= set(operation.moves)
@@ -97,10 +93,6 @@ class _Around:
                 for pair in facing(solids[a], now.poses[a], solids[b], now.poses[b], **bounds, known=known):
                     candidates += self._judged(a, b, pair, now, belief)
         return tuple(sorted(candidates, key=lambda c: (c.distance * (3 / len(c.pair.residual)), c.contact)))
-
-    def fixed(self, belief: Belief) -> _Found:
-        """Every pair within fixed thresholds; nothing is concluded from one to the other."""
-        return _Found(self.candidates(belief), belief, 0.0, ())
 
     def likeliest(self, belief: Belief) -> _Found:
         """The contacts that go together: of all beginnings, the set with the least score."""

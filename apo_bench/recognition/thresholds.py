@@ -1,4 +1,4 @@
-"""How near is near enough, from the stated noise or fixed as in the paper, and why a contact that is so is believed."""
+"""How near is near enough by the stated noise, and why a contact that is so is believed."""
 
 import math
 from collections.abc import Iterable
@@ -25,13 +25,11 @@ class Rules:
     miss: float = 1e-4
     """How often the noise may hide one face contact: 20, tested three ways, are then all found 99.4 % of the time."""
     gap_m: float = 10e-3
-    """No gap beyond this is believed to be noise; with `fixed`, the threshold itself."""
+    """No gap beyond this is believed to be noise."""
     angle_rad: float = math.radians(20.0)
     """The largest angle between a normal and the opposite of the other."""
     share: float = 0.15
     """The overlap is at least this part of the smaller face."""
-    fixed: bool = False
-    """Whether the bounds are the thresholds, whatever the noise is, and nothing is asked of contacts together."""
 
     def __post_init__(self) -> None:
         for name, high in (("miss", 1.0), ("gap_m", 1.0), ("angle_rad", math.pi / 2), ("share", 1.0)):
@@ -48,8 +46,6 @@ class Rules:
 
 RULES_BY_NOISE = Rules()
 """Thresholds from the stated noise."""
-FIXED_RULES = Rules(gap_m=6e-3, angle_rad=math.radians(10.0), fixed=True)
-"""The paper's: one number each, here what noise of 1 mm and 1 degree asks for."""
 
 
 class PairThresholds(NamedTuple):
@@ -70,8 +66,6 @@ def pair_thresholds(rules: Rules, covariance: Array, slack: PairThresholds, leng
         slack: What play allows in addition.
         lengths: How many rows are lengths, before those of tilts; without any of these the angle is free.
     """
-    if rules.fixed:
-        return PairThresholds(rules.gap_m, rules.angle_rad)
     gap = _longest(rules.miss, covariance[:lengths, :lengths], CONTACT_SOFT_M)
     angle = _longest(rules.miss, covariance[lengths:, lengths:], _SOFT_RAD)
     return PairThresholds(min(gap + slack.gap_m, rules.gap_m), min(angle + slack.angle_rad, rules.angle_rad))
@@ -171,7 +165,7 @@ def without_contacts(observation: Observation, rules: Rules, verb: str) -> Obser
         require(
             isinstance(argument, wanted),
             f"{kind(argument)} was given to {verb}; an Observation is allowed (read_observation reads one from a "
-            "file), and as rules RULES_BY_NOISE, FIXED_RULES or Rules(...) of apo_bench.recognition.thresholds.",
+            "file), and as rules RULES_BY_NOISE or Rules(...) of apo_bench.recognition.thresholds.",
         )
     return replace(observation, assembly=replace(with_contacts(observation.assembly, ()), gaps={}))
 

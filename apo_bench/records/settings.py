@@ -173,15 +173,15 @@ class TrialSettings:
     relations: Name = field(
         default="given",
         metadata=about(
-            "What correctors are told of the contacts: given (right), recognised, recognised-fixed (thresholds), "
-            "recognised-twice, recognised-jointly, missed, false, shifted:3 (mm)",
+            "What correctors are told of the contacts: given (right), recognised, "
+            "recognised-jointly, missed, false, shifted:3 (mm)",
             spelled=checked_relations,
             key=True,
             axis="relations",
         ),
     )
-    """What a corrector is told of the contacts: `given`, `recognised`, `recognised-fixed`, `recognised-twice`,
-    `recognised-jointly`, or wrong ones: `missed`, `false`, `shifted:3` (mm), or `module:name`."""
+    """What a corrector is told of the contacts: `given`, `recognised`, `recognised-jointly`, or wrong ones: `missed`,
+    `false`, `shifted:3` (mm), or `module:name`."""
     method: Name = field(
         default=CORRECTOR,
         metadata=about(

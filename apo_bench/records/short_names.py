@@ -7,7 +7,7 @@ What a corrector is told of the contacts, by the names that rows use.
 `given`             the right ones
 `missed`, `false`   one too few, one too many
 `shifted:3`         one face is not where the model of its part says, by 3 mm
-`recognised`        found in what was seen; `recognised-fixed`, `recognised-twice`, `recognised-jointly` in other ways
+`recognised`        found in what was seen; `recognised-jointly` decides contacts and poses together
 `module:name`       a function of somebody's own
 
 What a method is called: what the robot is told to do, and whether it searches for holes or feels meanwhile.
@@ -27,13 +27,8 @@ CORRECTORS = MappingProxyType(
         "contact-drop": "apo_bench.correction.contact.contact:contact_drop",
         "contact-robust": "apo_bench.correction.robust.robust:contact_robust",
         "learned-set": "apo_bench.correction.learned.network:learned_set",
-        "contact-fast": "apo_bench.correction.contact.contact:contact_fast",
         "paper": "apo_bench.correction.baselines.paper:paper",
         "paper-track": "apo_bench.correction.baselines.track:paper_track",
-        "last-only": "apo_bench.correction.baselines.paper:last_only",
-        "minimal": "apo_bench.correction.baselines.paper:minimal",
-        "no-history": "apo_bench.correction.baselines.track:no_history",
-        "no-disappeared": "apo_bench.correction.baselines.paper:no_disappeared",
         "snap": "apo_bench.correction.baselines.snap:snap",
         "least-squares": "apo_bench.correction.baselines.penalty:least_squares",
         "penalty": "apo_bench.correction.baselines.penalty:penalty",
@@ -70,7 +65,7 @@ RESIDUALS = "empirical:"
 GIVEN = "given"
 """The contacts come with the demonstration, and are right."""
 WRONG = tuple(WRONG_RELATIONS)
-RECOGNISED = ("recognised", "recognised-fixed", "recognised-twice", "recognised-jointly")
+RECOGNISED = ("recognised", "recognised-jointly")
 _KINDS = (GIVEN, *WRONG, *RECOGNISED)
 SHIFT_MM = 2.0
 _LARGEST_SHIFT_MM = 50.0

@@ -39,7 +39,7 @@ def page(document: Mapping[str, Any]) -> str:
             "time over that of `paper` on the same draw, called through the same door: medians of ratios, processor "
             "time, one thread; in brackets milliseconds. Peers run in processes of their own, on a tenth of the draws, "
             "`paper` beside them in turn; what leaves a contact open by more than 0.1 mm is not timed. `contact` is "
-            "compiled by Numba; `contact-fast` is another name of it.",
+            "compiled by Numba.",
             "",
             "| call | asked | Fig. 2 | Fig. 3 | Fig. 6 |",
             "|---|---|---|---|---|",

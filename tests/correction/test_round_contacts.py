@@ -32,7 +32,7 @@ BY_HAND = {
     "cone on rim": ("x", "y", "z"),
 }
 """What each fixes of a pin along its own z; lying with x down it rolls, turns about x and shifts along y and z."""
-METHODS = ("contact", "contact-robust", "contact-drop", "contact-refuse", "last-only", "minimal", "no-history", "snap")
+METHODS = ("contact", "contact-robust", "contact-drop", "contact-refuse", "paper", "paper-track", "snap")
 
 
 def case(kind, seed=0, **settings):

@@ -14,7 +14,7 @@ from apo_bench import recognise
 from apo_bench.assembly import Facing, contact_kind, measure_round, placements, round_pairs
 from apo_bench.assembly.touching import facing
 from apo_bench.geometry import Array, Face, RoundFace, pose
-from apo_bench.recognition.thresholds import FIXED_RULES, Rules, pair_thresholds, reality, slack
+from apo_bench.recognition.thresholds import Rules, pair_thresholds, reality, slack
 from tests import rounds, scenes
 from tests.brackets import on_pins, under_roof
 from tests.recognition.test_contacts import contacts, seen_at, stated
@@ -37,11 +37,6 @@ def test_every_contact_is_recognised_and_no_other(name: str, level: float) -> No
         assert tuple(e.contact for e in recognised.evidence) == tuple(
             r.contact for r in recognised.assembly.relations()
         )
-
-
-def test_fixed_thresholds_find_them_too() -> None:
-    for name in ("peg_in_plate", "through", "countersink", "on_pins"):
-        assert contacts(recognise(seen_at(built(name), 0, 0.1), FIXED_RULES).assembly) == contacts(built(name).assembly)
 
 
 def test_how_a_part_of_revolution_is_turned_does_not_matter() -> None:

@@ -165,9 +165,9 @@ def test_rows_are_counted_into_cells() -> None:
 
 
 def test_methods_are_sorted_as_a_reader_looks_for_them() -> None:
-    given = ("minimal", "paper-track", "last-only", "paper", "none", "oracle")
+    given = ("snap", "paper-track", "contact", "paper", "none", "oracle")
     assert [c.method for c in tally([row(method) for method in given])] == [
-        *("oracle", "none", "paper", "paper-track", "last-only", "minimal")
+        *("oracle", "none", "contact", "paper", "paper-track", "snap")
     ]
 
 

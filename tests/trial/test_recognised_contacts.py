@@ -83,7 +83,7 @@ def test_scenarios_are_also_counted_together() -> None:
 
 
 def test_nothing_recognised_has_no_precision(tmp_path: Path) -> None:
-    found = recognitions([row("recognised-fixed", contacts_right=0, contacts_missed=3)])
+    found = recognitions([row("recognised-jointly", contacts_right=0, contacts_missed=3)])
     assert (found[0].precision, found[0].recall) == (None, 0.0)
     assert recognition_table(found).markdown()[-1].endswith("| – | 0.00 % | 3 | 0 |")
     assert recognition_table(()).markdown() == ["No method was told relations that were recognised."]

@@ -396,7 +396,7 @@ def test_a_level_of_a_ray_is_one_number() -> None:
         TrialSettings("stick_in_tower", level_mm=51)
 
 
-@pytest.mark.parametrize("relations", ["recognised:3", "recognised-twice:3", "given:1", "missed:2", "false:"])
+@pytest.mark.parametrize("relations", ["recognised:3", "recognised-jointly:3", "given:1", "missed:2", "false:"])
 def test_only_shifted_relations_have_a_size(relations: str) -> None:
     with pytest.raises(InputError, match="only shifted has a size, as in shifted:3"):
         TrialSettings("stick_in_tower", relations=relations)

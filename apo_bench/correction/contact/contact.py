@@ -242,8 +242,6 @@ contact = ContactCorrector()
 contact_apply = ContactCorrector("apply")
 contact_refuse = ContactCorrector("refuse")
 contact_drop = ContactCorrector("drop")
-contact_fast = contact
-"""The old name of the compiled `contact`, which is compiled by default now: rows and sweeps may name it."""
 
 
 def _status(solved: Solved, gap_m: float) -> str:

@@ -48,10 +48,6 @@ STYLES = {
     "contact-robust": Style("#aa3377", (4, 1, 0), _DASHED),
     "paper": Style("#0072b2", "s", _SOLID),
     "paper-track": Style("#009e73", "D", _SOLID),
-    "last-only": Style("#e69f00", "v", _DASHED),
-    "no-history": Style("#cc79a7", "^", _DASHED),
-    "no-disappeared": Style("#56b4e9", "P", _DASHED),
-    "minimal": Style("#8c6bb1", "X", _DOTTED),
     "snap": Style("#a6761d", "*", _DOTTED),
     "least-squares": Style("#117733", "<", _DOTTED),
     "settle": Style("#882255", ">", _DOTTED),
@@ -60,8 +56,6 @@ STYLES = {
 OWN_STYLES = (Style("#6b6b6b", "h", _DOTTED), Style("#ddcc77", "H", _DOTTED), Style("#000000", "1", _DOTTED))
 RECOGNITION_STYLES = {
     "recognised": Style("#009e73", "o", _SOLID),
-    "recognised-fixed": Style("#d55e00", "s", _DASHED),
-    "recognised-twice": Style("#0072b2", "^", _DOTTED),
     "recognised-jointly": Style("#cc79a7", "D", _SOLID),
 }
 SEEN = Style(SOFT, "o", _SOLID)

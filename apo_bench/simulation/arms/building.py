@@ -1,6 +1,5 @@
 """From the description of an arm to an `Arm`: its model put together, its joints driven, its gripper measured."""
 
-import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -11,8 +10,6 @@ import numpy as np
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, pose
-from apo_bench.resources import folder
-from apo_bench.simulation.arms.apart import build_apart
 from apo_bench.simulation.arms.arm import Arm, ArmDescription, ArmLimits, GripperDescription, read_description
 from apo_bench.simulation.arms.chain import find_flange, find_joints
 from apo_bench.simulation.arms.kinematics import with_home
@@ -21,6 +18,7 @@ from apo_bench.simulation.arms.measuring import Measured, fill_grooves, measure
 from apo_bench.simulation.arms.pressing import PROBE
 from apo_bench.simulation.arms.servo import Drive, add_servos, drives_of, felt_inertia, is_soft
 from apo_bench.simulation.arms.strength import with_force
+from apo_bench.simulation.physics import without_log_file
 
 _TIP = "tip"
 _GRIPPER = "gripper/"
@@ -55,11 +53,7 @@ def read_described(description: ArmDescription) -> Arm:
     if times not in _BUILT:
         while len(_BUILT) >= _MOST_BUILT:
             del _BUILT[next(iter(_BUILT))]
-        # Models that come with the package are built here, those of strangers in a process of their own.
-        ours = os.path.realpath(folder("assets"))
-        models = (description.mjcf, description.gripper.mjcf or description.mjcf)
-        is_ours = all(Path(os.path.realpath(each)).is_relative_to(ours) for each in models)
-        _BUILT[times] = build_arm(description) if is_ours else build_apart(description)
+        _BUILT[times] = build_arm(description)
     return _BUILT[times]
 
 
@@ -93,12 +87,13 @@ def build_arm(description: ArmDescription) -> Arm:
     gripper = _with_names_as_mounted(rig, description.gripper)
     where = gripper.mjcf or mjcf
     flange = rig.body(last).id
-    measured, times = with_force(
-        spec,
-        gripper.force_n,
-        description.file,
-        lambda spec: measure(_measuring_model(spec, mjcf), where, joints, home, flange, gripper),
-    )
+    with without_log_file():
+        measured, times = with_force(
+            spec,
+            gripper.force_n,
+            description.file,
+            lambda spec: measure(_measuring_model(spec, mjcf), where, joints, home, flange, gripper),
+        )
     hand = measured.hand
     arm = Arm(
         mjcf=description.file,

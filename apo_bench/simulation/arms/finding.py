@@ -9,13 +9,15 @@ from collections.abc import Iterator
 from pathlib import Path
 from types import MappingProxyType
 
+import mujoco
+
 from apo_bench.errors import InputError, require, require_known, unknown
 from apo_bench.names import resolve
 from apo_bench.records import FOREIGN_ARMS
 from apo_bench.resources import folder
 from apo_bench.simulation.arms.arm import Arm, ArmDescription, GripperDescription
 from apo_bench.simulation.arms.building import read_arm, read_described
-from apo_bench.simulation.arms.tree import read_model_tree
+from apo_bench.simulation.arms.loading import load_model
 
 _MENAGERIE = "APO_BENCH_MENAGERIE"
 _ROBOSUITE = "APO_BENCH_ROBOSUITE"
@@ -130,8 +132,8 @@ def _robosuite() -> Path | None:
 
 def _has_fingers(mjcf: Path) -> bool:
     """Whether a joint slides, or it or its body is by its name of a gripper."""
-    root = read_model_tree(mjcf, "arm").root
-    if any(joint.get("type") == "slide" for joint in root.iter("joint")):
+    spec = load_model(mjcf, "arm")
+    if any(joint.type == mujoco.mjtJoint.mjJNT_SLIDE for joint in spec.joints):
         return True
-    names = (f"{body.get('name')} {joint.get('name')}" for body in root.iter("body") for joint in body.iter("joint"))
+    names = (f"{joint.parent.name} {joint.name}" for joint in spec.joints)
     return any(word in name.lower() for name in names for word in _WITH_FINGERS)

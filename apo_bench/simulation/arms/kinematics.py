@@ -14,6 +14,7 @@ import numpy as np
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from apo_bench.simulation.arms.arm import Arm
+from apo_bench.simulation.arms.loading import load_model
 from apo_bench.simulation.frames import frame, quaternion
 
 
@@ -141,7 +142,7 @@ class Kinematics:
 
 def _alone(arm: Arm) -> Any:
     """The model of the arm where it stands, and nothing else."""
-    spec = mujoco.MjSpec.from_string(arm.model) if arm.model is not None else mujoco.MjSpec.from_file(str(arm.mjcf))
+    spec = mujoco.MjSpec.from_string(arm.model) if arm.model is not None else load_model(arm.mjcf, "arm")
     stand = pose.unpack(np.array([*arm.base, *arm.turn]))
     for body in spec.worldbody.bodies:
         T = pose.pack(stand @ pose.unpack(np.array([*body.pos, *body.quat])))

@@ -1,47 +1,62 @@
-"""MJCF files of arms and grippers, read by MuJoCo and stripped of what a scene has of its own.
+"""Read the model file of an arm or gripper, MJCF or URDF, as `MjSpec`, without what a scene has itself.
 
-From a description that states its gripper to an `Arm`: the model is used as it is.
+`stated_arm` makes the arm of a description that states its gripper: the model is used as it is.
 """
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 
 from apo_bench.errors import InputError, one_line, require, require_known
 from apo_bench.geometry import pose
-from apo_bench.simulation.arms.allowed import MOST_MESH_BYTES
 from apo_bench.simulation.arms.arm import Arm, ArmDescription, ArmLimits, SlideGripper
-from apo_bench.simulation.arms.tree import checked_size, read_model_tree
 
 _LONGEST = 200
 _LARGEST_BASE_M = 0.5
 _NAMED = ("bodies", "joints", "geoms", "sites", "actuators")
+_OF_THE_SCENE = ("sensors", "keys", "cameras", "lights", "textures", "pairs", "skins", "texts", "numerics", "tuples")
+"""A scene has these itself, or needs none of them."""
+_NOT_RIGID = ("flexes", "hfields", "plugins")
+"""An arm is made of rigid bodies, and runs no code."""
 
 
 def load_model(path: Path, kind: str) -> Any:
-    """An MJCF file as `MjSpec`, without sensors, key frames, cameras, lights and pictures of its own.
+    """Read a model file as `MjSpec`, without sensors, key frames, cameras, lights and pictures.
 
-    Every body, joint, geom, site and actuator has a name in it. Shapes that touch nothing are left out where they are
-    meshes, which would have to be compiled with every scene. How it is simulated is left to the scene.
+    Every body, joint, geom, site and actuator has a name in it. Meshes that touch nothing are left out, since they
+    would be compiled with every scene. Options of the simulation are MuJoCo's defaults: the scene states them.
 
     Args:
+        path: An MJCF or URDF file.
         kind: What the file should be, for the message: `arm`, `gripper`.
 
     Raises:
-        InputError: There is no such file, it says what it may not, MuJoCo cannot read it, or a mesh is missing.
+        InputError: There is no such file, MuJoCo cannot read it, it has what no arm has, or a mesh is missing.
     """
-    tree = read_model_tree(path, kind)
+    require(path.is_file(), f"{path}: the model file of the {kind} is missing; check the path.")
     try:
-        spec = mujoco.MjSpec.from_string(tree.text)
-    except (ValueError, RuntimeError, mujoco.FatalError) as error:
-        raise InputError(f"{path}: MuJoCo cannot read this MJCF file of the {kind}: {_reason(error)}.") from error
+        spec = _read(path)
+    except (ValueError, RuntimeError, mujoco.FatalError, ElementTree.ParseError) as error:
+        raise InputError(f"{path}: MuJoCo cannot read this model file of the {kind}: {_reason(error)}.") from error
+    _check_kinds(spec, path, kind)
     _check_world(spec, path, kind)
+    for plural in _OF_THE_SCENE:
+        for each in list(getattr(spec, plural)):
+            spec.delete(each)
+    for material in spec.materials:
+        material.textures = [""] * len(material.textures)
     for geom in list(spec.geoms):
         if geom.type == mujoco.mjtGeom.mjGEOM_MESH and not geom.contype and not geom.conaffinity:
             spec.delete(geom)
     _keep_meshes(spec, path, kind)
+    plain = mujoco.MjSpec()
+    spec.option = plain.option
+    spec.stat = plain.stat
+    spec.visual = plain.visual
     for plural in _NAMED:
         for i, each in enumerate(getattr(spec, plural)):
             if not each.name:
@@ -62,11 +77,63 @@ def compiled(spec: Any, path: Path) -> Any:
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
-    """A file of an arm, with the files that it includes and the meshes that it names."""
+    """A model file, with the files that it includes and the meshes that it names."""
     try:
-        return tuple(dict.fromkeys(read_model_tree(path, "arm").files))
-    except InputError:
+        included = tuple(_included(path, path.parent, frozenset()))
+        meshes = tuple(_mesh_file(spec, mesh) for spec in (_read(path),) for mesh in spec.meshes)
+    except (OSError, ValueError, RuntimeError, mujoco.FatalError, ElementTree.ParseError):
         return (path,)
+    return tuple(dict.fromkeys((*included, *meshes)))
+
+
+def _read(path: Path) -> Any:
+    """A model file as it is, or without what the grippers of robosuite have and MuJoCo refuses.
+
+    These state some meshes twice, of which robosuite takes the first, and a group of a class, which has no effect.
+    """
+    try:
+        return mujoco.MjSpec.from_file(str(path))
+    except ValueError as error:
+        if not any(words in str(error) for words in ("repeated name", "unrecognized attribute: 'group'")):
+            raise
+    root = ElementTree.parse(path).getroot()
+    for default in root.iter("default"):
+        default.attrib.pop("group", None)
+    for assets in root.iter("asset"):
+        names: set[str] = set()
+        for mesh in assets.findall("mesh"):
+            name = mesh.get("name") or Path(mesh.get("file", "")).stem
+            if name in names:
+                assets.remove(mesh)
+            names.add(name)
+    spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"))
+    spec.modelfiledir = str(path.parent)
+    return spec
+
+
+def _included(path: Path, main: Path, outer: frozenset[Path]) -> Iterator[Path]:
+    """A file and what it includes; MuJoCo looks for these in the folder of the main file."""
+    yield path
+    for include in ElementTree.parse(path).iter("include"):
+        file = main / include.get("file", "")
+        if file not in outer and file.is_file():
+            yield from _included(file, main, outer | {file})
+
+
+def _mesh_file(spec: Any, mesh: Any) -> Path:
+    stated = Path(mesh.file)
+    return (Path(spec.modelfiledir) / spec.meshdir / stated).absolute()
+
+
+def _check_kinds(spec: Any, path: Path, kind: str) -> None:
+    """Rigid bodies that nothing outside of the model moves."""
+    for plural in _NOT_RIGID:
+        require(
+            not len(getattr(spec, plural)),
+            f"{path}: the {kind} has {plural}; an arm has rigid bodies and actuators only, so remove them.",
+        )
+    for body in spec.bodies:
+        require(not body.mocap, f"{path}: the body '{body.name}' of the {kind} is a mocap body; remove mocap=.")
 
 
 def _check_world(spec: Any, path: Path, kind: str) -> None:
@@ -114,23 +181,19 @@ def check_surroundings(model: Any, path: Path) -> None:
 
 
 def _keep_meshes(spec: Any, path: Path, kind: str) -> None:
-    """Meshes that something touches by."""
+    """Keep the meshes that something touches by, each with its absolute path."""
     used = {geom.meshname for geom in spec.geoms if geom.meshname}
-    size = 0
     for mesh in list(spec.meshes):
         if mesh.name not in used:
             spec.delete(mesh)
         elif mesh.file:
-            file = Path(mesh.file)
+            file = _mesh_file(spec, mesh)
             require(
                 file.is_file(),
                 f"{path}: the mesh file {one_line(str(file), _LONGEST)} of the {kind} is missing; bring it there.",
             )
-            size += checked_size(file, kind)
-    require(
-        size <= MOST_MESH_BYTES,
-        f"{path}: the meshes that touch something have {size / 1e6:.0f} MB; {MOST_MESH_BYTES / 1e6:g} are the most.",
-    )
+            mesh.file = str(file)
+    spec.meshdir = ""
 
 
 def _reason(error: Exception) -> str:
@@ -167,7 +230,7 @@ def stated_arm(description: ArmDescription, slides: SlideGripper, model: Any, jo
     for name in (*joints, grip):
         require_known("actuator", name, actuators, place=file)
     return Arm(
-        mjcf=file,
+        mjcf=description.mjcf,
         base=tuple(description.base[:3, 3].tolist()),
         turn=tuple(pose.pack(description.base)[3:].tolist()),
         joints=tuple(joints),
@@ -177,7 +240,6 @@ def stated_arm(description: ArmDescription, slides: SlideGripper, model: Any, jo
         mount=flange,
         home=description.home,
         opening_m=slides.opening_m,
-        model=read_model_tree(description.mjcf, "arm").text,
         limits=ArmLimits(
             payload_kg=description.payload_kg,
             speed_rad_s=description.of_each_joint("speed_deg_s", description.speed_rad_s, len(joints)),

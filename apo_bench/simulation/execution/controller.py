@@ -18,7 +18,7 @@ from apo_bench.simulation.execution.prepare import Move, key_angles, moves
 from apo_bench.simulation.execution.replay_cache import Progress, ReplayCache, cache_keys
 from apo_bench.simulation.hooks import Hooks, hooks_of
 from apo_bench.simulation.robot import Halt, HoldWatch, Robot, RobotError
-from apo_bench.simulation.scene import Scene, left_out, sleeping, snapshot
+from apo_bench.simulation.scene import Scene, sleeping, snapshot
 
 _SETTLE_S = 0.5
 """At the end, everything is left alone this long."""
@@ -83,7 +83,7 @@ def replay(
     hooks.before_replay(plan)
     robot = Robot(scene, start, hooks, fidelity, error)
     progress = Progress([None] * len(plan.assembly), [])
-    with sleeping(scene.work, scene.grasp == "friction"), left_out(scene.work):
+    with sleeping(scene.work, scene.grasp == "friction"):
         outcome = refused or run_schedule(plan, robot, todo, progress, cache, keys, most_s, feeling, prepared)
         final = _settled(robot, plan) if outcome.code != "unstable_simulation" else None
     result = ReplayResult(

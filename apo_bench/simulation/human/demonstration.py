@@ -30,7 +30,7 @@ from apo_bench.scenario.scenario import ErrorSpread
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.human.hands import Hands, PartLost
 from apo_bench.simulation.robot import Trajectory, minimum_jerk, shifted, smooth, with_height
-from apo_bench.simulation.scene import Scene, has_failed, is_unstable, left_out, sleeping, snapshot
+from apo_bench.simulation.scene import Scene, has_failed, is_unstable, sleeping, snapshot
 
 _SIDE_M = 0.002
 """A part comes down this far beside one that it will lie against, and leaves it by as much before it is lifted."""
@@ -274,7 +274,7 @@ def _assemble(scene: Scene, layout: Layout, hands: Hands, error: ErrorSpread) ->
     scenario = scene.scenario
     stages = (layout.start, *placements(scenario.assembly, layout.start, layout.goals))
     after = []
-    with sleeping(scene.shown, True), left_out(scene.shown):
+    with sleeping(scene.shown, True):
         hands.wait(0.05)
         for k in range(len(scenario.assembly)):
             hands.begin(k)

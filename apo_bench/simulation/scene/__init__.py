@@ -1,6 +1,5 @@
 """The scene: room, parts and arm as MuJoCo models, pictures of them, and where parts come to rest when let go."""
 
-from apo_bench.simulation.scene.apart import left_out
 from apo_bench.simulation.scene.composing import HANDS
 from apo_bench.simulation.scene.marks import Marks, ShiftArrows, TurnRing, pixels
 from apo_bench.simulation.scene.render import arm_home, camera_view, picture, place_for_picture, save_film
@@ -37,7 +36,6 @@ __all__ = (
     "has_failed",
     "initial_state",
     "is_unstable",
-    "left_out",
     "part_pose",
     "picture",
     "pixels",

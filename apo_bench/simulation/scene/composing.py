@@ -15,6 +15,7 @@ from apo_bench.parts import PartFile, read_part
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario, layout_at
 from apo_bench.simulation.arms.arm import Arm
+from apo_bench.simulation.arms.loading import load_model
 from apo_bench.simulation.physics import Physics, set_contact, set_options
 from apo_bench.simulation.scene.geoms import OF_PARTS, Bits, dress, meetings
 from apo_bench.simulation.scene.walls import simulated_pieces
@@ -159,7 +160,7 @@ def _add_weld(spec: Any, name: str, first: str, second: str, solref: Iterable[fl
 
 
 def _add_arm(spec: Any, arm: Arm, settings: Physics) -> None:
-    own = mujoco.MjSpec.from_file(str(arm.mjcf)) if arm.model is None else mujoco.MjSpec.from_string(arm.model)
+    own = load_model(arm.mjcf, "arm") if arm.model is None else mujoco.MjSpec.from_string(arm.model)
     set_contact(own.geoms, settings)
     if arm.hand is not None:
         for geom in own.geoms:

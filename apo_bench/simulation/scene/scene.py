@@ -18,7 +18,6 @@ from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.physics import Physics, physics
-from apo_bench.simulation.scene.bounds import bounds_of
 from apo_bench.simulation.scene.composing import fixed_parts, movable_parts, room_with_parts, with_arm, with_hands
 from apo_bench.simulation.scene.geoms import SMOOTH_PRIORITY
 from apo_bench.simulation.scene.world import World, leave_wrist_unfelt, world
@@ -143,9 +142,9 @@ def build_scene(
     settings = physics(timestep_s)
     kinematics = Kinematics(robot)
     room = room_with_parts(scenario, clearance, settings)
-    shown = _compiled(scenario, with_hands(room, scenario), clearance)
+    shown = _compiled(scenario, with_hands(room, scenario))
     shown.model.opt.sleep_tolerance = _DROWSY_M_S
-    work = _compiled(scenario, with_arm(room, scenario, settings, robot, grasp, kinematics.first_link), clearance)
+    work = _compiled(scenario, with_arm(room, scenario, settings, robot, grasp, kinematics.first_link))
     leave_wrist_unfelt(work.model)
     if grasp == "friction":
         check_holdable(scenario, work, robot)
@@ -181,8 +180,7 @@ def scene_xml(
     return str(spec.to_xml())
 
 
-def _compiled(scenario: Scenario, spec: Any, clearance_mm: float) -> World:
+def _compiled(scenario: Scenario, spec: Any) -> World:
     model = spec.compile()
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    bounds = bounds_of(model, scenario.assembly.solids, clearance_mm * 1e-3)
-    return world(model, movable_parts(scenario), fixed_parts(scenario), bounds)
+    return world(model, movable_parts(scenario), fixed_parts(scenario))

@@ -19,7 +19,6 @@ from apo_bench.assembly import Correction, Observation
 from apo_bench.geometry import Array, Solid, physical_pieces, pose
 from apo_bench.records import sentence
 from apo_bench.simulation.physics import Physics, physics, set_contact, set_options
-from apo_bench.simulation.scene.bounds import NO_BOUNDS
 from apo_bench.simulation.scene.geoms import add_pieces, set_mass
 from apo_bench.simulation.scene.world import World, has_failed, initial_state, part_pose, place, world
 
@@ -99,7 +98,7 @@ def _world(observation: Observation) -> World:
     spec = _room(observation.assembly.solids, free, observation.play_m or CLEARANCE_M, physics())
     model = spec.compile()
     model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_AUTORESET)
-    return world(model, free, fixed, NO_BOUNDS)
+    return world(model, free, fixed)
 
 
 def _room(solids: Mapping[str, Solid], free: tuple[str, ...], clearance_m: float, s: Physics) -> Any:

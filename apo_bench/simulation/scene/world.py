@@ -37,11 +37,9 @@ class World:
     dof: dict[str, int]
     geom_part: Ints
     """Per geom: index into free + fixed, -1 for everything else (arm, hands)."""
-    bounds: Array
-    """Per geom: a plane that it is behind, a cylinder that it is inside of, (geoms, 12), of `bounds_of`."""
 
 
-def world(model: Any, free: tuple[str, ...], fixed: tuple[str, ...], bounds: Array) -> World:
+def world(model: Any, free: tuple[str, ...], fixed: tuple[str, ...]) -> World:
     """Look up every part of a compiled scene."""
     body = {part: model.body(f"{part}/").id for part in free + fixed}
     root = {body_id: i for i, body_id in enumerate(body.values())}
@@ -55,7 +53,6 @@ def world(model: Any, free: tuple[str, ...], fixed: tuple[str, ...], bounds: Arr
         qpos={part: int(model.jnt_qposadr[j]) for part, j in joints.items()},
         dof={part: int(model.jnt_dofadr[j]) for part, j in joints.items()},
         geom_part=geom_part,
-        bounds=bounds,
     )
 
 

@@ -32,7 +32,7 @@ from apo_bench.simulation.execution.feel.feeling import Feeling, Feels
 from apo_bench.simulation.execution.feel.touching import lay
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.robot import Halt, Robot, RobotError, WristSensor, part_loads, wrist_of, zero
-from apo_bench.simulation.scene import Scene, left_out, sleeping
+from apo_bench.simulation.scene import Scene, sleeping
 
 
 @final
@@ -82,7 +82,7 @@ def prepare(
     robot = Robot(scene, plan.start, Hooks(), "contact", error)
     progress = Progress([None] * len(plan.assembly), [])
     keys = [b"%d" % i for i in range(2 * at)]
-    with sleeping(scene.work, scene.grasp == "friction"), left_out(scene.work):
+    with sleeping(scene.work, scene.grasp == "friction"):
 
         def earlier(left: RobotError | None) -> tuple[Move, ...]:
             return moves(left)[:at]
@@ -110,7 +110,7 @@ def go_on(
     """
     progress = Progress([*start.after, reached], [])
     other = Robot(robot.scene, start.parts, Hooks(), "contact", error)
-    with sleeping(robot.scene.work, robot.scene.grasp == "friction"), left_out(robot.scene.work):
+    with sleeping(robot.scene.work, robot.scene.grasp == "friction"):
         take_up(saved_state(robot, 0, progress), other)
         move = moves_of(plan, robot.scene, True, (), error)[start.operation + 1]
         return _held(plan, other, move, None, error, wrench, progress)

@@ -25,7 +25,7 @@ from apo_bench.simulation.execution import (
 )
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.robot import LowPass, Robot, shifted
-from apo_bench.simulation.scene import Scene, left_out, part_pose, sleeping, snapshot, wrist_felt
+from apo_bench.simulation.scene import Scene, part_pose, sleeping, snapshot, wrist_felt
 from apo_bench.simulation.task.start import Start
 
 PERIOD_S = 0.05
@@ -136,7 +136,7 @@ class TipControl:
         robot = self.robot
         t = self.start.transfer
         work = robot.scene.work
-        with sleeping(work, robot.scene.grasp == "friction"), left_out(work), robot.watch_stability():
+        with sleeping(work, robot.scene.grasp == "friction"), robot.watch_stability():
             robot.stand()
             if self.arrived:
                 at_end = shifted(robot.T, t.into.way, -float(self._off(robot.T)[2]))
@@ -193,7 +193,7 @@ class TipControl:
         robot = self.robot
         work = robot.scene.work
         asleep = sleeping(work, robot.scene.grasp == "friction")
-        with asleep, left_out(work), wrist_felt(work.model), robot.watch_stability():
+        with asleep, wrist_felt(work.model), robot.watch_stability():
             yield
 
     def _move(self, shift: Array, turn: Array) -> None:

@@ -63,14 +63,6 @@ def test_candidates_of_the_scenario_files(name: str) -> None:
     assert chosen(load_scenario(FILES[name]).assembly, *failing) == expected
 
 
-def test_the_first_operation_of_fig_6_is_reached_through_a_lost_arc_only() -> None:
-    assembly = scenes.pockets().assembly
-    failing = arcs(assembly, "cube2-table 6", "cube3-table 6")
-    for missing, expected in (("cube3-cube1", (6, 5, 3, 2)), ("cube3-table 3", (6, 5, 3, 2, 1))):
-        known = ~arcs(assembly, missing)
-        assert counted(candidates(assembly, failing, known)) == expected
-
-
 def test_a_stable_object_connects_nothing() -> None:
     assembly = scenes.fixture().assembly
     assert chosen(assembly, "cube-table 4") == (4,)
@@ -111,4 +103,3 @@ def test_what_is_chosen_is_closed_and_no_larger_than_it_must_be(seed: int) -> No
     assert set(system.among(failing).variables(n)) <= set(free)
     fewer = candidates(scene.assembly, failing & (rng.random(len(failing)) < 0.5))
     assert set(fewer) <= set(free)
-    assert set(candidates(scene.assembly, failing, failing)) <= set(free)

@@ -13,6 +13,8 @@ from apo_bench.geometry import pose
 from tests.correction.robust.test_robust import look
 
 SIGMA = np.array([1e-3, 2e-3, 3e-3, 0.01, 0.02, 0.03])
+ROUNDING = 1e-18
+"""Entries that are zero come out as 1e-21 on some processors; the others are 1e-6 and larger."""
 
 
 def of(observation: Observation, weight: float, off=None, deviation=SIGMA) -> Hypothesis:
@@ -29,7 +31,7 @@ def _observation() -> Observation:
 
 def test_of_one_hypothesis_it_is_its_own(observation):
     only = of(observation, 1.0)
-    np.testing.assert_allclose(mode_covariance((only,)), only.covariance, rtol=1e-12)
+    np.testing.assert_allclose(mode_covariance((only,)), only.covariance, rtol=1e-12, atol=ROUNDING)
 
 
 def test_of_a_mode_it_is_the_second_moment_about_the_goals_of_the_first(observation):
@@ -43,7 +45,7 @@ def test_of_a_mode_it_is_the_second_moment_about_the_goals_of_the_first(observat
 def test_what_leads_elsewhere_is_another_mode(observation):
     first = of(observation, 0.6)
     turned = of(observation, 0.4, [0.0, 0.0, 0.0, 0.0, 0.0, np.pi])
-    np.testing.assert_allclose(mode_covariance((first, turned)), first.covariance, rtol=1e-12)
+    np.testing.assert_allclose(mode_covariance((first, turned)), first.covariance, rtol=1e-12, atol=ROUNDING)
 
 
 def test_the_region_of_a_correction_is_that_of_enough_hypotheses(observation):

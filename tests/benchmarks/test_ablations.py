@@ -11,10 +11,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from apo_bench import Correction, Observation, correct
 from apo_bench.assembly import Try, placements
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.baselines.paper import MOST_SETS, last_only, minimal, no_disappeared, paper, smallest
-from apo_bench.correction.baselines.track import no_history, paper_track
+from apo_bench.correction.baselines.paper import paper
+from apo_bench.correction.baselines.track import paper_track
 from apo_bench.geometry import Array, pose
 from apo_bench.records import CORRECTORS
+from benchmarks.ablations import MOST_SETS, last_only, minimal, no_disappeared, no_history, smallest
 from tests import scenes
 
 CARELESS = ("stick_in_tower", "subassembly_on_castles", "fixture", "pockets")
