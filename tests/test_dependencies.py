@@ -6,9 +6,13 @@ import ast
 import re
 import sys
 import tomllib
+from collections.abc import Iterable
+from importlib.metadata import Distribution, distribution
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from benchmarks.lowest import EXTRAS, lowest
 
@@ -17,8 +21,10 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 BROUGHT = {"glfw": "mujoco", "OCP": "build123d", "PIL": "imageio"}
 """What a dependency needs itself whenever we do: its viewer and its renderer without EGL; its kernel;
 its pictures."""
-ALONGSIDE = {"dm_control"}
-"""Stated and not imported: for who works with it and `to_dm_env`, where it installs."""
+ASKED_FOR = {"robosuite"}
+"""Looked for and never needed: its arms, where somebody has installed it."""
+MOST = {True: (65, 750), False: (50, 600)}
+"""Whether dm-control comes along -> how many packages there may be, and how many MB."""
 
 
 def imported() -> set[str]:
@@ -30,9 +36,35 @@ def imported() -> set[str]:
                 names |= {alias.name.split(".")[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom):
                 names.add(str(node.module).split(".")[0])
-            elif isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "import_module":
+            elif isinstance(node, ast.Call) and _called(node.func) in ("import_module", "find_spec"):
                 names |= {str(a.value).split(".")[0] for a in node.args if isinstance(a, ast.Constant)}
     return names - {*sys.stdlib_module_names, "apo_bench"}
+
+
+def _called(function: ast.expr) -> str:
+    """`find_spec` of `find_spec(...)` and of `importlib.util.find_spec(...)`."""
+    return getattr(function, "attr", getattr(function, "id", ""))
+
+
+def installed(requirements: list[str]) -> dict[str, Distribution]:
+    """What pip installs for these requirements, by the metadata of what is installed here: name -> package."""
+    found: dict[str, Distribution] = {}
+    left = [(Requirement(each), "") for each in requirements]
+    while left:
+        wanted, extra = left.pop()
+        if wanted.marker is not None and not wanted.marker.evaluate({"extra": extra}):
+            continue
+        name = canonicalize_name(wanted.name)
+        known = name in found
+        found[name] = found.get(name) or distribution(wanted.name)
+        extras = [*wanted.extras] if known else ["", *wanted.extras]
+        left += [(Requirement(each), asked) for each in found[name].requires or () for asked in extras]
+    return found
+
+
+def megabytes(packages: Iterable[Distribution]) -> float:
+    files = (Path(str(each.locate_file(file))) for each in packages for file in each.files or ())
+    return sum(file.stat().st_size for file in files if file.is_file()) / 1e6
 
 
 def stated(*lists: list[str]) -> set[str]:
@@ -42,10 +74,27 @@ def stated(*lists: list[str]) -> set[str]:
 
 def test_what_is_imported_is_stated_and_what_is_stated_is_imported() -> None:
     extras = PROJECT["optional-dependencies"]
-    optional = stated(*(extras[name] for name in ("fast", "cad", "ray", "view", "dm", "data")))
-    assert stated(PROJECT["dependencies"]) - ALONGSIDE == imported() - optional - set(BROUGHT)
+    optional = stated(*(extras[name] for name in ("fast", "cad", "ray", "view", "dm", "data", "film")))
+    assert stated(PROJECT["dependencies"]) == imported() - optional - set(BROUGHT) - ASKED_FOR
     assert optional <= imported() | {BROUGHT[each] for each in set(BROUGHT) & imported()}
     assert {*BROUGHT.values()} <= stated(PROJECT["dependencies"]) | optional
+
+
+def test_what_comes_along_is_little() -> None:
+    came = installed(PROJECT["dependencies"])
+    most, most_mb = MOST["dm-control" in came]
+    assert {"mujoco", "numpy", "scipy"} <= came.keys()
+    assert not {"pyarrow", "imageio-ffmpeg", "h5py"} & came.keys(), "these are of extras"
+    assert len(came) + 1 < most, sorted(came)
+    assert megabytes(came.values()) < most_mb, {name: megabytes([each]) for name, each in came.items()}
+
+
+def test_packages_that_are_needed_by_others_are_counted() -> None:
+    came = installed(["matplotlib"])
+    assert {"matplotlib", "numpy", "pillow", "python-dateutil"} <= came.keys()
+    assert 20.0 < megabytes([came["matplotlib"]]) < megabytes(came.values())
+    assert installed(["matplotlib; python_version < '3'"]) == {}
+    assert installed(["imageio[ffmpeg]"]).keys() - installed(["imageio"]).keys() >= {"imageio-ffmpeg"}
 
 
 def test_every_dependency_says_from_which_version_on_it_works(tmp_path: Path) -> None:
