@@ -105,7 +105,7 @@ def test_every_dependency_says_from_which_version_on_it_works(tmp_path: Path) ->
     assert len(bounds) == len(set(bounds)), "one version of each, also where a bound depends on the version of Python"
     path = tmp_path / "pyproject.toml"
     path.write_text(
-        '[project]\ndependencies = ["a>=1.2,<3", "b[c]>=4", "d"]\noptional-dependencies = {fast = [], dm = []}\n'
+        '[project]\ndependencies = ["a>=1.2,<3", "b[c]>=4", "d"]\noptional-dependencies = {fast = [], dm = [], data = [], film = []}\n'
     )
     with pytest.raises(ValueError, match="'d' states no version"):
         lowest(path)
