@@ -40,6 +40,11 @@ def failed(what: str, error: Exception) -> InputError:
     return InputError(f"{what} failed: {said}; mend it, or use another.")
 
 
+def missing_package(what: str, package: str, instead: str = "") -> InputError:
+    """`the format minari needs the package h5py; install it with: pip install h5py`, to raise where it is imported."""
+    return InputError(f"{what} needs the package {package}; install it with: pip install {package}{instead}")
+
+
 def kind(value: Any) -> str:
     """What a value is, for a sentence: `a str`, `an int`, `None`, `a class`."""
     if value is None or isinstance(value, type):

@@ -30,7 +30,7 @@ TIMES = 5
 INSTALLERS = ("pip", "setuptools")
 """They come with the environment."""
 PIP = ("-m", "pip", "--quiet", "--disable-pip-version-check")
-OPTIONAL = ("build123d", "dm_env", "numba", "OCP", "ray", "viser")
+OPTIONAL = ("build123d", "dm_env", "numba", "OCP", "pyarrow", "ray", "viser")
 """What the extras bring; a module that needs one of these may say so."""
 IMPORT = f"""
 import importlib, pkgutil, sys, apo_bench

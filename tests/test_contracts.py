@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -109,7 +110,11 @@ BREACHES = {
         ("apo_bench.envs.apo_replay", "mujoco"),
         ("apo_bench.cli.app", "mink"),
     ],
-    "dm-control": [("apo_bench.simulation.scene.composing", "dm_control"), ("apo_bench.envs.apo_replay", "dm_control")],
+    "dm-control": [
+        ("apo_bench.simulation.scene.composing", "dm_control"),
+        ("apo_bench.envs.apo_replay", "dm_control"),
+        ("apo_bench.envs", "dm_control"),
+    ],
     "gymnasium": [("apo_bench.trial.trial", "gymnasium"), ("apo_bench.simulation.scene.scene", "gymnasium")],
 }
 
@@ -129,7 +134,7 @@ def keeps(graph: grimp.ImportGraph, contract: str) -> bool:
     session = {"root_packages": ["apo_bench"], "include_external_packages": True}
     kind = KINDS[CONTRACTS[contract]["type"]]
     check = kind(name=contract, session_options=session, contract_options=options)
-    return bool(check.check(graph=graph, verbose=False).kept)
+    return bool(check.check(graph=deepcopy(graph), verbose=False).kept)  # it takes out the imports that it ignores
 
 
 def test_a_breach_is_tried_for_every_contract() -> None:

@@ -6,9 +6,14 @@ import ast
 import re
 import sys
 import tomllib
+from collections.abc import Iterable
+from importlib.metadata import Distribution, distribution
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 from benchmarks.lowest import EXTRAS, lowest
 
@@ -17,8 +22,10 @@ PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["
 BROUGHT = {"glfw": "mujoco", "OCP": "build123d", "PIL": "imageio"}
 """What a dependency needs itself whenever we do: its viewer and its renderer without EGL; its kernel;
 its pictures."""
-ALONGSIDE = {"dm_control"}
-"""Stated and not imported: for who works with it and `to_dm_env`, where it installs."""
+ASKED_FOR = {"robosuite"}
+"""Looked for and never needed: its arms, where somebody has installed it."""
+MOST = {True: (65, 750), False: (50, 600)}
+"""Whether dm-control comes along -> how many packages there may be, and how many MB."""
 
 
 def imported() -> set[str]:
@@ -30,9 +37,36 @@ def imported() -> set[str]:
                 names |= {alias.name.split(".")[0] for alias in node.names}
             elif isinstance(node, ast.ImportFrom):
                 names.add(str(node.module).split(".")[0])
-            elif isinstance(node, ast.Call) and getattr(node.func, "attr", "") == "import_module":
+            elif isinstance(node, ast.Call) and _called(node.func) in ("import_module", "find_spec"):
                 names |= {str(a.value).split(".")[0] for a in node.args if isinstance(a, ast.Constant)}
     return names - {*sys.stdlib_module_names, "apo_bench"}
+
+
+def _called(function: ast.expr) -> str:
+    """`find_spec` of `find_spec(...)` and of `importlib.util.find_spec(...)`."""
+    return getattr(function, "attr", getattr(function, "id", ""))
+
+
+def installed(requirements: list[str]) -> dict[str, Distribution]:
+    """What pip installs for these requirements, by the metadata of what is installed here: name -> package."""
+    found: dict[str, Distribution] = {}
+    seen: set[tuple[str, str]] = set()
+    left = [(Requirement(each), "") for each in requirements]
+    while left:
+        wanted, of = left.pop()
+        if wanted.marker is not None and not wanted.marker.evaluate({"extra": of}):
+            continue
+        name = canonicalize_name(wanted.name)
+        for extra in {"", *wanted.extras} - {extra for known, extra in seen if known == name}:
+            seen.add((name, extra))
+            found[name] = distribution(wanted.name)
+            left += [(Requirement(each), extra) for each in found[name].requires or ()]
+    return found
+
+
+def megabytes(packages: Iterable[Distribution]) -> float:
+    files = (Path(str(each.locate_file(file))) for each in packages for file in each.files or ())
+    return sum(file.stat().st_size for file in files if file.is_file()) / 1e6
 
 
 def stated(*lists: list[str]) -> set[str]:
@@ -42,10 +76,34 @@ def stated(*lists: list[str]) -> set[str]:
 
 def test_what_is_imported_is_stated_and_what_is_stated_is_imported() -> None:
     extras = PROJECT["optional-dependencies"]
-    optional = stated(*(extras[name] for name in ("fast", "cad", "ray", "view", "dm", "data")))
-    assert stated(PROJECT["dependencies"]) - ALONGSIDE == imported() - optional - set(BROUGHT)
+    optional = stated(*(extras[name] for name in ("fast", "cad", "ray", "view", "dm", "data", "film")))
+    assert stated(PROJECT["dependencies"]) == imported() - optional - set(BROUGHT) - ASKED_FOR
     assert optional <= imported() | {BROUGHT[each] for each in set(BROUGHT) & imported()}
     assert {*BROUGHT.values()} <= stated(PROJECT["dependencies"]) | optional
+
+
+def test_what_comes_along_is_little() -> None:
+    came = installed(PROJECT["dependencies"])
+    most, most_mb = MOST["dm-control" in came]
+    assert {"mujoco", "numpy", "scipy"} <= came.keys()
+    assert not {"pyarrow", "imageio-ffmpeg", "h5py"} & came.keys(), "these are of extras"
+    assert len(came) + 1 < most, sorted(came)
+    assert megabytes(came.values()) < most_mb, {name: megabytes([each]) for name, each in came.items()}
+
+
+def test_packages_that_are_needed_by_others_are_counted(monkeypatch: pytest.MonkeyPatch) -> None:
+    needs = {"a": ["b_b[x]>=1", "old; python_version < '3'"], "b_b": ["c; extra == 'x'", "d; extra == 'y'"], "c": ["a"]}
+    monkeypatch.setattr(
+        f"{__name__}.distribution", lambda name: SimpleNamespace(requires=needs.get(name.replace("-", "_")))
+    )
+    assert installed(["a"]).keys() == {"a", "b-b", "c"}
+    assert installed(["a", "b-b[y]"]).keys() == {"a", "b-b", "c", "d"}
+
+
+def test_megabytes_are_those_of_all_files(tmp_path: Path) -> None:
+    (tmp_path / "one").write_bytes(bytes(3_000_000))
+    package = SimpleNamespace(files=["one", "gone"], locate_file=tmp_path.joinpath)
+    assert megabytes([package, package]) == 6.0  # type: ignore[list-item]
 
 
 def test_every_dependency_says_from_which_version_on_it_works(tmp_path: Path) -> None:
@@ -56,7 +114,8 @@ def test_every_dependency_says_from_which_version_on_it_works(tmp_path: Path) ->
     assert len(bounds) == len(set(bounds)), "one version of each, also where a bound depends on the version of Python"
     path = tmp_path / "pyproject.toml"
     path.write_text(
-        '[project]\ndependencies = ["a>=1.2,<3", "b[c]>=4", "d"]\noptional-dependencies = {fast = [], dm = []}\n'
+        '[project]\ndependencies = ["a>=1.2,<3", "b[c]>=4", "d"]\n'
+        "optional-dependencies = {fast = [], dm = [], data = [], film = []}\n"
     )
     with pytest.raises(ValueError, match="'d' states no version"):
         lowest(path)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 
 from apo_bench.cli.printing import console
-from apo_bench.io import clean
+from apo_bench.io import clean, has_parquet
 from apo_bench.records import RANGE, SETTINGS, FreedSet, MovedInHand, Predicted, Row, feels, look_up
 from apo_bench.report.tables.cells import cell_table
 from apo_bench.report.tables.methods import prediction_summary
@@ -71,7 +71,8 @@ def print_report(report: Report) -> None:
         drawn = "1 failure was" if report.pictures == 1 else f"{report.pictures} failures were"
         lines.append(f"{drawn} drawn. Not drawn: {'; '.join(report.no_pictures)}.")
     lines.append(f"Answer:  {report.answer.replace('`', '')}")
-    lines.append(f"Tables:  {report.tables['cells']} and {len(report.tables) - 1} more there, the same as .parquet")
+    same = "the same as .parquet" if has_parquet() else "as .parquet too with the package pyarrow"
+    lines.append(f"Tables:  {report.tables['cells']} and {len(report.tables) - 1} more there, {same}")
     if report.figures:
         lines.append(f"Figures: {report.figures[0]} and {len(report.figures) - 1} more there")
     lines.append(f"Report:  {report.page}")

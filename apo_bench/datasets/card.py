@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
-from pyarrow import parquet
-
 from apo_bench import __version__
 from apo_bench.geometry import Array
 from apo_bench.io import to_write
@@ -139,6 +137,8 @@ def _croissant(about: About, out: Path, files: list[Path], summary: str, tables:
         if first is None:
             continue
         name = pattern.removesuffix(".parquet").rstrip("/*")
+        from pyarrow import parquet
+
         schema = parquet.read_schema(first)
         distribution.append(
             {

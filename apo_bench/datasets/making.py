@@ -14,10 +14,11 @@ import numpy as np
 
 from apo_bench.datasets.card import About, Field, Rollout
 from apo_bench.datasets.episodes import about_replays, replay_rollouts, replays, write_parquet
-from apo_bench.datasets.loaders import write_lerobot, write_minari
+from apo_bench.datasets.minari import write_minari
 from apo_bench.envs.policies import POLICIES, insert_env
-from apo_bench.errors import InputError, require, require_known
+from apo_bench.errors import InputError, missing_package, require, require_known
 from apo_bench.geometry import Array
+from apo_bench.io import has_parquet
 from apo_bench.names import resolve
 from apo_bench.records import TrialSettings
 from apo_bench.trial.stages import scene_of
@@ -139,8 +140,7 @@ def _decided(decide: Callable[[Any, Any], Any], policy: str, env: Any, seen: Any
         raise InputError(f"the policy '{policy}' raised {what} ({last.filename}, line {last.lineno}).") from error
 
 
-_WRITERS = {"lerobot": write_lerobot, "minari": write_minari}
-FORMATS = ("parquet", *_WRITERS)
+FORMATS = ("parquet", "lerobot", "minari")
 
 
 def make_dataset(
@@ -176,14 +176,16 @@ def make_dataset(
         f"'{out}' is there already and not an empty folder; name another.",
     )
     require(
-        form in _WRITERS or policy is None,
+        form != "parquet" or policy is None,
         "insertions were asked for as parquet; give the format lerobot, whose tables are Parquet files, or minari.",
     )
+    if form != "minari" and not has_parquet():
+        raise missing_package(f"the format {form}", "pyarrow")
     existed = out.exists()
     ends: list[BaseException] = []
     if policy is not None:
         about, rollouts = insertions(trials, policy, command, say)
-        counted = _WRITERS[form](_to_the_end(rollouts, ends), about, out)
+        counted = _write_rollouts(form, _to_the_end(rollouts, ends), about, out)
     else:
         scenes = {each.scenario: scene_of(each) for each in trials}
         about = about_replays([*scenes.values()], command, trials[0].arm)
@@ -191,7 +193,7 @@ def make_dataset(
         if form == "parquet":
             counted = write_parquet(found, about, out)
         else:
-            counted = _WRITERS[form](replay_rollouts(found, about, say), about, out)
+            counted = _write_rollouts(form, replay_rollouts(found, about, say), about, out)
     if not counted[0]:
         for each in out.iterdir() if out.is_dir() else ():
             shutil.rmtree(each) if each.is_dir() else each.unlink()
@@ -203,6 +205,14 @@ def make_dataset(
         raise end
     require(counted[0] > 0, "no trial made an episode, so nothing was written; give other seeds or a lower level.")
     return counted
+
+
+def _write_rollouts(form: str, rollouts: Iterable[Rollout], about: About, out: Path) -> tuple[int, int]:
+    if form == "minari":
+        return write_minari(rollouts, about, out)
+    from apo_bench.datasets.lerobot import write_lerobot
+
+    return write_lerobot(rollouts, about, out)
 
 
 def _to_the_end(found: Iterable[Any], ends: list[BaseException]) -> Iterator[Any]:

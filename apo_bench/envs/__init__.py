@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Any
 
-from apo_bench.errors import InputError
+from apo_bench.errors import missing_package
 
 if TYPE_CHECKING:
     import gymnasium
@@ -23,5 +23,5 @@ def to_dm_env(env: "gymnasium.Env[Any, Any]", *, seed: int | None = None) -> Any
     except ImportError as error:
         if error.name != "dm_env":
             raise
-        raise InputError("to_dm_env needs the package dm-env; install it with: pip install dm-env") from error
+        raise missing_package("to_dm_env", "dm-env") from error
     return DmAdapter(env, seed)

@@ -34,7 +34,7 @@ from apo_bench.records import (
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.robot import Halt
-from apo_bench.simulation.scene import Scene, build_scene
+from apo_bench.simulation.scene import Scene, build_scene, data_with_arm
 from apo_bench.simulation.task.tip_control import PERIOD_S, TipControl
 
 Seen = dict[str, Any]
@@ -300,6 +300,12 @@ class APOInsert(gymnasium.Env[Seen, Action]):
     def render(self) -> Any:
         """Arm and parts, (480, 640, 3) of uint8."""
         return self._picture(640, 480) if self.render_mode == "rgb_array" else None
+
+    def mujoco_data(self) -> Any:
+        """The live `mujoco.MjData` of this episode; before the first one, parts at their start. It holds the truth."""
+        if self._begun is None:
+            return data_with_arm(self.scene, self.scene.scenario.start)
+        return self._at_work().robot.data
 
     def __getstate__(self) -> dict[str, Any]:
         """All but the simulation, which is made again by the same actions."""

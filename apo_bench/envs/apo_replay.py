@@ -29,7 +29,7 @@ from apo_bench.records import (
 )
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.arm import Arm
-from apo_bench.simulation.scene import build_scene
+from apo_bench.simulation.scene import build_scene, data_with_arm
 from apo_bench.trial.fitting import fitting_plan
 from apo_bench.trial.promise import abstained, promised_success
 from apo_bench.trial.stages import (
@@ -292,6 +292,10 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         `human`, which shows the replay itself, None.
         """
         return self._rendering.shown(self._scene, self.render_mode)
+
+    def mujoco_data(self) -> Any:
+        """What the mode `rgb_array` shows, as a new `mujoco.MjData`; it holds the truth."""
+        return data_with_arm(self._scene, self._rendering.poses, self._rendering.state)
 
     def close(self) -> None:
         """Close the window, if one is open."""

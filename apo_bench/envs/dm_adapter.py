@@ -1,9 +1,12 @@
 """An environment of Gymnasium as one of `dm_env`, for agents and wrappers that know that interface.
 
-Needs the package dm-env, which is pure Python itself; dm-control is not needed.
+Needs the package dm-env, which is pure Python itself. The viewer of dm_control and those of its wrappers that ask for
+`physics` also need dm-control, which is imported when `physics` is first used.
 """
 
+import copy
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, final
 
 import dm_env
@@ -11,6 +14,21 @@ import gymnasium
 import numpy as np
 from dm_env import specs
 from gymnasium import spaces
+
+from apo_bench.errors import missing_package, require
+from apo_bench.io import SAFE_PATH, environment
+from apo_bench.simulation.scene import copy_data
+
+_STREAM = 0x646D
+"""The stream of `task.random`; no trial uses it."""
+
+
+@final
+@dataclass(frozen=True)
+class DmTask:
+    """What wrappers of dm_control ask of a task."""
+
+    random: np.random.Generator
 
 
 @final
@@ -24,12 +42,35 @@ class DmAdapter(dm_env.Environment):  # type: ignore[misc]
         self._env = env
         self._seed = seed
         self._over = True
+        self._physics: Any = None
         self.info: dict[str, Any] = {}
+        self.task = DmTask(np.random.default_rng(None if seed is None else [seed, _STREAM]))
+
+    @property
+    def physics(self) -> Any:
+        """What the environment shows, a `dm_control.mujoco.Physics`.
+
+        It is a copy, with its own model, that every reset and step updates: nothing done to it changes an episode. It
+        holds the truth, so it is not for policies.
+
+        Raises:
+            InputError: The package dm-control is not installed, or this environment has no simulation to show.
+        """
+        if self._physics is None:
+            base = self._env.unwrapped
+            require(
+                hasattr(base, "mujoco_data"),
+                f"physics was asked of {type(base).__name__}, which has none; use APOReplay-v0, APOInsert-v0 or "
+                "APOAssemble-v0.",
+            )
+            self._physics = _physics(base.mujoco_data())  # type: ignore[attr-defined]
+        return self._physics
 
     def reset(self) -> dm_env.TimeStep:
         observation, self.info = self._env.reset(seed=self._seed)
         self._seed = None  # the first episode alone is that of the seed; the others follow from it
         self._over = False
+        self._update_physics()
         return dm_env.restart(_arrays(observation))
 
     def step(self, action: Any) -> dm_env.TimeStep:
@@ -37,6 +78,7 @@ class DmAdapter(dm_env.Environment):  # type: ignore[misc]
             return self.reset()
         observation, reward, terminated, truncated, self.info = self._env.step(np.asarray(action))
         self._over = terminated or truncated
+        self._update_physics()
         time_step = dm_env.termination if terminated else dm_env.truncation if truncated else dm_env.transition
         return time_step(float(reward), _arrays(observation))
 
@@ -48,6 +90,25 @@ class DmAdapter(dm_env.Environment):  # type: ignore[misc]
 
     def close(self) -> None:
         self._env.close()
+
+    def _update_physics(self) -> None:
+        if self._physics is not None:
+            copy_data(self._env.unwrapped.mujoco_data(), self._physics.data.ptr)  # type: ignore[attr-defined]
+
+
+@environment({SAFE_PATH: "1"})
+def _physics(data: Any) -> Any:
+    """A copy of `mujoco.MjData` and its model; GLFW, which comes along, starts a Python while it is imported."""
+    try:
+        from dm_control.mujoco import Physics
+        from dm_control.mujoco.wrapper import MjData
+    except ImportError as error:
+        if error.name is None or error.name.split(".")[0] != "dm_control":
+            raise
+        raise missing_package("physics", "dm-control", " (Python 3.11 or 3.12)") from error
+    made = Physics(MjData(copy.deepcopy(data)))
+    copy_data(data, made.data.ptr)
+    return made
 
 
 def _spec(space: spaces.Space[Any], name: str) -> Any:

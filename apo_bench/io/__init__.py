@@ -28,7 +28,7 @@ from apo_bench.io.ordinary_files import (
     write_whole,
 )
 from apo_bench.io.processes import SAFE_PATH, descendants, end_descendants, environment, flush, redirect_output
-from apo_bench.io.strict_csv import Columns, CsvRow, check_separator, read_csv, write_columns, write_csv
+from apo_bench.io.strict_csv import Columns, CsvRow, check_separator, has_parquet, read_csv, write_columns, write_csv
 from apo_bench.io.words import (
     CONTROL,
     UNSHOWN,
@@ -68,6 +68,7 @@ __all__ = (
     "flush",
     "grouped",
     "half_letter",
+    "has_parquet",
     "is_there",
     "is_whole",
     "listed_words",

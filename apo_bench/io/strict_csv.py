@@ -1,6 +1,6 @@
 """Comma-separated values read strictly: every complaint is one sentence that names the line and the column.
 
-Tables as CSV and as Parquet.
+Tables as CSV and, where the package pyarrow is installed, as Parquet.
 
 A spreadsheet shows a CSV file and does not obey it: a text that it would take for a formula has ' in front.
 """
@@ -11,11 +11,12 @@ import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
+from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NoReturn, final
 
-from apo_bench.errors import InputError, require
+from apo_bench.errors import InputError, missing_package, require
 from apo_bench.io.ordinary_files import read_text, to_write
 
 Columns = Mapping[str, tuple[str, float]]
@@ -161,20 +162,29 @@ def _number(text: str) -> bool:
     return "_" not in text
 
 
+def has_parquet() -> bool:
+    """Whether tables can be written as Parquet: pyarrow is installed."""
+    return find_spec("pyarrow") is not None
+
+
 def write_columns(
     names: Sequence[str], columns: Sequence[Sequence[Any]], path: Path, kinds: Mapping[str, str] = MappingProxyType({})
 ) -> None:
-    """Write columns; lists of a column are lists there, and a column without any value is one of numbers.
+    """Write columns as Parquet; lists of a column are lists there, and a column without any value is one of numbers.
 
     Args:
         kinds: What columns are that may have no value: text, whole, numbers or wholes, the last two of lists.
 
     Raises:
-        InputError: A link or anything else that is no regular file stands there.
+        InputError: The package pyarrow is not installed, or a link or anything else that is no regular file stands
+            there.
         OSError: The file cannot be written.
     """
-    import pyarrow as pa
-    from pyarrow import parquet
+    try:
+        import pyarrow as pa
+        from pyarrow import parquet
+    except ImportError as error:
+        raise missing_package("a Parquet table", "pyarrow") from error
 
     of_kind = {
         "text": pa.string(),

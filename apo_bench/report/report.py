@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from apo_bench.errors import InputError, require
-from apo_bench.io import check_folders, check_target, to_write, write_columns
+from apo_bench.io import check_folders, check_target, has_parquet, to_write, write_columns
 from apo_bench.records import Row, check_same_salt, one_salt, read_salt
 from apo_bench.records.run.run_file import read_run
 from apo_bench.records.run.run_folder import COLUMNS as KEPT
@@ -50,12 +50,12 @@ PNG = ("success_over_level", "success_over_tightness", "success_over_looks", "re
 FILES = ("cells", "pairs", "half_levels", "areas", "recognised", "gaps", "confusion", "felt", "times")
 """Tables that are also kept as files; those of `_IF_ANY` if there is any line."""
 _IF_ANY = ("recognised", "felt", "times")
-OURS = (*FILES, *PNG, "failure_stages", "gap_before_and_after", "prediction", "timing")
+ROWS = "rows.parquet"
+OURS = (*FILES, *PNG, Path(ROWS).stem, "failure_stages", "gap_before_and_after", "prediction", "timing")
 """Names of our tables and figures, without endings; `difference_to_..` is ours too."""
 PAGE = "report.html"
 TABLES = "tables"
 FIGURES = "figures"
-ROWS = "rows.parquet"
 
 
 class Report(NamedTuple):
@@ -66,7 +66,7 @@ class Report(NamedTuple):
     """What the sweep says, in one sentence, with methods in backquotes."""
     tables: Mapping[str, Path]
     """All, as CSV, by what they are of: `cells` are rates, `pairs`, `confusion`, ...; beside each is the same as
-    Parquet."""
+    Parquet, where the package pyarrow is installed."""
     figures: tuple[Path, ...]
     """All, as SVG, and as PNG where people put them into text."""
     cells: tuple[Cell, ...]
@@ -113,7 +113,8 @@ def report(
         for name in (TABLES, FIGURES):
             (folder / name).mkdir(exist_ok=True)
         _remove_older(folder)
-        _write_rows(rows, folder / TABLES / ROWS)
+        if has_parquet():
+            _write_rows(rows, folder / TABLES / ROWS)
         return _written(
             folder, rows, numbers, partial(draw_failures, most=pictures, draw=draw, salt=salt, trust_code=trust_code)
         )
@@ -146,15 +147,15 @@ def _written(folder: Path, rows: Sequence[Row], numbers: Summary, draw_own: Draw
         "work": work_table(workers),
     }
     wanted = [name for name in FILES if tables[name].items or name not in _IF_ANY]
-    kept = {name: tables[name].write(folder / TABLES / f"{name}.csv") for name in wanted}
-    for name in wanted:
-        tables[name].write(folder / TABLES / f"{name}.parquet")
+    written = {name: tables[name].write_all(folder / TABLES / f"{name}.csv") for name in wanted}
+    kept = {name: paths[0] for name, paths in written.items()}
     drawn = figures(numbers, grouped, gap_summaries, confused, recognised, times)
     paths = [drawing.write(folder / FIGURES / f"{name}.svg") for name, drawing in drawn.items()]
     small = [name for name in PNG if name in drawn and len(drawn[name].panels) <= MOST_PANELS]
     paths += [drawn[name].write(folder / FIGURES / f"{name}.png") for name in small]
     pictures, no_pictures = draw_own(rows, folder, scenario_files(run))
-    beside = [path for table in kept.values() for path in (table, table.with_suffix(".parquet"))]
+    beside = [path for both in written.values() for path in both]
+    rows_kept = [folder / TABLES / ROWS] if has_parquet() else []
     sentences = answer(rows, numbers)
     html = report_page(
         name=folder.resolve().name,
@@ -169,7 +170,7 @@ def _written(folder: Path, rows: Sequence[Row], numbers: Summary, draw_own: Draw
         timed=len(timing),
         pictures=pictures,
         no_pictures=no_pictures,
-        beside=[str(path.relative_to(folder)) for path in (*beside, folder / TABLES / ROWS, *paths)],
+        beside=[str(path.relative_to(folder)) for path in (*beside, *rows_kept, *paths)],
     )
     with to_write(folder / PAGE, "w") as file:
         file.write(html)

@@ -28,7 +28,7 @@ from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.film.film import write_film
 from apo_bench.simulation.film.still import FilmTrack
 from apo_bench.simulation.graphics import renderer
-from apo_bench.simulation.scene import Scene
+from apo_bench.simulation.scene import Scene, check_film
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.kept_demonstrations import KeptDemonstrations, demonstration_of
 from apo_bench.trial.outcome_columns import lost
@@ -179,12 +179,15 @@ def checked_request(request: Request) -> tuple[Scenario, TrialSettings]:
     """The scenario and the settings of a request.
 
     Raises:
-        InputError: A setting that is not allowed, two that contradict each other, or no place for demonstrations.
+        InputError: A setting that is not allowed, two that contradict each other, no place for demonstrations, or a
+            film that cannot be written.
     """
     scenario = load_scenario(request.scenario)
     settings = requested_settings(request, scenario.clearance_mm)
     if request.cache is not None:
         KeptDemonstrations(request.cache)
+    if request.video is not None:
+        check_film(request.video)
     return scenario, settings
 
 

@@ -14,8 +14,8 @@ from gymnasium.envs.registration import EnvSpec
 from pyarrow import parquet
 
 from apo_bench import InputError, TrialSettings
-from apo_bench.datasets.loaders import write_minari
 from apo_bench.datasets.making import make_dataset
+from apo_bench.datasets.minari import write_minari
 
 REPLAYED = [
     TrialSettings(name, method="contact", seed=1000000, clearance_mm=0.5) for name in ("block_on_block", "dovetail")
@@ -175,3 +175,23 @@ def test_without_h5py_one_sentence_says_what_to_install(monkeypatch: pytest.Monk
     monkeypatch.setitem(sys.modules, "h5py", None)
     with pytest.raises(InputError, match="needs the package h5py; install it with"):
         write_minari([], None, tmp_path)  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("form", ["parquet", "lerobot"])
+def test_without_pyarrow_one_sentence_says_what_to_install_before_any_trial(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, form: str
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    monkeypatch.setattr("apo_bench.datasets.making.scene_of", lambda *_: pytest.fail("a scene was built"))
+    with pytest.raises(InputError, match=f"^the format {form} needs the package pyarrow; install it with: pip install"):
+        make_dataset(REPLAYED[:1], tmp_path / "data", "by hand", form)
+    assert not (tmp_path / "data").exists()
+
+
+def test_without_pyarrow_a_minari_data_set_is_the_same(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    trials = [TrialSettings("block_on_block", fidelity="contact", seed=1)]
+    make_dataset(trials, tmp_path / "with", "by hand", "minari")
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    make_dataset(trials, tmp_path / "without", "by hand", "minari")
+    for name in ("croissant.json", "README.md", "data/metadata.json"):
+        assert (tmp_path / "with" / name).read_bytes() == (tmp_path / "without" / name).read_bytes()

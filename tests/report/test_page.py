@@ -7,6 +7,7 @@ import json
 import os
 import re
 import shlex
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -15,6 +16,9 @@ from xml.etree import ElementTree
 import pytest
 
 from apo_bench.cli.app import main
+from apo_bench.cli.terminal import print_report
+from apo_bench.errors import InputError
+from apo_bench.io import write_columns
 from apo_bench.report.report import Report, report
 from tests import pages
 from tests.browser import browser, opened, overflow
@@ -267,6 +271,22 @@ def test_tables_are_the_same_as_parquet(made: Report) -> None:
     kept = parquet.read_table(made.tables["cells"].with_name("rows.parquet"))
     assert kept.num_rows == len(rows())
     assert sum(x is True for x in kept["success"].to_pylist()) == sum(r["success"] is True for r in rows())
+
+
+def test_without_pyarrow_tables_are_csv_alone_and_it_is_said(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    both = report(write(tmp_path / "run", rows()))
+    kept = {path.name: path.read_bytes() for path in both.tables.values()}
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    made = report(tmp_path / "run")
+    assert {path.suffix for path in (tmp_path / "run" / "tables").iterdir()} == {".csv"}
+    assert {path.name: path.read_bytes() for path in made.tables.values()} == kept
+    assert ".parquet" not in made.page.read_text(encoding="utf-8")
+    print_report(made)
+    assert "as .parquet too with the package pyarrow" in " ".join(capsys.readouterr().out.split())
+    with pytest.raises(InputError, match="a Parquet table needs the package pyarrow; install it with: pip install"):
+        write_columns(["a"], [[1]], tmp_path / "a.parquet")
 
 
 def test_the_same_rows_in_another_order_make_the_same_tables_and_commands(made: Report, tmp_path: Path) -> None:

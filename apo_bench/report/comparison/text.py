@@ -157,8 +157,7 @@ def write_comparison(comparison: Comparison, folder: Path) -> Path:
         folder.mkdir(parents=True, exist_ok=True)
         check_folders([folder])
         for name, table in tables.items():
-            table.write(folder / f"{name}.csv")
-            table.write(folder / f"{name}.parquet")
+            table.write_all(folder / f"{name}.csv")
         with to_write(folder / "compare.html", "w") as file:
             file.write(html)
     except OSError as error:

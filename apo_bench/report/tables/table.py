@@ -8,7 +8,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
-from apo_bench.io import markdown, write_columns, write_csv
+from apo_bench.io import has_parquet, markdown, write_columns, write_csv
 from apo_bench.records import knows_truth
 from apo_bench.statistics import Interval, Place, Rate, cell_place, level_label, setting_of
 
@@ -81,6 +81,10 @@ class Table:
         heads = [column.head for column in self.shown]
         lines = [f"| {' | '.join(map(markdown, cells))} |" for cells in (heads, *self.lines)]
         return [lines[0], "|" + "---|" * len(heads), *lines[1:]] if self.items else [self.empty]
+
+    def write_all(self, path: Path) -> list[Path]:
+        """Write a CSV file and, where Parquet can be written, the same as Parquet."""
+        return [self.write(path), *([self.write(path.with_suffix(".parquet"))] if has_parquet() else [])]
 
     def write(self, path: Path) -> Path:
         """Write a file, by its ending as CSV, where None is an empty field, or as Parquet."""

@@ -2,7 +2,16 @@
 
 from apo_bench.simulation.scene.composing import HANDS
 from apo_bench.simulation.scene.marks import Marks, ShiftArrows, TurnRing, pixels
-from apo_bench.simulation.scene.render import arm_home, camera_view, picture, place_for_picture, save_film
+from apo_bench.simulation.scene.render import (
+    arm_home,
+    camera_view,
+    check_film,
+    copy_data,
+    data_with_arm,
+    picture,
+    place_for_picture,
+    save_film,
+)
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.scene.world import (
     WRIST_SENSORS,
@@ -33,6 +42,9 @@ __all__ = (
     "awaken",
     "build_scene",
     "camera_view",
+    "check_film",
+    "copy_data",
+    "data_with_arm",
     "has_failed",
     "initial_state",
     "is_unstable",

@@ -2,6 +2,7 @@
 
 import weakref
 from collections.abc import Callable, Iterable
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Poses
-from apo_bench.errors import InputError, require
+from apo_bench.errors import InputError, missing_package, require
 from apo_bench.geometry import Array
 from apo_bench.simulation.graphics import need_window, renderer
 from apo_bench.simulation.scene.scene import Scene
@@ -54,12 +55,23 @@ def picture_with_arm(
         state: `qpos` of a replay, which is then shown as it is; of `poses` only fixed parts are looked at.
         more: Draws more into MuJoCo's abstract scene, such as `Marks`.
     """
+    return _drawn(scene.work, data_with_arm(scene, poses, state), width, height, camera, more)
+
+
+def data_with_arm(scene: Scene, poses: Poses, state: Array | None = None) -> Any:
+    """What `picture_with_arm` shows, as `mujoco.MjData` of the scene where the robot works."""
     data = _at(scene.work, scene, poses)
     arm_home(scene, data)
     if state is not None:
         data.qpos[:] = state
     mujoco.mj_forward(scene.work.model, data)
-    return _drawn(scene.work, data, width, height, camera, more)
+    return data
+
+
+def copy_data(data: Any, into: Any) -> None:
+    """Copy `mujoco.MjData` into another one, of the same model or a copy of it, and compute all frames and forces."""
+    mujoco.mj_copyData(into, into.model, data)
+    mujoco.mj_forward(into.model, into)
 
 
 def place_for_picture(model: Any, data: Any) -> None:
@@ -141,19 +153,30 @@ class Film:
         self._close()
 
 
-def save_film(frames: Iterable[_Image], path: str | Path, fps: float) -> None:
-    """Write pictures as a film, MP4 or GIF by the ending.
+def check_film(path: Path) -> None:
+    """Refuse a film that cannot be written; a GIF needs nothing that does not come along.
 
     Raises:
-        InputError: Another ending, or a place that cannot be written.
+        InputError: An ending other than .mp4 and .gif, or an MP4 without the package imageio-ffmpeg.
     """
-    import imageio.v3 as imageio
-
-    path = Path(path)
     require(
         path.suffix.lower() in _VIDEO_ENDINGS,
         f"a film cannot be written as '{path}'; give a name that ends in .mp4 or .gif.",
     )
+    if path.suffix.lower() == ".mp4" and find_spec("imageio_ffmpeg") is None:
+        raise missing_package("an MP4 film", "imageio-ffmpeg", ", or give a name that ends in .gif.")
+
+
+def save_film(frames: Iterable[_Image], path: str | Path, fps: float) -> None:
+    """Write pictures as a film, MP4 or GIF by the ending.
+
+    Raises:
+        InputError: As of `check_film`, or a place that cannot be written.
+    """
+    import imageio.v3 as imageio
+
+    path = Path(path)
+    check_film(path)
     how: dict[str, Any] = {"duration": 1000.0 / fps, "loop": 0}
     if path.suffix.lower() == ".mp4":
         how = {"fps": fps, "macro_block_size": 8}
