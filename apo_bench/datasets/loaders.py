@@ -25,7 +25,7 @@ from apo_bench.datasets.card import FPS, About, Field, Rollout, write_card
 from apo_bench.datasets.episodes import KINDS
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
-from apo_bench.io import to_write, write_columns
+from apo_bench.io import replace_file, write_columns, write_file
 
 _PLACE = "chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _CHUNK = 1000
@@ -90,7 +90,7 @@ def write_lerobot(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple
                 chunk, file = divmod(files, _CHUNK)
                 path = out / "data" / _PLACE.format(chunk_index=chunk, file_index=file)
                 path.parent.mkdir(parents=True, exist_ok=True)
-                writer = opened.enter_context(parquet.ParquetWriter(opened.enter_context(to_write(path)), schema))
+                writer = opened.enter_context(parquet.ParquetWriter(opened.enter_context(replace_file(path)), schema))
                 files += 1
             columns = _columns(rollout, e, frames, tasks.setdefault(rollout.task, len(tasks)))
             if apart:
@@ -181,8 +181,7 @@ def _write_meta(
         },
     }
     for name, content in (("info", info), ("stats", statistics)):
-        with to_write(out / "meta" / f"{name}.json", "w") as file:
-            json.dump(content, file, indent=4)
+        write_file(out / "meta" / f"{name}.json", json.dumps(content, indent=4))
 
 
 def _write_tasks(tasks: Mapping[str, int], path: Path) -> None:
@@ -193,7 +192,7 @@ def _write_tasks(tasks: Mapping[str, int], path: Path) -> None:
     ]
     told = {"index_columns": ["task"], "column_indexes": [], "columns": columns, "pandas_version": "2.0.0"}
     table = pa.table({"task_index": pa.array([*tasks.values()], pa.int64()), "task": pa.array([*tasks], pa.string())})
-    with to_write(path) as file:
+    with replace_file(path) as file:
         parquet.write_table(table.replace_schema_metadata({"pandas": json.dumps(told)}), file)
 
 
@@ -213,6 +212,19 @@ _MINARI_OF_EPISODE = {
 }
 
 
+def load_h5py() -> Any:
+    """Import h5py.
+
+    Raises:
+        InputError: It is not installed.
+    """
+    try:
+        import h5py
+    except ImportError as error:
+        raise InputError("the format minari needs the package h5py; install it with: pip install h5py") from error
+    return h5py
+
+
 def write_minari(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple[int, int]:
     """Write episodes, and the card.
 
@@ -223,14 +235,11 @@ def write_minari(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple[
         InputError: The package h5py is not installed.
         OSError: Something cannot be written.
     """
-    try:
-        import h5py
-    except ImportError as error:
-        raise InputError("the format minari needs the package h5py; install it with: pip install h5py") from error
+    h5py = load_h5py()
     folder = out / "data"
     folder.mkdir(parents=True)
     steps = right = episodes = 0
-    with to_write(folder / "main_data.hdf5", "w+b") as file, h5py.File(file, "w", track_order=True) as data:
+    with replace_file(folder / "main_data.hdf5") as file, h5py.File(file, "w", track_order=True) as data:
         for rollout in rollouts:
             _add(data.create_group(f"episode_{episodes}"), rollout, episodes)
             episodes += 1
@@ -252,8 +261,7 @@ def write_minari(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple[
         "requirements": [f"apo_bench=={__version__}"],
         **({"env_spec": about.env_spec} if about.env_spec else {}),
     }
-    with to_write(folder / "metadata.json", "w") as told:
-        json.dump(metadata, told, indent=1)
+    write_file(folder / "metadata.json", json.dumps(metadata, indent=1))
     observations = {f"observations/{name}": field for name, field in about.fields.items()}
     where = "data/main_data.hdf5"
     tables: dict[str, dict[str, Any]] = {

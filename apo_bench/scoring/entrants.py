@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.errors import InputError, require
-from apo_bench.io import check_target, read_bytes
+from apo_bench.io import read_bytes, write_file
 from apo_bench.names import own_modules_in
 from apo_bench.scoring.score import score
 from apo_bench.scoring.track import Track
@@ -62,8 +62,7 @@ def exported(tracks: Sequence[Track], out: Path, *, quick: bool, **how: Any) -> 
         with _module(Path(made), "Export", f"Export({str(requests)!r})", b"") as name:
             score(name, tracks, Path(made) / "rows", quick=quick, **how)
         lines = [path.read_text(encoding="utf-8") for path in sorted(requests.iterdir())]
-    check_target(out)
-    out.write_text("".join(lines), encoding="utf-8")
+    write_file(out, "".join(lines))
     return len(lines)
 
 
@@ -73,8 +72,7 @@ def _module(folder: Path, made: str, call: str, content: bytes) -> Iterator[str]
     folder.mkdir(parents=True, exist_ok=True)
     called = f"entrant_{hashlib.sha256(call.encode() + content).hexdigest()[:_HEX]}"
     path = folder / f"{called}.py"
-    check_target(path)
-    path.write_text(_MODULE.format(made=made, name=_NAME, call=call), encoding="utf-8")
+    write_file(path, _MODULE.format(made=made, name=_NAME, call=call))
     with own_modules_in(str(folder.resolve())):
         yield f"{called}:{_NAME}"
 

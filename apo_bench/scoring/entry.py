@@ -10,7 +10,7 @@ import msgspec
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
-from apo_bench.io import read_bytes, to_write
+from apo_bench.io import read_bytes, write_file
 
 SCHEMA = "apo-bench/entry/1"
 _LARGEST_BYTES = 16_000_000
@@ -96,11 +96,7 @@ def write_entry(entry: Entry, path: str | Path) -> None:
     Raises:
         InputError: The file cannot be written.
     """
-    try:
-        with to_write(Path(path)) as file:
-            file.write(json.dumps(asdict(entry), indent=1, allow_nan=False).encode() + b"\n")
-    except OSError as error:
-        raise InputError(f"{path}: the file cannot be written ({error.strerror}); choose another path.") from error
+    write_file(path, json.dumps(asdict(entry), indent=1, allow_nan=False) + "\n")
 
 
 def read_entry(path: str | Path) -> Entry:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.errors import require
-from apo_bench.io import clean, default_looks, save_figure
+from apo_bench.io import check_target, clean, default_looks, save_figure, write_file
 from apo_bench.report.tables.table import Column, Table
 from apo_bench.scoring.entry import EXCLUDED, RIGHT, Entry, TrackScore, read_entry
 from apo_bench.statistics import Results, contrast, points
@@ -82,8 +82,9 @@ def write_leaderboard(folder: str | Path, out: str | Path, salts: frozenset[str]
     lines = ranked(entries, salts)
     out = Path(out)
     picture = out.with_suffix(".png")
+    check_target(out)
     _draw(lines, tracks, picture)
-    out.write_text("\n".join(_page(lines, tracks, picture.name)) + "\n", encoding="utf-8")
+    write_file(out, "\n".join(_page(lines, tracks, picture.name)) + "\n")
     return len(entries)
 
 

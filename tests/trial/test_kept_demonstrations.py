@@ -163,7 +163,9 @@ def test_what_cannot_be_kept_is_used_all_the_same(tmp_path: Path, capsys: pytest
     kept = KeptDemonstrations(tmp_path / "gone")
     kept.folder.rmdir()
     assert kept.simulated(SPEC, scene()).demonstration.code == "ok"
-    assert "the demonstration cannot be kept (No such file or directory)." in capsys.readouterr().err
+    complaint = capsys.readouterr().err
+    assert "the demonstration cannot be kept: " in complaint
+    assert "cannot be written (No such file or directory)" in complaint
 
 
 def test_what_stands_in_the_way_of_a_file_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -172,7 +174,8 @@ def test_what_stands_in_the_way_of_a_file_is_one_sentence(tmp_path: Path, capsys
     assert kept.simulated(SPEC, scene()).demonstration.code == "ok"
     complaint = capsys.readouterr().err
     assert complaint.count("\n") == 1
-    assert complaint.endswith("the demonstration is made again, and cannot be kept (Is a directory).\n")
+    assert "the demonstration is made again, and cannot be kept: " in complaint
+    assert complaint.endswith(".json is a folder, and only an ordinary file is written over; remove it.\n")
 
 
 def test_a_folder_that_is_none_is_refused(tmp_path: Path) -> None:
