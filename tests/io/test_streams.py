@@ -35,6 +35,27 @@ def test_one_sentence_and_exit_code_1(case: str, tmp_path: Path) -> None:
     assert done.stdout.count("\n") == (code == 0)
 
 
+@pytest.mark.parametrize("both", ["", "2>&1"])
+@pytest.mark.parametrize(
+    ("words", "code"),
+    [("graph stick_in_tower", 0), ("explain stick_in_tower --out drawn.png", 0), ("graph nothing", 2)],
+)
+def test_a_closed_pipe_is_no_error(words: str, code: int, both: str, tmp_path: Path) -> None:
+    command = f"(sleep 0.1; {RUN} {words} {both}; echo $? > code) | true"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert (tmp_path / "code").read_text() == f"{code}\n"
+    assert done.stderr.count("\n") == (code != 0 and not both)
+    assert "drawn.png" not in words or (tmp_path / "drawn.png").stat().st_size > 1000
+
+
+def test_results_are_written_where_nothing_can_be_printed(tmp_path: Path) -> None:
+    command = f"{RUN} explain stick_in_tower --out drawn.png > /dev/full"
+    done = subprocess.run(["bash", "-c", command], capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    assert f"standard output could not be written ({FULL}); what was not printed is lost" in done.stderr
+    assert (tmp_path / "drawn.png").stat().st_size > 1000
+
+
 def test_letters_that_the_terminal_does_not_have(tmp_path: Path) -> None:
     command = f"PYTHONIOENCODING=ascii {RUN} scenarios $'\\xff'"
     done = subprocess.run(["bash", "-c", command], capture_output=True, check=False, cwd=tmp_path)

@@ -206,7 +206,7 @@ def test_a_report_is_not_written_through_links(name: str, tmp_path: Path) -> Non
     assert list(target.iterdir()) == [] if target.is_dir() else target.read_text(encoding="utf-8") == "mine"
 
 
-@pytest.mark.parametrize("name", ["trials.jsonl", "timing.jsonl", "run.json.new", "torn.txt"])
+@pytest.mark.parametrize("name", ["trials.jsonl", "timing.jsonl", "run.json", "torn.txt"])
 def test_a_sweep_does_not_write_through_links(name: str, tmp_path: Path) -> None:
     from apo_bench.records.run.run_folder import RunFolder
 
