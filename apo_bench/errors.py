@@ -10,6 +10,10 @@ _LONGEST = 200
 """So much of a name that is not known is said again."""
 
 
+RAISED = (Exception, SystemExit)
+"""What code of a user may raise: `sys.exit` in it must not end this program, as if a result had been produced."""
+
+
 class InputError(ValueError):
     """A request or a file that cannot be honoured; its message is one clear sentence (CLI: exit code 2)."""
 
@@ -30,7 +34,7 @@ def one_line(text: str, longest: int) -> str:
     return text if text.isprintable() else ascii(text)[1:-1]
 
 
-def failed(what: str, error: Exception) -> InputError:
+def failed(what: str, error: BaseException) -> InputError:
     """`the noise model 'mine' failed: it raised RuntimeError('oops'); mend it, or use another.`, to raise from it."""
     try:
         text = " ".join(str(error).split()) if type(error) is ValueError else ""

@@ -14,7 +14,7 @@ from importlib.machinery import ModuleSpec, PathFinder
 from types import FrameType, ModuleType
 from typing import Any, final
 
-from apo_bench.errors import InputError, require, require_known, unknown
+from apo_bench.errors import RAISED, InputError, require, require_known, unknown
 
 
 @final
@@ -112,7 +112,7 @@ def resolve(given: Any, known: Mapping[str, str], kind: str) -> Any:
             f"the {kind} '{given}' cannot be imported ({error}); start in the folder of its module, "
             "or put that on PYTHONPATH."
         ) from error
-    except Exception as error:
+    except RAISED as error:
         raise InputError(f"the {kind} '{given}' cannot be imported: its module raised {error!r}.") from error
     try:
         value: Any = module

@@ -12,6 +12,7 @@ from apo_bench.cad.meshes.mesh_file import CadFile
 from apo_bench.cad.solids.naming import part_name, title_of
 from apo_bench.cad.solids.raw_solid import RawSolid, Region, SolidPlace
 from apo_bench.geometry import pose
+from apo_bench.io import write_file
 from apo_bench.parts.making import quoted
 
 _KIND_WORDS = {
@@ -179,7 +180,7 @@ def write_places(places: Iterable[tuple[str, str, SolidPlace]], folder: Path, so
         if place.color is not None:
             lines.append(f"color = {_list(np.round(place.color, 4))}")
     path = folder / "poses.toml"
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_file(path, "\n".join(lines) + "\n")
     return path
 
 

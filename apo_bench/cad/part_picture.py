@@ -7,7 +7,7 @@ import numpy as np
 
 from apo_bench.cad.solids.raw_solid import RawSolid
 from apo_bench.geometry import Array
-from apo_bench.io import default_looks
+from apo_bench.io import default_looks, save_figure
 
 _VIEWS = ((28.0, -55.0), (-28.0, 125.0))
 """Elevation and azimuth, [deg]."""
@@ -26,7 +26,7 @@ def draw_part(raw: RawSolid, refused: frozenset[str], title: str, path: Path) ->
         axes.view_init(elevation, azimuth)
         e, a = np.radians([elevation, azimuth])
         _draw(axes, raw, refused, np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]))
-    figure.savefig(path, dpi=100)
+    save_figure(figure, path)
 
 
 def _draw(axes: Any, raw: RawSolid, refused: frozenset[str], eye: Array) -> None:

@@ -59,12 +59,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MemoryError:
         return _complain("there is not enough memory.", NO_RESULT)
     except OSError as error:
-        return _complain(processes.give_up(error), NO_RESULT)
+        return _complain(processes.unexpected(error), NO_RESULT)
     except SystemExit as error:
-        # what the command line library makes of an output that nobody reads
+        # what the command line library makes of a pipe that nobody reads
         if not isinstance(error.__context__, OSError):
             raise
-        return _complain(processes.give_up(error.__context__), NO_RESULT)
+        return _complain(processes.unexpected(error.__context__), NO_RESULT)
     except Exception as error:
         if not hasattr(error, "format_message"):
             raise

@@ -7,10 +7,10 @@ import typer
 
 from apo_bench.assembly import Correction, Observation, Plan
 from apo_bench.cli.printing import print_json, print_lines, print_tables, say
-from apo_bench.cli.setting_options import NO_RESULT, AsJson, ScenarioArgument, check_outputs, writing
+from apo_bench.cli.setting_options import NO_RESULT, AsJson, ScenarioArgument, check_outputs
 from apo_bench.errors import require
 from apo_bench.files.observation import as_planned, read_observation_file
-from apo_bench.io import redirect_output
+from apo_bench.io import redirect_output, write_file
 from apo_bench.records import CORRECTOR, with_simulated
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
@@ -64,6 +64,10 @@ def explain_command(
         where = f"at the corrected goals of {observation}"
         where += f", {_stated(deviation_mm, deviation_deg)} where it states none" * assumed
     explanation = explain(seen, at)
+    if out is not None:
+        from apo_bench.show.explain_picture import draw_explanation
+
+        draw_explanation(loaded, seen, explanation, out)
     if as_json:
         known = {"promised": promised, "hypotheses": hypothesis_forms(explanation.hypotheses)}
         print_json(explanation_form(loaded.name, explanation) | known)
@@ -73,9 +77,6 @@ def explain_command(
         typer.echo("\n".join([f"{loaded.name}: {total(explanation)}", where, *said, "", *sentences(explanation)]))
         print_tables(*explanation_tables(explanation))
     if out is not None:
-        from apo_bench.show.explain_picture import draw_explanation
-
-        draw_explanation(loaded, seen, explanation, out)
         say(f"\nWrote {out}", as_json)
 
 
@@ -128,6 +129,8 @@ def correct_command(
     explanation = _explained(seen, correction)
     plan, moved = _planned(loaded, seen, correction) if correction.ok else (None, "")
     promised = None if plan is None else _promised(plan, seen, correction, loaded)
+    if out is not None and plan is not None:
+        _write_plan(out, scenario, loaded.name, plan)
     if as_json:
         form = correction_form(loaded.name, method, seen, correction, explanation, assumed)
         print_json(form | {"moved": (out is not None and moved) or None, "promised": promised})
@@ -147,8 +150,7 @@ def correct_command(
         if out is not None:
             typer.echo(f"apo-bench: nothing was corrected, so {out} was not written.", err=True)
         raise typer.Exit(NO_RESULT)
-    if out is not None and plan is not None:
-        _write_plan(out, scenario, loaded.name, plan)
+    if out is not None:
         say(f"Wrote {out}{moved and f': {moved}'}", as_json)
 
 
@@ -208,8 +210,7 @@ def _write_plan(out: Path, scenario: str, name: str, plan: Plan) -> None:
     if out.suffix.lower() == ".json":
         write_form(plan_form(plan, name if scenario == name else str(Path(scenario).resolve())), out)
         return
-    with writing(f"--out {out}"):
-        out.write_text(table(plan.assembly, plan.goals), encoding="utf-8")
+    write_file(out, table(plan.assembly, plan.goals))
 
 
 def _stated(deviation_mm: float, deviation_deg: float) -> str:

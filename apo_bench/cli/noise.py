@@ -6,8 +6,9 @@ from typing import Annotated, Any
 import typer
 
 from apo_bench.cli.printing import group, print_answer, say
-from apo_bench.cli.setting_options import NO_RESULT, AsJson, check_outputs, writing
+from apo_bench.cli.setting_options import NO_RESULT, AsJson, check_outputs
 from apo_bench.errors import require
+from apo_bench.io import write_file
 from apo_bench.records import check
 
 _HELP = "Noise models: list, cards, fits to measured poses, noise learned from observations."
@@ -47,14 +48,15 @@ def print_noise_card(
     check("level_mm", level, called="level")
     check_outputs([(out, "--out", (".png",))])
     drawn = draw_errors(name, Level(level, level))
+    seen = len(drawn.errors) > 0
+    if out is not None and seen:
+        draw_histogram(drawn, out)
     typer.echo(noise_card(name, Level(level, level), drawn), nl=False)
     if out is None:
         return
-    if not len(drawn.errors):
+    if not seen:
         typer.echo(f"apo-bench: nothing was seen, so {out} was not written.", err=True)
         raise typer.Exit(NO_RESULT)
-    with writing(f"--out {out}"):
-        draw_histogram(drawn, out)
     typer.echo(f"\nWrote {out}")
 
 
@@ -86,12 +88,11 @@ def noise_fit(
     matched = match_residuals(seen, read_truth(truth, seen, scene_id))
     measured = fit.fit_noise(matched, _printable(source or f"{estimates.name} against {truth.name}"))
     goodness = fit.goodness_of_fit(matched, measured)
-    print_answer(fit_form(matched, measured, goodness), fit_lines(matched, measured, goodness), as_json)
     command = f"apo-bench noise fit --estimates {estimates.name} --truth {truth.name}"
     _write_fit(matched, measured, (out, picture), (_printable(command), *fit_notes(matched, measured, goodness)))
     if residuals is not None:
-        with writing():
-            residuals.write_text(residuals_text(matched), encoding="utf-8")
+        write_file(residuals, residuals_text(matched))
+    print_answer(fit_form(matched, measured, goodness), fit_lines(matched, measured, goodness), as_json)
     for path in (out, residuals, picture):
         if path is not None and not as_json:
             typer.echo(f"Wrote {path}")
@@ -116,10 +117,10 @@ def noise_still(
     stated = read_camera(camera)
     scatter = still_residuals(read_log(log, form, stated.conventions))
     measured = fit.fit_noise(scatter, _printable(f"parts at rest in {log.name}"))
-    typer.echo("\n".join(fit_lines(scatter, measured, fit.goodness_of_fit(scatter, measured))))
-    typer.echo("\nAn error that stays while a part rests is not in these numbers: no log of still parts can show it.")
     notes = (_printable(f"apo-bench noise still {log.name} --format {form}"), "without errors that stay")
     _write_fit(scatter, measured, (out, picture), notes, stated.T_world_camera)
+    typer.echo("\n".join(fit_lines(scatter, measured, fit.goodness_of_fit(scatter, measured))))
+    typer.echo("\nAn error that stays while a part rests is not in these numbers: no log of still parts can show it.")
     for path in (out, picture):
         if path is not None:
             typer.echo(f"Wrote {path}")
@@ -148,12 +149,11 @@ def noise_learn(
     check_outputs([(out, "--out", (".toml",))])
     named = _printable(source or f"{len(files)} observations of {', '.join(str(path) for path in observations)}")
     learned = learn([read_json_observation(path) for path in files], Camera(), named, constant=constant)
+    if out is not None:
+        write_file(out, noise_text(learned.measured))
     print_answer(learned_form(learned), learned_lines(learned), as_json)
-    if out is None:
-        return
-    with writing(f"--out {out}"):
-        out.write_text(noise_text(learned.measured), encoding="utf-8")
-    say(f"Wrote {out}", as_json)
+    if out is not None:
+        say(f"Wrote {out}", as_json)
 
 
 def _write_fit(
@@ -164,11 +164,10 @@ def _write_fit(
     from apo_bench.show.fit_text import draw_fit
 
     out, picture = files
-    with writing():
-        if out is not None:
-            out.write_text(noise_text(measured, notes, *camera), encoding="utf-8")
-        if picture is not None:
-            draw_fit(residuals, measured, picture)
+    if out is not None:
+        write_file(out, noise_text(measured, notes, *camera))
+    if picture is not None:
+        draw_fit(residuals, measured, picture)
 
 
 def _observation_files(paths: list[Path]) -> list[Path]:

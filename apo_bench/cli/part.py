@@ -15,7 +15,7 @@ import typer
 from apo_bench.cli.printing import group, print_json, say
 from apo_bench.cli.setting_options import AsJson, check_outputs, path_given, writing
 from apo_bench.errors import InputError, require
-from apo_bench.io import read_text
+from apo_bench.io import check_target, read_text, write_file
 from apo_bench.parts.allowed import LARGEST_PART_BYTES
 from apo_bench.scenario.file import load_scenario
 
@@ -88,6 +88,9 @@ def _written(
     for raw in raws:
         called = part_name(raw.name, used | _of_others(out, title_of(raw.name)))
         used.add(called)
+        picture = out / f"{called}.png"
+        for path in (picture, *(out / f"{called}{ending}" for ending in (".xml", ".toml", ".drawn.npz"))):
+            check_target(path)
         try:
             each = import_part(raw, called, out, file.name, density)
         except InputError as error:
@@ -97,10 +100,8 @@ def _written(
             say(f"{called}: NO PART", as_json)
             continue
         imported.append(each)
-        say("\n".join(import_lines(each)), as_json)
-        picture = each.path.with_suffix(".png")
         draw_part(raw, frozenset(each.refused), called, picture)
-        say(f"Wrote {each.path} and {picture}", as_json)
+        say("\n".join([*import_lines(each), f"Wrote {each.path} and {picture}"]), as_json)
     return imported, left_out
 
 
@@ -166,9 +167,7 @@ def arm_check(
     check_outputs([(out, "--out", (".png",))])
     loaded = load_scenario(scenario)
     robot = find_arm(name)
-    typer.echo(f"{name} at the table of {loaded.name}:")
-    for line in check_lines(check_arm(robot, loaded, layouts)):
-        typer.echo(f"  {line}")
+    checked = check_arm(robot, loaded, layouts)
     if out is not None:
         import imageio.v3 as imageio
 
@@ -176,5 +175,10 @@ def arm_check(
         from apo_bench.simulation.scene.scene import build_scene
 
         scene = build_scene(loaded, arm=robot, grasp="weld")
-        imageio.imwrite(out, picture_with_arm(scene, loaded.start, None, *_SIZE, camera_view(*_WHOLE_TABLE)))
+        image = picture_with_arm(scene, loaded.start, None, *_SIZE, camera_view(*_WHOLE_TABLE))
+        write_file(out, imageio.imwrite("<bytes>", image, extension=".png"))
+    typer.echo(f"{name} at the table of {loaded.name}:")
+    for line in check_lines(checked):
+        typer.echo(f"  {line}")
+    if out is not None:
         typer.echo(f"Wrote {out}")

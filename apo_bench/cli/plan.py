@@ -19,14 +19,13 @@ from apo_bench.cli.setting_options import (
     check_outputs,
     takes,
     trial_options,
-    writing,
 )
 from apo_bench.errors import require
 from apo_bench.files.csv_form import assumed_deviations
 from apo_bench.files.json_forms import RobotFrames, read_robot_frames
 from apo_bench.files.observation import read_observation, read_observation_file
 from apo_bench.geometry import Array, pose
-from apo_bench.io import redirect_output
+from apo_bench.io import redirect_output, write_file
 from apo_bench.records import CORRECTOR, SETTINGS, check, in_python
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
@@ -49,12 +48,12 @@ def graph_command(
     seen = None if observation is None else read_observation(observation, loaded)
     residuals = None if seen is None else observed_residuals(seen, graph)
     gap_m = loaded.gap_mm * 1e-3 if seen is None else seen.gap_m
+    if out is not None:
+        title = graph_title(loaded.name, graph)
+        draw_graph(graph, out, title=title, residuals=residuals, gap_m=gap_m, colors=loaded.colors)
     lines = graph_lines(loaded.name, graph, residuals, gap_m)
     print_answer(graph_form(loaded.name, graph, residuals), lines, as_json)
     if out is not None:
-        title = graph_title(loaded.name, graph)
-        with writing(f"--out {out}"):
-            draw_graph(graph, out, title=title, residuals=residuals, gap_m=gap_m, colors=loaded.colors)
         say(f"\nWrote {out}", as_json)
 
 
@@ -70,7 +69,7 @@ def scene_command(
         check(name, value)
     loaded = load_scenario(scenario)
     check_outputs([(out, "--out", (".xml",))])
-    out.write_text(scene_xml(loaded, **settings), encoding="utf-8")
+    write_file(out, scene_xml(loaded, **settings))
     typer.echo(f"Wrote {out}; open it with: python -m mujoco.viewer --mjcf={out}")
 
 

@@ -21,11 +21,10 @@ from apo_bench.cli.setting_options import (
     takes,
     trial_options,
     whole_numbers,
-    writing,
 )
 from apo_bench.errors import InputError, require, require_known
 from apo_bench.files.csv_form import assumed_deviations
-from apo_bench.io import redirect_output
+from apo_bench.io import redirect_output, write_csv, write_file
 from apo_bench.records import RECOGNISED
 from apo_bench.scenario.file import load_scenario
 
@@ -74,7 +73,6 @@ def recording_import(
 def _import(
     log: Any, objects: Any, camera: Any, tracks: Any, scenario: str, order: tuple[str | None, str | None], files: Any
 ) -> None:
-    from apo_bench.io.strict_csv import write_csv
     from apo_bench.recording.importing import import_recording
     from apo_bench.recording.show.drawing import draw_recording, drawing_of, unfit_drawing
     from apo_bench.recording.show.text import PATH_HEAD, imported_lines, path_rows
@@ -91,8 +89,6 @@ def _import(
         raise
     mains = [operation.main for operation in loaded.assembly.operations]
     rests = [operation.rest for operation in imported.operations]
-    _print_rests(imported.camera, mains, rests, tracks, [""])
-    print_lines(imported_lines(imported))
     if out.suffix.lower() == ".json":
         from apo_bench.files.json_forms import observation_form, write_form
 
@@ -100,13 +96,13 @@ def _import(
         write_form(observation_form(imported.observation, name), out)
     else:
         _write_table(out, mains, rests, imported.observation.goals, camera)
-    typer.echo(f"\nWrote {out}")
     if paths is not None:
         write_csv(paths, PATH_HEAD, path_rows(imported))
-        typer.echo(f"Wrote {paths}")
     if picture is not None:
         draw_recording(drawing_of(imported, log, tracks, camera), picture)
-        typer.echo(f"Wrote {picture}")
+    _print_rests(imported.camera, mains, rests, tracks, [""])
+    print_lines(imported_lines(imported))
+    _print_written(out, paths, picture)
 
 
 def _import_unplanned(log: Any, objects: Any, camera: Any, tracks: Any, out: Path, picture: Path | None) -> None:
@@ -117,12 +113,11 @@ def _import_unplanned(log: Any, objects: Any, camera: Any, tracks: Any, out: Pat
     recording = unplanned_recording(tracks, camera, log.file)
     parts = [put.part for put in recording.puts]
     rests = [put.rest for put in recording.puts]
-    _print_rests(recording.camera, parts, rests, tracks, put_lines(recording))
     _write_table(out, parts, rests, goals_of(recording), camera)
-    typer.echo(f"\nWrote {out}")
     if picture is not None:
         draw_recording(unplanned_drawing(recording, log, tracks), picture)
-        typer.echo(f"Wrote {picture}")
+    _print_rests(recording.camera, parts, rests, tracks, put_lines(recording))
+    _print_written(out, picture)
 
 
 def _stated(ends: str | None, unseen: str | None, operations: int) -> Any:
@@ -147,14 +142,17 @@ def _print_rests(camera: Any, parts: list[str], rests: list[Any], tracks: Any, f
     typer.echo("\n" + "\n".join([*lines, *further]))
 
 
+def _print_written(*paths: Path | None) -> None:
+    typer.echo("\n" + "\n".join(f"Wrote {path}" for path in paths if path is not None))
+
+
 def _write_table(path: Path, parts: list[str], rests: list[Any], goals: Any, camera: Any) -> None:
     """Write goals as CSV; an operation that the log does not show has no rest."""
     from apo_bench.recording.importing import deviations
     from apo_bench.recording.show.text import observation_table
 
     sizes = [(1.0, 1.0) if rest is None else deviations(rest, camera) for rest in rests]
-    with writing(f"--out {path}"):
-        path.write_text(observation_table(parts, goals, sizes, [rest is not None for rest in rests]), encoding="utf-8")
+    write_file(path, observation_table(parts, goals, sizes, [rest is not None for rest in rests]))
 
 
 def eye_command(
@@ -173,11 +171,12 @@ def eye_command(
     drawn_view = checked_view(view)
     sensor_run = run_sensor(scenario, level, seed, careless)
     form = sensor_form(sensor_run, level, seed, careless)
-    print_answer(form, sensor_lines(form), as_json)
     if out is not None:
         from apo_bench.show.sensor import draw_sensor
 
         draw_sensor(sensor_run, out, drawn_view)
+    print_answer(form, sensor_lines(form), as_json)
+    if out is not None:
         say(f"\nWrote {out}", as_json)
     if not all(operation["found"] for operation in form["operations"]):
         raise typer.Exit(NO_RESULT)

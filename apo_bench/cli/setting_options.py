@@ -88,7 +88,9 @@ def check_writable(path: Path, option: str, endings: tuple[str, ...]) -> None:
         check_target(path)
     folder = path.parent
     require(
-        not path.is_dir() and folder.is_dir() and os.access(path if path.exists() else folder, os.W_OK),
+        not path.is_dir()
+        and folder.is_dir()
+        and all(os.access(each, os.W_OK) for each in (folder, path) if each.exists()),
         f"{option} {path} cannot be written; name a file in a folder that exists and can be written.",
     )
 
@@ -100,7 +102,7 @@ def writing(target: str = "") -> Iterator[None]:
         yield
     except OSError as error:
         raise InputError(
-            f"{target or error.filename} cannot be written ({error.strerror}); choose another place."
+            f"{target or error.filename or 'a file'} cannot be written ({error.strerror}); choose another place."
         ) from error
 
 

@@ -197,8 +197,10 @@ def dataset_make(
     several = [requested_settings(each, load_scenario(each.scenario).clearance_mm) for each in asked]
     trials = [replace(each, seed=each.seed + k) for each in several for k in range(episodes)]
     led = (policy or "expert") if record == "insertions" else None
-    with writing():
-        made, right = make_dataset(
-            trials, out, shlex.join(["apo-bench", *sys.argv[1:]]), format, led, partial(typer.echo, err=True)
-        )
+    command = shlex.join(["apo-bench", *sys.argv[1:]])
+    try:
+        with writing():
+            made, right = make_dataset(trials, out, command, format, led, partial(typer.echo, err=True))
+    except KeyboardInterrupt as error:
+        raise interrupted(error) from error
     typer.echo(f"{made} trials, {right} right; the card is {out / 'README.md'}")

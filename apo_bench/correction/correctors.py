@@ -16,7 +16,7 @@ from apo_bench.correction.checks.correction_checks import RIGID, check_correctio
 from apo_bench.correction.checks.status import gap_of, goals_as_given, opposing
 from apo_bench.correction.contact.contact import ContactCorrector
 from apo_bench.correction.robust.robust import RobustCorrector, contact_robust
-from apo_bench.errors import InputError, failed, kind, require
+from apo_bench.errors import RAISED, InputError, failed, kind, require
 from apo_bench.geometry import Array, NotReal, is_rigid, real
 from apo_bench.names import resolve
 from apo_bench.records import CORRECTOR, CORRECTORS
@@ -68,7 +68,7 @@ def correct(observation: Observation, corrector: Any = CORRECTOR, look: Look | N
         if ours or isinstance(error, CorrectorMisbehaved):
             raise
         raise CorrectorMisbehaved(str(error)) from error
-    except Exception as error:
+    except RAISED as error:
         raise CorrectorMisbehaved(str(failed(f"the corrector '{name}'", error))) from error
 
 

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, final
 
 from apo_bench import __version__
 from apo_bench.geometry import Array
-from apo_bench.io import to_write
+from apo_bench.io import write_file
 
 FPS = 20
 """Frames, and actions, a second of simulated time."""
@@ -105,11 +105,10 @@ def write_card(about: About, out: Path, counted: tuple[int, int], tables: Mappin
         lines += [f"| `{name}` | {' | '.join(_cells(column))} |" for name, column in columns.items()]
         several = {name: c.names for name, c in columns.items() if isinstance(c, Field) and len(c.names) > 1}
         lines += ["", *(f"Numbers of `{name}`: {', '.join(names)}." for name, names in several.items())]
-    files = sorted(path for path in out.rglob("*") if path.is_file())
-    with to_write(out / "README.md", "w") as card:
-        card.write("\n".join(lines) + "\n")
-    with to_write(out / "croissant.json", "w") as croissant:
-        json.dump(_croissant(about, out, files, f"{summary}. {about.summary}", tables), croissant, indent=1)
+    files = sorted(path for path in out.rglob("*") if path.suffix in _TYPES)
+    write_file(out / "README.md", "\n".join(lines) + "\n")
+    croissant = _croissant(about, out, files, f"{summary}. {about.summary}", tables)
+    write_file(out / "croissant.json", json.dumps(croissant, indent=1))
 
 
 def _cells(column: Field | str) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ from pyarrow import parquet
 from apo_bench.datasets.card import FPS, About, Field, Rollout, write_card
 from apo_bench.datasets.episodes import KINDS
 from apo_bench.geometry import Array
-from apo_bench.io import to_write, write_columns
+from apo_bench.io import replace_file, write_columns, write_file
 
 _PLACE = "chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 _CHUNK = 1000
@@ -85,7 +85,7 @@ def write_lerobot(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple
                 chunk, file = divmod(files, _CHUNK)
                 path = out / "data" / _PLACE.format(chunk_index=chunk, file_index=file)
                 path.parent.mkdir(parents=True, exist_ok=True)
-                writer = opened.enter_context(parquet.ParquetWriter(opened.enter_context(to_write(path)), schema))
+                writer = opened.enter_context(parquet.ParquetWriter(opened.enter_context(replace_file(path)), schema))
                 files += 1
             columns = _columns(rollout, e, frames, tasks.setdefault(rollout.task, len(tasks)))
             if apart:
@@ -176,8 +176,7 @@ def _write_meta(
         },
     }
     for name, content in (("info", info), ("stats", statistics)):
-        with to_write(out / "meta" / f"{name}.json", "w") as file:
-            json.dump(content, file, indent=4)
+        write_file(out / "meta" / f"{name}.json", json.dumps(content, indent=4))
 
 
 def _write_tasks(tasks: Mapping[str, int], path: Path) -> None:
@@ -188,5 +187,5 @@ def _write_tasks(tasks: Mapping[str, int], path: Path) -> None:
     ]
     told = {"index_columns": ["task"], "column_indexes": [], "columns": columns, "pandas_version": "2.0.0"}
     table = pa.table({"task_index": pa.array([*tasks.values()], pa.int64()), "task": pa.array([*tasks], pa.string())})
-    with to_write(path) as file:
+    with replace_file(path) as file:
         parquet.write_table(table.replace_schema_metadata({"pandas": json.dumps(told)}), file)

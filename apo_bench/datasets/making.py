@@ -6,6 +6,7 @@ Insertions as data: what a policy saw and did in `APOInsert-v0`, and what the ju
 import shutil
 import traceback
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -14,13 +15,13 @@ import numpy as np
 
 from apo_bench.datasets.card import About, Field, Rollout
 from apo_bench.datasets.episodes import about_replays, replay_rollouts, replays, write_parquet
-from apo_bench.datasets.minari import write_minari
+from apo_bench.datasets.minari import load_h5py, write_minari
 from apo_bench.envs.policies import POLICIES, insert_env
-from apo_bench.errors import InputError, missing_package, require, require_known
-from apo_bench.geometry import Array
-from apo_bench.io import has_parquet
+from apo_bench.errors import RAISED, InputError, missing_package, require, require_known
+from apo_bench.io import has_parquet, write_file
 from apo_bench.names import resolve
 from apo_bench.records import TrialSettings
+from apo_bench.sweeps.work.environment_lock import Check, listening
 from apo_bench.trial.stages import scene_of
 
 _FRAME = "way in"
@@ -111,11 +112,14 @@ def _rollouts(trials: Iterable[TrialSettings], policy: str, act: Any, say: Calla
             say(str(error))
             continue
         scenario, k = env.scene.scenario, env.operation
-        decide = act() if isinstance(act, type) else act
+        with _policy(policy):
+            decide = act() if isinstance(act, type) else act
         sights, actions, rewards = [seen], [], []
         over = False
         while not over:
-            actions.append(np.clip(_decided(decide, policy, env, seen), -1.0, 1.0).astype(np.float32))
+            with _policy(policy):
+                action = np.asarray(decide(env, seen), dtype=np.float64)
+            actions.append(np.clip(action, -1.0, 1.0).astype(np.float32))
             seen, reward, over, _, info = env.step(actions[-1])
             sights.append(seen)
             rewards.append(reward)
@@ -130,11 +134,12 @@ def _rollouts(trials: Iterable[TrialSettings], policy: str, act: Any, say: Calla
         )
 
 
-def _decided(decide: Callable[[Any, Any], Any], policy: str, env: Any, seen: Any) -> Array:
-    """What a policy, which may be somebody's own, does."""
+@contextmanager
+def _policy(policy: str) -> Iterator[None]:
+    """Name a policy, which may be the user's, and its line in what it raises."""
     try:
-        return np.asarray(decide(env, seen), dtype=np.float64)
-    except Exception as error:
+        yield
+    except RAISED as error:
         last = traceback.extract_tb(error.__traceback__)[-1]
         what = f"{type(error).__name__}: {error}".rstrip(": ")
         raise InputError(f"the policy '{policy}' raised {what} ({last.filename}, line {last.lineno}).") from error
@@ -153,7 +158,9 @@ def make_dataset(
 ) -> tuple[int, int]:
     """Run trials and write them, with a card `README.md` and `croissant.json`.
 
-    The same trials give the same bytes on one machine. An interrupt, or a policy that raises, ends the data set early.
+    The same trials give the same bytes on one machine. A signal (Ctrl-C, SIGTERM) or a policy that raises ends the data
+    set early: after the trial that runs, with the episodes that were made. A second signal, or a full disk, ends it at
+    once, and the file `UNFINISHED` stays in the folder.
 
     Args:
         trials: At least one.
@@ -168,7 +175,7 @@ def make_dataset(
 
     Raises:
         InputError: The folder holds something, a trial cannot be run, none makes an episode, or a package is missing.
-        OSError: Something cannot be written.
+        KeyboardInterrupt: A signal asked for an end.
     """
     require_known("format", form, FORMATS)
     require(
@@ -179,21 +186,26 @@ def make_dataset(
         form != "parquet" or policy is None,
         "insertions were asked for as parquet; give the format lerobot, whose tables are Parquet files, or minari.",
     )
-    if form != "minari" and not has_parquet():
+    if form == "minari":
+        load_h5py()
+    elif not has_parquet():
         raise missing_package(f"the format {form}", "pyarrow")
     existed = out.exists()
     ends: list[BaseException] = []
+    found: Iterator[Any]
     if policy is not None:
-        about, rollouts = insertions(trials, policy, command, say)
-        counted = _write_rollouts(form, _to_the_end(rollouts, ends), about, out)
+        about, found = insertions(trials, policy, command, say)
     else:
         scenes = {each.scenario: scene_of(each) for each in trials}
         about = about_replays([*scenes.values()], command, trials[0].arm)
-        found = _to_the_end(replays(trials, scenes), ends)
+        found = replays(trials, scenes)
+    with listening() as check, _unfinished(out):
+        found = _to_the_end(found, ends, check)
         if form == "parquet":
             counted = write_parquet(found, about, out)
         else:
-            counted = _write_rollouts(form, replay_rollouts(found, about, say), about, out)
+            rollouts = found if policy is not None else replay_rollouts(found, about, say)
+            counted = _write_rollouts(form, rollouts, about, out)
     if not counted[0]:
         for each in out.iterdir() if out.is_dir() else ():
             shutil.rmtree(each) if each.is_dir() else each.unlink()
@@ -215,9 +227,21 @@ def _write_rollouts(form: str, rollouts: Iterable[Rollout], about: About, out: P
     return write_lerobot(rollouts, about, out)
 
 
-def _to_the_end(found: Iterable[Any], ends: list[BaseException]) -> Iterator[Any]:
+@contextmanager
+def _unfinished(out: Path) -> Iterator[None]:
+    """Until the block has ended well, a file in the folder says that the data set is not finished."""
+    out.mkdir(parents=True, exist_ok=True)
+    mark = out / "UNFINISHED"
+    write_file(mark, "This data set is not finished: `apo-bench dataset make` still runs, or was ended.\n")
+    yield
+    mark.unlink()
+
+
+def _to_the_end(found: Iterable[Any], ends: list[BaseException], check: Check) -> Iterator[Any]:
     """What is found until something ends it, which is added to the list: the data set is finished first."""
     try:
-        yield from found
+        for each in found:
+            yield each
+            check()
     except (InputError, KeyboardInterrupt) as error:
         ends.append(error)

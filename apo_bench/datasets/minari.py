@@ -14,7 +14,7 @@ import numpy as np
 from apo_bench import __version__
 from apo_bench.datasets.card import About, Field, Rollout, write_card
 from apo_bench.errors import missing_package
-from apo_bench.io import to_write
+from apo_bench.io import replace_file, write_file
 
 _OWN = {
     "rewards": "reward of each action",
@@ -30,6 +30,19 @@ _OF_EPISODE = {
 }
 
 
+def load_h5py() -> Any:
+    """Import h5py.
+
+    Raises:
+        InputError: It is not installed.
+    """
+    try:
+        import h5py
+    except ImportError as error:
+        raise missing_package("the format minari", "h5py") from error
+    return h5py
+
+
 def write_minari(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple[int, int]:
     """Write episodes, and the card.
 
@@ -40,14 +53,11 @@ def write_minari(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple[
         InputError: The package h5py is not installed.
         OSError: Something cannot be written.
     """
-    try:
-        import h5py
-    except ImportError as error:
-        raise missing_package("the format minari", "h5py") from error
+    h5py = load_h5py()
     folder = out / "data"
     folder.mkdir(parents=True)
     steps = right = episodes = 0
-    with to_write(folder / "main_data.hdf5", "w+b") as file, h5py.File(file, "w", track_order=True) as data:
+    with replace_file(folder / "main_data.hdf5") as file, h5py.File(file, "w", track_order=True) as data:
         for rollout in rollouts:
             _add(data.create_group(f"episode_{episodes}"), rollout, episodes)
             episodes += 1
@@ -69,8 +79,7 @@ def write_minari(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple[
         "requirements": [f"apo_bench=={__version__}"],
         **({"env_spec": about.env_spec} if about.env_spec else {}),
     }
-    with to_write(folder / "metadata.json", "w") as told:
-        json.dump(metadata, told, indent=1)
+    write_file(folder / "metadata.json", json.dumps(metadata, indent=1))
     observations = {f"observations/{name}": field for name, field in about.fields.items()}
     where = "data/main_data.hdf5"
     tables: dict[str, dict[str, Any]] = {

@@ -13,7 +13,7 @@ from apo_bench.drafting.nests import nest_xml
 from apo_bench.drafting.ordering import Placing
 from apo_bench.drafting.posed import TABLE, PosedPart
 from apo_bench.geometry import Array, Solid, pose
-from apo_bench.io import clean
+from apo_bench.io import clean, write_file
 from apo_bench.parts import part_names, part_path
 from apo_bench.records import Thresholds
 from apo_bench.scenario.scenario import Grasp
@@ -36,9 +36,9 @@ THRESHOLDS = {
 
 def write_scenario(draft: Draft, path: Path, title: str, source: str) -> None:
     """Write the file, and beside it the part files of nests."""
-    path.write_text(scenario_text(draft, title, source, path), encoding="utf-8")
     for nest in draft.nests.values():
-        _nest_file(path, nest).write_text(nest_xml(nest), encoding="utf-8")
+        write_file(_nest_file(path, nest), nest_xml(nest))
+    write_file(path, scenario_text(draft, title, source, path))
 
 
 def _nest_file(path: Path, nest: Solid) -> Path:

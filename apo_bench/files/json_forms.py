@@ -16,9 +16,8 @@ from typing import Any, Literal, cast, final
 import numpy as np
 
 from apo_bench.assembly import Assembly, Observation, OutlierModel, Plan, Poses, SharedError, Step, Tails
-from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
-from apo_bench.io import read_toml
+from apo_bench.io import read_toml, write_file
 from apo_bench.scenario.contacts import read_any_pose
 
 OBSERVATION_SCHEMA = "apo-bench/observation/2"
@@ -77,11 +76,7 @@ def write_form(form: Form, path: str | Path) -> None:
     Raises:
         InputError: The file cannot be written.
     """
-    text = json.dumps(form, indent=2, ensure_ascii=False, allow_nan=False) + "\n"
-    try:
-        Path(path).write_text(text, encoding="utf-8")
-    except OSError as error:
-        raise InputError(f"{path}: the file cannot be written ({error.strerror}); choose another path.") from error
+    write_file(path, json.dumps(form, indent=2, ensure_ascii=False, allow_nan=False) + "\n")
 
 
 def _head(schema: str, scenario: str, start: Poses) -> Form:

@@ -19,6 +19,7 @@ from apo_bench.generated.assembled import BOARD, Assembled, Station, Table, lay,
 from apo_bench.generated.bodies import TOP
 from apo_bench.generated.linked import bridged, castled, grooved, keyed, pinned, threaded
 from apo_bench.generated.stations import carried, corner, covered, peg, post
+from apo_bench.io import write_file
 from apo_bench.parts.making import Body, extrude, join, rectangle, write_part
 
 _GAP = 10.0
@@ -148,7 +149,7 @@ def write(made: Assembled, table: Table, folder: Path, name: str) -> Path:
                 part, made.parts[part], folder, density=_DENSITY, friction=_FRICTION, source=_SOURCE, licence=_LICENCE
             )
     path = folder / f"{name}.toml"
-    path.write_text("\n".join(_lines(made, table, files)) + "\n", encoding="utf-8")
+    write_file(path, "\n".join(_lines(made, table, files)) + "\n")
     return path
 
 

@@ -14,20 +14,17 @@ from apo_bench.io.documents import (
 )
 from apo_bench.io.figures import default_looks, load_matplotlib, save_figure
 from apo_bench.io.named_files import named_files
-from apo_bench.io.ordinary_files import (
+from apo_bench.io.ordinary_files import decoded, each_line, opened, read_bytes, read_text
+from apo_bench.io.processes import SAFE_PATH, descendants, end_descendants, environment, flush, redirect_output
+from apo_bench.io.result_files import (
     check_folders,
     check_target,
-    decoded,
-    each_line,
     is_there,
-    opened,
+    open_to_append,
     put_back,
-    read_bytes,
-    read_text,
-    to_write,
-    write_whole,
+    replace_file,
+    write_file,
 )
-from apo_bench.io.processes import SAFE_PATH, descendants, end_descendants, environment, flush, redirect_output
 from apo_bench.io.strict_csv import Columns, CsvRow, check_separator, has_parquet, read_csv, write_columns, write_csv
 from apo_bench.io.words import (
     CONTROL,
@@ -75,6 +72,7 @@ __all__ = (
     "load_matplotlib",
     "markdown",
     "named_files",
+    "open_to_append",
     "opened",
     "parse_json",
     "put_back",
@@ -85,10 +83,10 @@ __all__ = (
     "read_toml",
     "read_whole",
     "redirect_output",
+    "replace_file",
     "save_figure",
-    "to_write",
     "with_article",
     "write_columns",
     "write_csv",
-    "write_whole",
+    "write_file",
 )

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from apo_bench.errors import InputError
+from apo_bench.io.result_files import replace_file
 
 _READ = "matplotlibrc"
 
@@ -46,13 +46,12 @@ def load_matplotlib() -> Any:
     return matplotlib
 
 
-def save_figure(figure: Any, out: str | Path, *, dpi: int = 100, given: str = "") -> None:
-    """Write a figure of matplotlib as PNG; `given` is the option that named the file, for the message.
+def save_figure(figure: Any, out: str | Path, *, dpi: int = 100) -> None:
+    """Write a figure of matplotlib, as SVG if the file is called so, else as PNG; without date and version.
 
     Raises:
-        InputError: The file cannot be written.
+        InputError: As `replace_file`.
     """
-    try:
-        figure.savefig(out, dpi=dpi, format="png", metadata={"Software": None})
-    except OSError as error:
-        raise InputError(f"{given}{out} cannot be written ({error.strerror}); choose another place.") from error
+    kind, left_out = ("svg", "Date") if Path(out).suffix.lower() == ".svg" else ("png", "Software")
+    with replace_file(out) as file:
+        figure.savefig(file, dpi=dpi, format=kind, metadata={left_out: None})

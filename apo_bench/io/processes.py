@@ -3,12 +3,14 @@ streams that may be closed, full or redirected, and a current folder that may be
 """
 
 import ctypes
+import io
 import os
 import signal
 import sys
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager, redirect_stdout, suppress
 from pathlib import Path
+from typing import Any
 
 SAFE_PATH = "PYTHONSAFEPATH"
 """Without it, `python -c` looks for Python's own modules in the current folder, and so do processes of a pool."""
@@ -76,7 +78,9 @@ class Unusable(Exception):
 def prepare() -> str:
     """The current folder; standard input and error, if they are closed, lead nowhere.
 
-    Nothing may be opened before: it would take the number of a closed stream, and be printed into.
+    Nothing may be opened before: it would take the number of a closed stream, and be printed into. From here on a pipe
+    that nobody reads any more, or a full disk behind standard output, does not end the program: results come first, and
+    `finish` reports what was not printed.
 
     Raises:
         Unusable: Standard output is closed, or the current folder was deleted.
@@ -91,6 +95,8 @@ def prepare() -> str:
         raise Unusable("standard output is closed; send it to a file, or to /dev/null.")
     if hasattr(sys.stdout, "reconfigure"):
         sys.stdout.reconfigure(errors="backslashreplace")
+    sys.stdout = _patient(sys.stdout)
+    sys.stderr = _patient(sys.stderr)
     try:
         return str(Path.cwd())
     except OSError as error:
@@ -103,24 +109,55 @@ def finish() -> None:
     """Print what is held back.
 
     Raises:
-        OSError: Standard output is full, or nobody reads it any more.
+        Unusable: Something could not be printed, such as on a full disk; a closed pipe is no error.
     """
-    if sys.stdout is not None:
-        sys.stdout.flush()
+    sys.stdout.flush()
+    raw = _raw(sys.stdout)
+    error = raw.error if isinstance(raw, _PatientFile) else None
+    if error is not None and not isinstance(error, BrokenPipeError):
+        raise Unusable(f"standard output could not be written ({error.strerror}); what was not printed is lost.")
 
 
-def give_up(error: OSError) -> str:
-    """What is to be said when something could not be written; what standard output holds back is thrown away."""
+def unexpected(error: OSError) -> str:
+    """The sentence for a file that could not be read or written where the program does not expect it."""
     if error.filename is not None:
         return f"{error.filename}: {error.strerror}."
-    with suppress(OSError, ValueError, AttributeError):
-        if not isinstance(error, BrokenPipeError):
-            sys.stdout.flush()
-            return f"a file could not be read or written ({error.strerror or error}); is there room on the disk?"
-    with suppress(OSError, ValueError):
-        _lead_nowhere(1)
-    sys.stdout = sys.__stdout__
-    return f"standard output could not be written ({error.strerror or error}); what was not printed is lost."
+    return f"a file could not be read or written ({error.strerror or error}); is there room on the disk?"
+
+
+class _PatientFile(io.FileIO):
+    """A standard stream that keeps its first error, and throws away what cannot be written from then on."""
+
+    error: OSError | None = None
+
+    def write(self, data: Any, /) -> int:
+        if self.error is None:
+            try:
+                return super().write(data)
+            except OSError as error:
+                self.error = error
+        return memoryview(data).nbytes
+
+
+def _raw(stream: Any) -> Any:
+    """What a text stream writes its bytes to at last."""
+    buffer = getattr(stream, "buffer", None)
+    return getattr(buffer, "raw", buffer)
+
+
+def _patient(stream: Any) -> Any:
+    """The same stream on a `_PatientFile`, if it is a standard one on a plain file descriptor."""
+    if stream not in (sys.__stdout__, sys.__stderr__) or type(_raw(stream)) is not io.FileIO:
+        return stream
+    stream.flush()
+    raw: Any = _PatientFile(stream.fileno(), "wb", closefd=False)
+    return io.TextIOWrapper(
+        raw if stream.write_through else io.BufferedWriter(raw),
+        encoding=stream.encoding,
+        errors="backslashreplace",
+        line_buffering=stream.line_buffering,
+        write_through=stream.write_through,
+    )
 
 
 @contextmanager

@@ -17,7 +17,8 @@ from types import MappingProxyType
 from typing import Any, NoReturn, final
 
 from apo_bench.errors import InputError, missing_package, require
-from apo_bench.io.ordinary_files import read_text, to_write
+from apo_bench.io.ordinary_files import read_text
+from apo_bench.io.result_files import replace_file, write_file
 
 Columns = Mapping[str, tuple[str, float]]
 """What a column stands for, and the size of its unit."""
@@ -138,13 +139,13 @@ def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[object]])
     """Write a table; None is an empty field, and numbers stay numbers.
 
     Raises:
-        InputError: A link or anything else that is no regular file stands there.
-        OSError: The file cannot be written.
+        InputError: As `replace_file`.
     """
-    with to_write(path, "w") as file:
-        writer = csv.writer(file)
-        writer.writerow(map(_cell, head))
-        writer.writerows(map(_cell, row) for row in rows)
+    table = io.StringIO(newline="")
+    writer = csv.writer(table)
+    writer.writerow(map(_cell, head))
+    writer.writerows(map(_cell, row) for row in rows)
+    write_file(path, table.getvalue())
 
 
 def _cell(x: object) -> object:
@@ -176,9 +177,7 @@ def write_columns(
         kinds: What columns are that may have no value: text, whole, numbers or wholes, the last two of lists.
 
     Raises:
-        InputError: The package pyarrow is not installed, or a link or anything else that is no regular file stands
-            there.
-        OSError: The file cannot be written.
+        InputError: The package pyarrow is not installed, or as `replace_file`.
     """
     try:
         import pyarrow as pa
@@ -195,5 +194,5 @@ def write_columns(
     types = [of_kind[kinds[name]] if name in kinds else None for name in names]
     arrays = [pa.array(column, kind, from_pandas=False) for column, kind in zip(columns, types, strict=True)]
     arrays = [a.cast(pa.float64()) if pa.types.is_null(a.type) else a for a in arrays]
-    with to_write(path) as out:
+    with replace_file(path) as out:
         parquet.write_table(pa.table(arrays, names=list(names)), out, compression="zstd")

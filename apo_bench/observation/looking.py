@@ -12,7 +12,7 @@ from typing import Any, final
 import numpy as np
 
 from apo_bench.assembly import Assembly, Demonstration, Observation
-from apo_bench.errors import InputError, failed, require
+from apo_bench.errors import RAISED, InputError, failed, require
 from apo_bench.geometry import Array, is_rigid
 from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.records import check, level_pair
@@ -50,7 +50,7 @@ def observe(
         complaint = _complaint(demonstration, seen)
     except InputError:
         raise
-    except Exception as error:
+    except RAISED as error:
         raise failed(f"the noise model '{name}'", error) from error
     require(not complaint, f"the noise model '{name}' {complaint}.")
     return replace(seen, gap_m=demonstration.gap_m, play_m=demonstration.play_m)

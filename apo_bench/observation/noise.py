@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from apo_bench.assembly import Assembly, Demonstration, Observation
-from apo_bench.errors import InputError, failed, require, unknown
+from apo_bench.errors import RAISED, InputError, failed, require, unknown
 from apo_bench.geometry import Array
 from apo_bench.names import resolve
 from apo_bench.observation.models import Level, floored
@@ -84,7 +84,7 @@ def make_noise(given: Any, level: Level) -> Noise:
         return _noise(model, name, level)
     except InputError:
         raise
-    except Exception as error:
+    except RAISED as error:
         raise failed(f"the noise model '{name}'", error) from error
 
 

@@ -30,7 +30,7 @@ from apo_bench.assembly import (
     relation_graph,
     round_pairs,
 )
-from apo_bench.errors import InputError, failed, require
+from apo_bench.errors import RAISED, InputError, failed, require
 from apo_bench.geometry import Array, Face, RoundFace, Solid, overlap
 from apo_bench.names import resolve
 from apo_bench.records import GIVEN, SHIFT_MM, WRONG_RELATIONS, relations_name
@@ -87,7 +87,7 @@ def with_relations(
         complaint = _complaint(observation.assembly, wrong)
     except InputError:
         raise
-    except Exception as error:
+    except RAISED as error:
         raise failed(f"the relations '{name}'", error) from error
     require(not complaint, f"the relations '{name}' {complaint}.")
     return replace(observation, assembly=wrong)

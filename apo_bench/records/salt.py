@@ -14,7 +14,7 @@ from typing import Any, final
 import numpy as np
 
 from apo_bench.errors import InputError, require
-from apo_bench.io import read_bytes, write_whole
+from apo_bench.io import read_bytes, write_file
 
 FEWEST_BYTES = 16
 _MOST_BYTES = 512
@@ -72,13 +72,7 @@ def salt_of_sweep(path: str | Path, folder: str | Path) -> Salt:
         f"the salt file '{path}' is not there, and '{folder}' holds trials already; give the salt file that they "
         "were drawn with, or choose another folder.",
     )
-    try:
-        make_salt(Path(path))
-    except OSError as error:
-        raise InputError(
-            f"the salt file '{path}' cannot be made ({error.strerror}); name a file in a folder that exists and can be "
-            "written."
-        ) from error
+    make_salt(Path(path))
     return read_salt(path)
 
 
@@ -86,9 +80,9 @@ def make_salt(path: Path) -> None:
     """Write 256 random bits to a file that only its owner can read; a file that is there by then is left as it is.
 
     Raises:
-        OSError: The file cannot be made.
+        InputError: The file cannot be made.
     """
-    write_whole(path, f"{secrets.token_hex(32)}\n", over=False)
+    write_file(path, f"{secrets.token_hex(32)}\n", private=True, over=False)
 
 
 def one_salt(rows: Iterable[Mapping[str, Any]]) -> str | None:

@@ -1,12 +1,12 @@
 """The report of a sweep: one page that answers, tables and figures beside it."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from apo_bench.errors import InputError, require
-from apo_bench.io import check_folders, check_target, has_parquet, to_write, write_columns
+from apo_bench.io import check_folders, check_target, has_parquet, write_columns, write_file
 from apo_bench.records import Row, check_same_salt, one_salt, read_salt
 from apo_bench.records.run.run_file import read_run
 from apo_bench.records.run.run_folder import COLUMNS as KEPT
@@ -112,7 +112,6 @@ def report(
         check_folders(folder / name for name in (TABLES, FIGURES))
         for name in (TABLES, FIGURES):
             (folder / name).mkdir(exist_ok=True)
-        _remove_older(folder)
         if has_parquet():
             _write_rows(rows, folder / TABLES / ROWS)
         return _written(
@@ -172,18 +171,18 @@ def _written(folder: Path, rows: Sequence[Row], numbers: Summary, draw_own: Draw
         no_pictures=no_pictures,
         beside=[str(path.relative_to(folder)) for path in (*beside, *rows_kept, *paths)],
     )
-    with to_write(folder / PAGE, "w") as file:
-        file.write(html)
+    _remove_older(folder, {path.resolve() for path in (*beside, folder / TABLES / ROWS, *paths)})
+    write_file(folder / PAGE, html)
     return Report(
         folder / PAGE, sentences, kept, tuple(paths), numbers.cells, confused, len(pictures), tuple(no_pictures)
     )
 
 
-def _remove_older(folder: Path) -> None:
-    """What an earlier report wrote and this one may not: nothing beside the page shall be of other rows."""
+def _remove_older(folder: Path, written: Collection[Path]) -> None:
+    """Remove what an earlier report wrote and this one did not, so that all tables and figures are of the same rows."""
     for path in (*(folder / TABLES).glob("*"), *(folder / FIGURES).glob("*")):
         ours = path.stem in OURS or path.stem.startswith("difference_to_")
-        if ours and path.suffix in (".csv", ".parquet", ".svg", ".png"):
+        if ours and path.suffix in (".csv", ".parquet", ".svg", ".png") and path.resolve() not in written:
             path.unlink()
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.errors import InputError, require
-from apo_bench.io import check_folders, check_target, parse_json, write_whole
+from apo_bench.io import check_folders, parse_json, write_file
 from apo_bench.names import own_modules_in
 from apo_bench.scoring.program import goals_of, read_answers
 from apo_bench.scoring.score import score
@@ -72,8 +72,7 @@ def exported(tracks: Sequence[Track], out: Path, **how: Any) -> int:
     """
     with tempfile.TemporaryDirectory() as made:
         lines = _requests(tracks, Path(made), **how)
-    check_target(out)
-    out.write_text("".join(lines), encoding="utf-8")
+    write_file(out, "".join(lines))
     return len(lines)
 
 
@@ -97,7 +96,7 @@ def _kept(answers: Mapping[str, str], rows: Path) -> Path:
     check_folders([folder])
     folder.mkdir(exist_ok=True)
     for request, line in answers.items():
-        write_whole(folder / f"{request}.json", line)
+        write_file(folder / f"{request}.json", line)
     return folder
 
 
@@ -116,8 +115,7 @@ def _module(folder: Path, made: str, call: str) -> Iterator[str]:
     folder.mkdir(parents=True, exist_ok=True)
     called = f"entrant_{hashlib.sha256(call.encode()).hexdigest()[:_HEX]}"
     path = folder / f"{called}.py"
-    check_target(path)
-    path.write_text(_MODULE.format(made=made, name=_NAME, call=call), encoding="utf-8")
+    write_file(path, _MODULE.format(made=made, name=_NAME, call=call))
     with own_modules_in(str(folder.resolve())):
         yield f"{called}:{_NAME}"
 

@@ -14,7 +14,7 @@ from msgspec import Meta
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
-from apo_bench.io import HALF_LETTER, UNSHOWN, WHOLE_LETTERS, half_letter, parse_json, read_text, to_write
+from apo_bench.io import HALF_LETTER, UNSHOWN, WHOLE_LETTERS, half_letter, parse_json, read_text, write_file
 from apo_bench.statistics import pooled_rate
 
 SCHEMA: Final = "apo-bench/entry/1"
@@ -155,11 +155,7 @@ def write_entry(entry: Entry, path: str | Path) -> None:
     Raises:
         InputError: The file cannot be written.
     """
-    try:
-        with to_write(Path(path)) as file:
-            file.write(json.dumps(msgspec.to_builtins(entry), indent=1, allow_nan=False).encode() + b"\n")
-    except OSError as error:
-        raise InputError(f"{path}: the file cannot be written ({error.strerror}); choose another path.") from error
+    write_file(path, json.dumps(msgspec.to_builtins(entry), indent=1, allow_nan=False) + "\n")
 
 
 def read_entry(path: str | Path) -> Entry:

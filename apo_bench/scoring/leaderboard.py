@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.errors import InputError, require
-from apo_bench.io import default_looks, grouped, save_figure
+from apo_bench.io import check_target, default_looks, grouped, save_figure, write_file
 from apo_bench.report.tables.table import Column, Table
 from apo_bench.scoring.entry import Entry, TrackScore, read_entry
 from apo_bench.scoring.track import read_track, track_names
@@ -103,8 +103,9 @@ def write_leaderboard(entries: Sequence[Entry], out: str | Path, salts: frozense
     lines = ranked(entries, salts)
     out = Path(out)
     picture = out.with_suffix(".png")
+    check_target(out)
     _draw(lines[:_MOST_SQUARES], tracks[:_MOST_SQUARES], picture)
-    out.write_text("\n".join(_page(lines, tracks, picture.name)) + "\n", encoding="utf-8")
+    write_file(out, "\n".join(_page(lines, tracks, picture.name)) + "\n")
 
 
 def leaderboard_table(lines: Sequence[Line]) -> Table:

@@ -22,7 +22,7 @@ from apo_bench.assembly import Observation
 from apo_bench.errors import InputError, require
 from apo_bench.files.json_forms import observation_form
 from apo_bench.geometry import Array, Face, RoundFace, pose
-from apo_bench.io import JsonNode, decoded, end_descendants, opened, parse_json, read_json
+from apo_bench.io import JsonNode, decoded, end_descendants, opened, parse_json, read_json, write_file
 
 REQUEST = "apo-bench/request/1"
 _HEX = 32
@@ -136,7 +136,7 @@ class Export:
             InputError: Always, when the request was written.
         """
         line = request_line(observation)
-        (Path(self.folder) / f"{json.loads(line)['id']}.json").write_text(line + "\n", encoding="utf-8")
+        write_file(Path(self.folder) / f"{json.loads(line)['id']}.json", line + "\n")
         raise InputError("the request was written, and nothing was corrected.")
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.io import columns, default_looks
+from apo_bench.io import columns, default_looks, save_figure
 from apo_bench.observation.fitting.fit import PERCENTILES, Figures, outliers_by_score
 from apo_bench.observation.models import INLIER_MM, TURNED_DEG, MeasuredNoise, Residuals, Split
 
@@ -247,7 +247,7 @@ def draw_fit(residuals: Residuals, measured: MeasuredNoise, path: Path) -> None:
     source = measured.source if len(measured.source) <= 110 else measured.source[:107] + "..."
     rates = f"{100 * measured.outliers:.1f} % outliers, {100 * measured.missed:.1f} % missed"
     figure.suptitle(f"{source}\n{int(upright.sum())} inliers that are not turned; {rates}", fontsize=11)
-    figure.savefig(path, dpi=120)
+    save_figure(figure, path, dpi=120)
 
 
 def _histogram(axis: Any, name: str, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 
 from apo_bench.assembly import Demonstration, placements
 from apo_bench.geometry import Array, pose
-from apo_bench.io import default_looks
+from apo_bench.io import default_looks, save_figure
 from apo_bench.names import resolve
 from apo_bench.observation.looking import observe
 from apo_bench.observation.models import Camera, Facts
@@ -152,7 +152,7 @@ def draw_histogram(drawn: Drawn, path: Path) -> None:
         _panel(axis, drawn.errors[:, i], float(drawn.stated[i]))
         axis.set_xlabel(f"{name} [{unit}]", fontsize=9)
     axes[0].set_ylabel("density", fontsize=9)
-    figure.savefig(path, dpi=90)
+    save_figure(figure, path, dpi=90)
 
 
 def _histogram(drawn: Drawn) -> list[str]:

@@ -162,7 +162,7 @@ def draw_sensor(run: SensorRun, out: Path, view: int = 0) -> None:
     v, u = np.nonzero(np.any(changed, axis=0)) if changed else (np.zeros(0), np.zeros(0))
     for axes in rows[:, 1:].ravel() if len(u) else ():
         axes.set(xlim=(u.min() - _AROUND, u.max() + _AROUND), ylim=(v.max() + _AROUND, v.min() - _AROUND))
-    save_figure(figure, out, dpi=72, given="--out ")
+    save_figure(figure, out, dpi=72)
 
 
 def _label(assembly: Assembly, event: Event) -> str:

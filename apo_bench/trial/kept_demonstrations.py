@@ -21,7 +21,7 @@ import numpy as np
 from apo_bench import __version__
 from apo_bench.assembly import Demonstration, Layout
 from apo_bench.errors import InputError, require
-from apo_bench.io import parse_json, read_text, write_whole
+from apo_bench.io import parse_json, read_text, write_file
 from apo_bench.records import RANGE, TrialSettings
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.fingerprint import code_files
@@ -83,10 +83,10 @@ class KeptDemonstrations:
                 complaint = f"{str(error).rstrip('.')}; the demonstration is made again"
         simulated = demonstration_of(settings, scene)
         try:
-            write_whole(path, _written(key, simulated))
-        except OSError as error:
+            write_file(path, _written(key, simulated), private=True)
+        except InputError as error:
             what = f"{complaint}, and" if complaint else f"{path}: the demonstration"
-            complaint = f"{what} cannot be kept ({error.strerror or error})"
+            complaint = f"{what} cannot be kept: {str(error).rstrip('.')}"
         if complaint:
             with suppress(OSError, AttributeError):
                 sys.stderr.write(f"apo-bench: {complaint}.\n")

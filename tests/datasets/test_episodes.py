@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -168,3 +172,66 @@ def test_an_interrupt_keeps_the_episodes_that_had_ended(
         make_dataset(trials, tmp_path / "out", "by hand", form, say=said.append)
     assert said == ["1 episodes that had ended are kept."]
     assert "1 simulated trials" in (tmp_path / "out" / "README.md").read_text()
+
+
+def test_a_policy_that_ends_the_program_is_one_sentence(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "leaving_policy.py").write_text(
+        "import sys\ndef act(env, seen):\n    sys.exit(0)\nclass Made:\n    def __init__(self):\n        sys.exit(0)\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    words = ["dataset", "make", "block_on_block", "--episodes", "1", "--record", "insertions", "--format", "lerobot"]
+    for name, line in (("act", 3), ("Made", 6)):
+        assert main([*words, "--policy", f"leaving_policy:{name}", "--out", "out"]) == 2
+        said = capsys.readouterr().err
+        assert said.count("\n") == 1
+        assert f"the policy 'leaving_policy:{name}' raised SystemExit: 0 (" in said
+        assert f"leaving_policy.py, line {line})." in said
+        assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="sends SIGTERM")
+@pytest.mark.parametrize("form", ["parquet", "lerobot", "minari"])
+def test_after_a_signal_the_data_set_is_finished(form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def signalled(trials: Any, scenes: Any) -> Any:
+        assert [each.name for each in (tmp_path / "out").iterdir() if each.name == "UNFINISHED"]
+        for each in replays(trials, scenes):
+            os.kill(os.getpid(), signal.SIGTERM)
+            yield each
+
+    monkeypatch.setattr(making, "replays", signalled)
+    words = ["dataset", "make", "block_on_block", "--episodes", "3", "--format", form, "--out", str(tmp_path / "out")]
+    assert main(words) == 128 + signal.SIGTERM
+    assert "1 simulated trials" in (tmp_path / "out" / "README.md").read_text()
+    assert not (tmp_path / "out" / "UNFINISHED").exists()
+    assert signal.getsignal(signal.SIGTERM) == signal.SIG_DFL
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="limits the size of files")
+@pytest.mark.parametrize("form", ["parquet", "lerobot", "minari"])
+def test_a_full_disk_is_one_sentence_and_the_data_set_says_that_it_is_not_finished(form: str, tmp_path: Path) -> None:
+    program = f"""
+import resource
+from apo_bench import TrialSettings
+from apo_bench.datasets import making
+from apo_bench.datasets.episodes import replays
+
+def limited(trials, scenes):
+    found = list(replays(trials, scenes))
+    resource.setrlimit(resource.RLIMIT_FSIZE, (2000, resource.RLIM_INFINITY))
+    return iter(found)
+
+making.replays = limited
+trials = [TrialSettings("block_on_block", method="none", level_mm=0.0, level_deg=0.0)]
+try:
+    making.make_dataset(trials, making.Path("out"), "by hand", {form!r})
+except making.InputError as error:
+    print(error)
+"""
+    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False)
+    place = {"parquet": "frames/000000.parquet", "lerobot": "data/chunk-000/file-000.parquet"}
+    path = place.get(form, "data/main_data.hdf5")
+    assert done.stdout == f"out/{path} cannot be written (File too large); choose another place.\n", done.stderr
+    assert done.stderr == ""
+    assert [each.name for each in (tmp_path / "out").rglob("*") if each.is_file()] == ["UNFINISHED"]

@@ -94,16 +94,10 @@ def torn(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-100])
 
 
-def pipe(path: Path) -> None:
-    path.unlink()
-    os.mkfifo(path)
-
-
 @pytest.mark.parametrize(
     ("spoil", "said"),
     [
         (torn, "this is not JSON"),
-        (pipe, "a pipe was given"),
         (lambda path: path.write_bytes(b"\0" * 1_000_001), "larger than 1 MB"),
         (lambda path: path.write_text("[]"), "an object with named keys is needed"),
         (edited(lambda said: said.update(schema="apo-bench/kept-demonstration/0")), "no kept demonstration of this"),
@@ -163,16 +157,22 @@ def test_what_cannot_be_kept_is_used_all_the_same(tmp_path: Path, capsys: pytest
     kept = KeptDemonstrations(tmp_path / "gone")
     kept.folder.rmdir()
     assert kept.simulated(SPEC, scene()).demonstration.code == "ok"
-    assert "the demonstration cannot be kept (No such file or directory)." in capsys.readouterr().err
+    complaint = capsys.readouterr().err
+    assert "the demonstration cannot be kept: " in complaint
+    assert "cannot be written (No such file or directory)" in complaint
 
 
-def test_what_stands_in_the_way_of_a_file_is_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize(("made", "what"), [(Path.mkdir, "a folder"), (os.mkfifo, "a pipe")])
+def test_what_stands_in_the_way_of_a_file_is_one_sentence(
+    made: Callable[[Path], None], what: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
     kept = KeptDemonstrations(tmp_path)
-    (tmp_path / f"{demonstration_key(SPEC, scene())}.json").mkdir()
+    made(tmp_path / f"{demonstration_key(SPEC, scene())}.json")
     assert kept.simulated(SPEC, scene()).demonstration.code == "ok"
     complaint = capsys.readouterr().err
     assert complaint.count("\n") == 1
-    assert complaint.endswith("the demonstration is made again, and cannot be kept (Is a directory).\n")
+    assert "the demonstration is made again, and cannot be kept: " in complaint
+    assert complaint.endswith(f".json is {what}, and only an ordinary file is written over; remove it.\n")
 
 
 def test_a_folder_that_is_none_is_refused(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from apo_bench.cad.solids.raw_solid import Mesh
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array
-from apo_bench.io import read_bytes
+from apo_bench.io import read_bytes, replace_file
 
 _SUFFIX = ".drawn.npz"
 _LARGEST_BYTES = 20_000_000
@@ -36,7 +36,8 @@ class Overlap(NamedTuple):
 def keep_drawn(mesh: Mesh, part_file: Path) -> None:
     """Write the mesh of a part, [mm], beside its file."""
     triangles = np.asarray(mesh.triangles, dtype=np.int32)
-    np.savez_compressed(part_file.with_suffix(_SUFFIX), corners=mesh.corners, triangles=triangles)
+    with replace_file(part_file.with_suffix(_SUFFIX)) as file:
+        np.savez_compressed(file, corners=mesh.corners, triangles=triangles)
 
 
 def drawn_mesh(part_file: Path) -> Mesh | None:

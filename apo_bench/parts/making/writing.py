@@ -9,6 +9,7 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 import numpy as np
 
 from apo_bench.geometry import WHOLE_TURN, Array, Box, Face, Hull, Piece, RoundFace, Solid, all_boxes, flat_area
+from apo_bench.io import write_file
 from apo_bench.parts.allowed import THINNEST_M
 from apo_bench.parts.making.body import Body
 from apo_bench.parts.stated import PART_SCHEMA
@@ -107,11 +108,9 @@ def write_part(
     said = "; ".join(filter(None, (title, source, licence))).replace("--", "- -")  # which would end the comment
     note = f"<!-- {said} -->\n" if boxes else ""
     indent(root)
-    path.write_text(note + tostring(root, encoding="unicode") + "\n", encoding="utf-8")
+    write_file(path, note + tostring(root, encoding="unicode") + "\n")
     if not boxes:
-        path.with_suffix(".toml").write_text(
-            stated_text(solid, density, friction, source, licence, title), encoding="utf-8"
-        )
+        write_file(path.with_suffix(".toml"), stated_text(solid, density, friction, source, licence, title))
     return path
 
 

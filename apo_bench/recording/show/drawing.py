@@ -142,7 +142,7 @@ def draw_recording(drawing: RecordingDrawing, out: Path) -> None:
     near.legend(loc="upper left", fontsize=8, frameon=False)
     _draw_times(figure.add_subplot(grid[2]), drawing)
     figure.suptitle(drawing.title, fontsize=11)
-    save_figure(figure, out, given="--picture ")
+    save_figure(figure, out)
 
 
 def _draw_parts(axes: Any, drawing: RecordingDrawing, X: Array, reach: float, close: bool) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from apo_bench.errors import InputError, require
-from apo_bench.io import read_bytes, to_write
+from apo_bench.io import read_bytes, write_file
 from apo_bench.records.run.validation import run_of
 from apo_bench.records.salt import Salt
 from apo_bench.records.thresholds import USUAL_LIMITS, Limits
@@ -53,12 +53,7 @@ def run_record(
 
 def write_run(folder: Path, run: Mapping[str, Any]) -> None:
     """Replace the file at once: it is the old one or the new one, never half of it."""
-    beside = folder / "run.json.new"
-    with to_write(beside) as file:
-        file.write(json.dumps(run, indent=2).encode() + b"\n")
-        file.flush()
-        os.fsync(file.fileno())
-    os.replace(beside, folder / "run.json")
+    write_file(folder / "run.json", json.dumps(run, indent=2) + "\n")
 
 
 def read_run(folder: Path) -> dict[str, Any]:

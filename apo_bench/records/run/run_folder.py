@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import IO, Any, Self, cast, final
 
 from apo_bench.errors import InputError, require
-from apo_bench.io import check_target, each_line, is_there, put_back, to_write
+from apo_bench.io import check_target, each_line, is_there, open_to_append, put_back
 from apo_bench.records.row import ROW_FIELDS, Key, Predicted, Row, row_key
 from apo_bench.records.run.run_file import check_same, write_run
 from apo_bench.records.run.validation import row_of, unwritable
@@ -43,14 +43,14 @@ class RunFolder:
         try:
             self._place = folder.absolute()
             folder.mkdir(parents=True, exist_ok=True)
-            self._trials: IO[bytes] = to_write(folder / "trials.jsonl", "a+b", 0)
+            self._trials: IO[bytes] = open_to_append(folder / "trials.jsonl")
             try:
                 _lock(self._trials.fileno(), folder)
                 for name in ("trials.jsonl", "timing.jsonl"):
                     _set_torn_line_aside(folder / name)
                 self._read(run)
                 write_run(folder, run)
-                self._timing: IO[bytes] = to_write(folder / "timing.jsonl", "a+b", 0)
+                self._timing: IO[bytes] = open_to_append(folder / "timing.jsonl")
                 self._size = os.fstat(self._trials.fileno()).st_size
             except BaseException:
                 self._trials.close()
@@ -116,8 +116,8 @@ class RunFolder:
             self._timing.close()
             self._timing = timing
             write_run(self._place, self._run)
-        except OSError as error:
-            raise RuntimeError(f"{lost} cannot be put back ({error.strerror}); the same command runs them.") from error
+        except (OSError, InputError) as error:
+            raise RuntimeError(f"{lost} cannot be put back ({error}); the same command runs them.") from error
 
     def _read(self, run: Mapping[str, Any]) -> None:
         for row in each_row(self.folder):
@@ -191,7 +191,7 @@ def _set_torn_line_aside(path: Path) -> None:
             tail = file.read(end - at)
         torn = tail[tail.rfind(b"\n") + 1 :]
         if torn:
-            with to_write(path.parent / "torn.txt", "ab") as aside:
+            with open_to_append(path.parent / "torn.txt") as aside:
                 aside.write(torn + b"\n")
             file.truncate(end - len(torn))
 

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.errors import InputError
-from apo_bench.io import check_folders, to_write
+from apo_bench.io import check_folders, write_file
 from apo_bench.records import KEY, Row, row_key
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.run.run_folder import NUMBERS
@@ -158,8 +158,7 @@ def write_comparison(comparison: Comparison, folder: Path) -> Path:
         check_folders([folder])
         for name, table in tables.items():
             table.write_all(folder / f"{name}.csv")
-        with to_write(folder / "compare.html", "w") as file:
-            file.write(html)
+        write_file(folder / "compare.html", html)
     except OSError as error:
         raise InputError(f"--out {folder} cannot be written ({error.strerror}); choose another place.") from error
     return folder / "compare.html"

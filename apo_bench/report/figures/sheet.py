@@ -19,7 +19,7 @@ from typing import Any, NamedTuple, final
 
 from markupsafe import Markup
 
-from apo_bench.io import default_looks, to_write
+from apo_bench.io import default_looks, save_figure, write_file
 
 INK = "#1d2430"
 SOFT = "#5b6575"
@@ -201,12 +201,11 @@ class DrawnFigure:
 
     def write(self, path: Path) -> Path:
         """Write the sheet, as SVG or PNG by the ending."""
-        with to_write(path) as file:
-            if path.suffix == ".png":
-                with _looks(self.title):
-                    self.canvas.savefig(file, format="png", dpi=_PNG_DPI)
-            else:
-                file.write(self.sheet.encode())
+        if path.suffix == ".png":
+            with _looks(self.title):
+                save_figure(self.canvas, path, dpi=_PNG_DPI)
+        else:
+            write_file(path, self.sheet)
         return path
 
 

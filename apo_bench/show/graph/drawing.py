@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from apo_bench.assembly import Arc, ArcResiduals, Graph, Node
-from apo_bench.io import default_looks
+from apo_bench.io import default_looks, save_figure
 from apo_bench.show.graph.layout import GraphLayout, layout_graph
 
 _INK = "#222222"
@@ -56,7 +56,7 @@ def draw_graph(
         _arrow(axes, layout, i, arc, texts[i], residual is not None and residual > gap_m)
     for node in layout.boxes:
         _node(axes, layout, node, graph.stands(node), (colors or {}).get(node.part))
-    figure.savefig(path, dpi=110, metadata={"Date": None} if path.suffix.lower() == ".svg" else None)
+    save_figure(figure, path, dpi=110)
 
 
 def _canvas(figure: Any, layout: GraphLayout, width: float, height: float, words: bool) -> Any:

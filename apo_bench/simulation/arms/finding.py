@@ -11,7 +11,7 @@ from types import MappingProxyType
 
 import mujoco
 
-from apo_bench.errors import InputError, require, require_known, unknown
+from apo_bench.errors import RAISED, InputError, require, require_known, unknown
 from apo_bench.names import resolve
 from apo_bench.records import FOREIGN_ARMS
 from apo_bench.resources import folder
@@ -65,7 +65,7 @@ def find_arm(name: str | Arm) -> Arm:
         arm = resolve(name, {}, "arm")
         try:
             arm = arm() if callable(arm) else arm
-        except Exception as error:
+        except RAISED as error:
             raise InputError(
                 f"the arm '{name}' failed: it raised {error!r}; give a function without arguments."
             ) from error

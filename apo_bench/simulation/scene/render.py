@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Poses
 from apo_bench.errors import InputError, missing_package, require
 from apo_bench.geometry import Array
+from apo_bench.io import write_file
 from apo_bench.simulation.graphics import need_window, renderer
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import World, initial_state, place
@@ -177,13 +178,15 @@ def save_film(frames: Iterable[_Image], path: str | Path, fps: float) -> None:
 
     path = Path(path)
     check_film(path)
+    ending = path.suffix.lower()
     how: dict[str, Any] = {"duration": 1000.0 / fps, "loop": 0}
-    if path.suffix.lower() == ".mp4":
+    if ending == ".mp4":
         how = {"fps": fps, "macro_block_size": 8}
     try:
-        imageio.imwrite(path, np.array(list(frames)), **how)
+        film = imageio.imwrite("<bytes>", np.array(list(frames)), extension=ending, **how)
     except OSError as error:
-        raise InputError(f"the film '{path}' cannot be written: {error}.") from error
+        raise InputError(f"the film '{path}' cannot be encoded: {error}.") from error
+    write_file(path, film)
 
 
 class ReplayWindow:
