@@ -76,6 +76,13 @@ URDF = """<robot name="two"><link name="base"/>
 <limit lower="-1" upper="1" effort="10" velocity="1"/></joint></robot>"""
 
 
+def test_numbers_that_are_not_finite_are_refused(tmp_path: Path) -> None:
+    text = (ARMS / "ur5e_primitive.xml").read_text()
+    (tmp_path / "arm.xml").write_text(text.replace(WORLD, f'{WORLD}<site name="off" pos="nan 0 0"/>', 1))
+    with pytest.raises(InputError, match="is not a finite number; correct the file"):
+        compiled(load_model(tmp_path / "arm.xml", "arm"), tmp_path)
+
+
 def test_a_urdf_file_is_read(tmp_path: Path) -> None:
     (tmp_path / "arm.urdf").write_text(URDF)
     model = compiled(load_model(tmp_path / "arm.urdf", "arm"), tmp_path)

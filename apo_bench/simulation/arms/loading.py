@@ -68,12 +68,18 @@ def compiled(spec: Any, path: Path) -> Any:
     """The model of what was read.
 
     Raises:
-        InputError: MuJoCo cannot compile it.
+        InputError: MuJoCo cannot compile it, or a pose or a range in it is not finite.
     """
     try:
-        return spec.compile()
+        model = spec.compile()
     except (ValueError, RuntimeError, mujoco.FatalError) as error:
-        raise InputError(f"{path}: MuJoCo cannot compile this: {_reason(error)}; mend the file.") from error
+        raise InputError(f"{path}: MuJoCo cannot compile this: {_reason(error)}; correct the file.") from error
+    numbers = (model.body_pos, model.body_quat, model.site_pos, model.site_quat, model.jnt_axis, model.jnt_range)
+    require(
+        all(np.isfinite(each).all() for each in numbers),
+        f"{path}: a position, a direction or a range is not a finite number; correct the file.",
+    )
+    return model
 
 
 def files_of(path: Path) -> tuple[Path, ...]:
