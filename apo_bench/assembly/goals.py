@@ -12,6 +12,7 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly.error_models import OutlierModel, SharedError, Tails
 from apo_bench.assembly.topology import Assembly
 from apo_bench.errors import require
@@ -23,6 +24,7 @@ SCHEDULE_REMEDY = "do operations in order, undo the last one that is done, and h
 
 
 @final
+@check_arguments
 @copyable
 @dataclass(frozen=True, eq=False)
 class Layout:
@@ -36,6 +38,7 @@ class Layout:
 
 
 @final
+@check_arguments
 @copyable
 @dataclass(frozen=True, eq=False)
 class Demonstration:
@@ -64,6 +67,7 @@ class Demonstration:
 
 
 @final
+@check_arguments
 @copyable
 @dataclass(frozen=True, eq=False)
 class Observation:
@@ -130,6 +134,7 @@ def once_each(n: int) -> tuple[Step, ...]:
 
 
 @final
+@check_arguments
 @copyable
 @dataclass(frozen=True, eq=False)
 class Plan:
@@ -154,6 +159,7 @@ class Plan:
             object.__setattr__(self, "targets", self.goals[[step.operation for step in self.schedule]])
         freeze(self, targets=(len(self.schedule), 4, 4))
 
+    @check_arguments
     def with_goals(self, goals: Array) -> "Plan":
         """The plan with other goals, (n, 4, 4), and with them where its schedule brings parts to the old ones."""
         done = [step.operation for step in self.schedule]

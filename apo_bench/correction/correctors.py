@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Correction, Look, LookingCorrector, Observation, lowered_observation
 from apo_bench.correction.checks.correction_checks import RIGID, check_correction, check_near, check_observations
 from apo_bench.correction.checks.status import gap_of, goals_as_given, opposing
@@ -31,6 +32,7 @@ class CorrectorMisbehaved(InputError):
     """A corrector raised an error, or returned what it must not: its own failure, not that of the request."""
 
 
+@check_arguments
 def correct(observation: Observation, corrector: Any = CORRECTOR, look: Look | None = None) -> Correction:
     """What the corrector makes of an observation.
 
@@ -143,6 +145,7 @@ LARGEST_JACOBIANS = 96_000
 """Entries of all their Jacobians: more would leave the cache of the processor."""
 
 
+@check_arguments
 def correct_many(
     observations: Sequence[Observation], corrector: ContactCorrector | RobustCorrector = contact_robust
 ) -> tuple[Correction, ...]:

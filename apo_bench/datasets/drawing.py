@@ -14,6 +14,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Demonstration, Layout, Observation, Operation
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
@@ -158,6 +159,7 @@ class Pairs:
 _ARRAYS = tuple(field.name for field in fields(Pairs))[:6]
 
 
+@check_arguments
 def pairs(
     scenarios: Given | Sequence[Given],
     noise: Any = USUAL,
@@ -194,6 +196,7 @@ def pairs(
     return Pairs(**arrays, scenarios=blocks[0].scenarios, together=blocks[0].together)
 
 
+@check_arguments
 def endless_pairs(
     scenarios: Given | Sequence[Given],
     noise: Any = USUAL,

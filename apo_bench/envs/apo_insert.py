@@ -11,11 +11,12 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Outcome, Poses, Snapshot
 from apo_bench.envs.episode import asked_options, check_flag
 from apo_bench.envs.spaces import PIXELS, as_seen, insert_space
 from apo_bench.envs.starts import Begun, RobotSettings, Trials, judged
-from apo_bench.errors import InputError, require, unknown
+from apo_bench.errors import InputError, require, shown, unknown
 from apo_bench.geometry import Array
 from apo_bench.names import resolve
 from apo_bench.observation.noise import Level, make_noise
@@ -38,6 +39,7 @@ _REWARDS = ("judge", "progress")
 _PLANS = ("none", "oracle", "by-heart")
 
 
+@check_arguments
 class APOInsert(gymnasium.Env[Seen, Action]):
     """Insert one part that the robot holds before its mouth.
 
@@ -214,6 +216,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         """The operation of this episode, from 1."""
         return self._now().start.operation + 1
 
+    @check_arguments
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
         """Begin at one of the starts.
 
@@ -256,7 +259,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         except (TypeError, ValueError):
             given = np.zeros(0, dtype=np.float32)
         if not self.action_space.contains(given):
-            raise InputError(f"the action {action!r} was given; seven numbers from -1 to 1 are allowed.")
+            raise InputError(f"the action {shown(action)} was given; seven numbers from -1 to 1 are allowed.")
         control = self._at_work()
         self._actions.append(given.copy())
         before = self._best

@@ -11,6 +11,7 @@ from typing import Any, final
 
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Demonstration, Observation
 from apo_bench.errors import InputError, failed, require
 from apo_bench.geometry import Array, is_rigid
@@ -18,6 +19,7 @@ from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.records import check, level_pair
 
 
+@check_arguments
 def observe(
     demonstration: Demonstration,
     noise: Noise | type | str,

@@ -14,9 +14,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Contact, Facing, Observation, placements
 from apo_bench.assembly.touching import facing
-from apo_bench.geometry import Array
+from apo_bench.geometry import Array, frozen
 from apo_bench.recognition.situation import Belief, Candidate, PartBeliefs, initial_belief, judged
 from apo_bench.recognition.thresholds import (
     RULES_BY_NOISE,
@@ -32,6 +33,7 @@ _BEGINNINGS = 12
 """Candidates that are tried as the first of an operation, at most."""
 
 
+@check_arguments
 def recognise(
     observation: Observation, rules: Rules = RULES_BY_NOISE, *, first_seen: Array | None = None
 ) -> Recognised:
@@ -52,7 +54,8 @@ def recognise(
     assembly = observation.assembly
     belief = initial_belief(observation)
     evidence = list[Evidence]()
-    as_seen = placements(assembly, observation.start, belief.goals if first_seen is None else first_seen)
+    goals = belief.goals if first_seen is None else frozen(first_seen, len(assembly), 4, 4)
+    as_seen = placements(assembly, observation.start, goals)
     standing = set(assembly.fixed)
     for k, (operation, poses) in enumerate(zip(assembly.operations, as_seen, strict=True)):
         others = tuple(p for p in assembly.solids if p in standing - set(operation.moves))

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.errors import require
 from apo_bench.io import clean, default_looks, save_figure
 from apo_bench.report.tables.table import Column, Table
@@ -67,6 +68,7 @@ def ranked(entries: Sequence[Entry], salts: frozenset[str] = frozenset()) -> lis
     ]
 
 
+@check_arguments
 def write_leaderboard(folder: str | Path, out: str | Path, salts: frozenset[str] = frozenset()) -> int:
     """Write the page, in Markdown, and its figure beside it; return how many entries it has.
 

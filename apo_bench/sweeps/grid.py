@@ -7,6 +7,7 @@ from itertools import product
 from numbers import Real
 from typing import Any, final
 
+from apo_bench.arguments import check_arguments
 from apo_bench.errors import require
 from apo_bench.io import UNSHOWN, grouped
 from apo_bench.records import (
@@ -49,6 +50,7 @@ _Level = float | tuple[float, float]
 
 
 @final
+@check_arguments
 @dataclass(frozen=True)
 class SweepSettings:
     """What a sweep varies; it runs every combination, with the same seeds in every cell."""

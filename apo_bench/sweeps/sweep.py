@@ -20,6 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from apo_bench.arguments import check_arguments
 from apo_bench.errors import InputError, require, require_known
 from apo_bench.io import JsonNode, grouped, read_toml
 from apo_bench.records import (
@@ -53,6 +54,7 @@ _LARGEST_WORKERS = 256
 _BACKENDS = ("local", "ray")
 
 
+@check_arguments
 def run_sweep(
     grids: SweepSettings | Sequence[SweepSettings],
     out: str | Path,
@@ -215,6 +217,7 @@ def is_sweep_file(text: str) -> bool:
     return "scenarios" in keys or not {"parts", "operations"} & set(keys)
 
 
+@check_arguments
 def read_sweep(
     path: str | Path, overrides: Mapping[str, Any] | None = None, besides: Sequence[str] = ()
 ) -> tuple[SweepSettings, ...]:

@@ -16,6 +16,7 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import (
     Assembly,
     Consistency,
@@ -89,6 +90,7 @@ DROPS = 3
 
 
 @final
+@check_arguments
 @dataclass(frozen=True)
 class ContactCorrector:
     """Nearest consistent goals; what to do if the test of the correction fails is said beforehand."""
@@ -115,6 +117,7 @@ class ContactCorrector:
             f"a test level of {self.level!r} was given; a number between 0 and 1 is allowed.",
         )
 
+    @check_arguments
     def __call__(self, observation: Observation) -> Correction:
         """Correct an observation.
 

@@ -9,6 +9,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, pose
 from apo_bench.resources import folder
@@ -39,6 +40,7 @@ _MOST_BUILT = 8
 _BUILT: dict[tuple[tuple[str, int], ...], Arm] = {}
 
 
+@check_arguments
 def read_arm(path: str | Path) -> Arm:
     """The arm of an arm file, built and measured.
 

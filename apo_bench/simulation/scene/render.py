@@ -9,19 +9,21 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Poses
-from apo_bench.errors import InputError, require
+from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Array
 from apo_bench.simulation.graphics import need_window, renderer
 from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import World, initial_state, place
 
 _Image = NDArray[np.uint8]
-SceneCamera = Any
+SceneCamera = str | mujoco.MjvCamera
 """The name of a camera of the room, or a `mujoco.MjvCamera`."""
 _VIDEO_ENDINGS = (".mp4", ".gif")
 
 
+@check_arguments
 def picture(
     scene: Scene,
     poses: Poses,
@@ -77,6 +79,7 @@ def arm_home(scene: Scene, data: Any) -> None:
         data.joint(f"arm/{finger}").qpos = at
 
 
+@check_arguments
 def camera_view(
     look_at: Array, distance_m: float = 0.45, azimuth_deg: float = 130.0, elevation_deg: float = -22.0
 ) -> SceneCamera:
@@ -89,6 +92,7 @@ def camera_view(
     return camera
 
 
+@check_arguments
 class Film:
     """Takes pictures of a replay: pass it as `watch`."""
 
@@ -112,6 +116,7 @@ class Film:
         self.fps = fps
         self.camera = camera or camera_view(middle, 0.85, 128.0, -24.0)
         self.frames: list[_Image] = []
+        _check_camera(scene.work, self.camera)
         self._renderer = renderer(scene.work.model, width, height)
         self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
         self._close = weakref.finalize(self, _release, self._renderer)
@@ -128,6 +133,7 @@ class Film:
         self._renderer.update_scene(data, camera=self.camera)
         return np.array(self._renderer.render())
 
+    @check_arguments
     def save(self, path: str | Path) -> None:
         """Write the film, by its ending as MP4 or GIF.
 
@@ -196,11 +202,18 @@ class ReplayWindow:
 def _drawn(
     world: World, data: Any, width: int, height: int, camera: SceneCamera, more: Callable[[Any], None] | None = None
 ) -> _Image:
+    _check_camera(world, camera)
     with renderer(world.model, width, height) as draws:
         draws.update_scene(data, camera=camera)
         if more is not None:
             more(draws.scene)
         return np.array(draws.render())
+
+
+def _check_camera(world: World, camera: SceneCamera) -> None:
+    names = [world.model.camera(i).name for i in range(world.model.ncam)]
+    if isinstance(camera, str):
+        require_known("camera", camera, names, rest=" Or give a camera_view.")
 
 
 def _at(world: World, scene: Scene, poses: Poses) -> Any:
