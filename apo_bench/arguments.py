@@ -144,8 +144,10 @@ def _one_of(types: Sequence[_Type]) -> _Type:
 def _array(is_truth: bool) -> _Type:
     """An array of real numbers; or of truth values, which may be 0 and 1."""
 
+    usual = np.dtype(np.bool_ if is_truth else np.float64)
+
     def take(value: Any) -> Any:
-        if type(value) is np.ndarray and value.dtype == np.float64 and value.ndim and not is_truth:
+        if type(value) is np.ndarray and value.dtype == usual and value.ndim:
             return value
         try:
             array = np.asarray(value)

@@ -80,6 +80,7 @@ class Consistency:
 
 
 @final
+@check_arguments
 @copyable
 @dataclass(frozen=True, eq=False)
 class Hypothesis:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly.error_models import OutlierModel, SharedError, Tails
 from apo_bench.assembly.topology import Assembly
-from apo_bench.errors import require
+from apo_bench.errors import ArgumentError, require, require_known
 from apo_bench.geometry import Array, copyable, freeze, pose
 
 Poses = Mapping[str, Array]
@@ -64,6 +64,7 @@ class Demonstration:
     def __post_init__(self) -> None:
         n = len(self.assembly)
         freeze(self, goals=(n, 4, 4), careless=(n, 6, 6), start=(4, 4), final=(4, 4))
+        _check_parts(self.assembly, self.start, self.final)
 
 
 @final
@@ -95,15 +96,18 @@ class Observation:
     def __post_init__(self) -> None:
         n = len(self.assembly)
         freeze(self, goals=(n, 4, 4), covariance=(n, 6, 6), start=(4, 4))
+        _check_parts(self.assembly, self.start)
         object.__setattr__(self, "shared", tuple(self.shared))
         for error in self.shared:
             if max(error.operations, default=-1) >= n:
-                raise ValueError(f"the shared error '{error.name}' names operation {max(error.operations) + 1} of {n}")
+                raise ArgumentError(
+                    f"the shared error '{error.name}' names operation {max(error.operations) + 1} of {n}"
+                )
         if self.tails is not None and len(self.tails.frames) != n:
-            raise ValueError(f"tails of {len(self.tails.frames)} operations were given for {n}")
+            raise ArgumentError(f"tails of {len(self.tails.frames)} operations were given for {n}")
         seen = np.array(self.seen, dtype=np.bool_)
         if seen.shape != (n,):
-            raise ValueError(f"`seen` needs shape ({n},), {seen.shape} was given")
+            raise ArgumentError(f"`seen` needs shape ({n},), {seen.shape} was given")
         seen.flags.writeable = False
         object.__setattr__(self, "seen", seen)
 
@@ -119,6 +123,12 @@ class Observation:
             "observe the demonstration again.",
         )
         return Plan(self.assembly, self.start, self.goals)
+
+
+def _check_parts(assembly: Assembly, *placed: Poses) -> None:
+    """Raise an `InputError` if poses are of a part that the assembly does not have."""
+    for part in {part: None for poses in placed for part in poses}:
+        require_known("part in the poses", part, assembly.solids)
 
 
 class Step(NamedTuple):
@@ -153,6 +163,7 @@ class Plan:
     def __post_init__(self) -> None:
         n = len(self.assembly)
         freeze(self, goals=(n, 4, 4), start=(4, 4))
+        _check_parts(self.assembly, self.start)
         if not self.schedule:
             object.__setattr__(self, "schedule", once_each(n))
         if not len(self.targets):

@@ -229,6 +229,7 @@ class Assembly:
             together.setdefault((made, frozenset(of.part for of in contact)), []).append(i)
         return tuple(map(tuple, together.values()))
 
+    @check_arguments
     def without(self, left_out: Collection[str]) -> NDArray[np.bool_]:
         """Which contacts are left, (c,) in the order of `relations()`, without some.
 

@@ -17,7 +17,7 @@ from apo_bench.correction.checks.correction_checks import RIGID, check_correctio
 from apo_bench.correction.checks.status import gap_of, goals_as_given, opposing
 from apo_bench.correction.contact.contact import ContactCorrector
 from apo_bench.correction.robust.robust import RobustCorrector, contact_robust
-from apo_bench.errors import InputError, failed, kind, require
+from apo_bench.errors import ArgumentError, InputError, failed, kind, require
 from apo_bench.geometry import Array, NotReal, is_rigid, real
 from apo_bench.names import resolve
 from apo_bench.records import CORRECTOR, CORRECTORS
@@ -69,6 +69,8 @@ def correct(observation: Observation, corrector: Any = CORRECTOR, look: Look | N
     except InputError as error:
         if ours or isinstance(error, CorrectorMisbehaved):
             raise
+        if isinstance(error, ArgumentError):
+            raise CorrectorMisbehaved(str(failed(f"the corrector '{name}'", error))) from error
         raise CorrectorMisbehaved(str(error)) from error
     except Exception as error:
         raise CorrectorMisbehaved(str(failed(f"the corrector '{name}'", error))) from error

@@ -101,8 +101,8 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
             raise gymnasium.error.ResetNeeded("the episode is over, or there is none; call reset().")
         if not self.action_space.contains(action):
             raise InputError(
-                f"the action {shown(action)} was given; a dict of 'act', 0 to 2, and 'twist', (6,) within 0.1 m and 0.5 "
-                "rad, is allowed, as `env.action_space` says."
+                f"the action {shown(action)} was given; a dict of 'act', 0 to 2, and 'twist', (6,) within 0.1 m and "
+                "0.5 rad, is allowed, as `env.action_space` says."
             )
         act = int(action["act"])
         self._acts += 1

@@ -88,7 +88,7 @@ def freeze(record: Any, **shapes: tuple[int | None, ...] | None) -> None:
             elif shape is not None:
                 object.__setattr__(record, name, frozen(value, *shape))
         except ArgumentError as error:
-            raise ArgumentError(f"{name} of {type(record).__name__}: {error}") from None
+            raise ArgumentError(f"{name} of {type(record).__name__}: {error}.") from None
 
 
 def copyable(record: type[Record]) -> type[Record]:

@@ -13,7 +13,7 @@ import numpy as np
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Demonstration, Observation
-from apo_bench.errors import InputError, failed, require
+from apo_bench.errors import ArgumentError, InputError, failed, require
 from apo_bench.geometry import Array, is_rigid
 from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.records import check, level_pair
@@ -50,9 +50,9 @@ def observe(
     try:
         seen = noise(demonstration.assembly, demonstration, rng)
         complaint = _complaint(demonstration, seen)
-    except InputError:
-        raise
     except Exception as error:
+        if isinstance(error, InputError) and not isinstance(error, ArgumentError):
+            raise
         raise failed(f"the noise model '{name}'", error) from error
     require(not complaint, f"the noise model '{name}' {complaint}.")
     return replace(seen, gap_m=demonstration.gap_m, play_m=demonstration.play_m)

@@ -270,6 +270,8 @@ def _value(key: str, node: JsonNode) -> Any:
 
 
 def _entries(node: JsonNode, key: str, of: str) -> Sequence[JsonNode]:
+    if isinstance(node.value, str):
+        return [node]
     if not isinstance(node.value, list) or not node.value:
         empty = "an empty grid has no trials, so name at least one or leave the key out"
         node.fail(f"a list of {of} is needed", empty if node.value == [] else f"write {key} = [...]")

@@ -151,6 +151,7 @@ class ContactCorrector:
                 results[i] = correction
         return [correction for correction in results if correction is not None]
 
+    @check_arguments
     def leaving_out(self, observation: Observation, dropped: tuple[str, ...]) -> Correction:
         """Correct an observation by all contacts but those of some relations."""
         problem = problem_of((observation,), self.level, self.compiled)

@@ -308,7 +308,8 @@ def _beside(path: Path, node: JsonNode) -> Path:
 
 
 def _names(node: JsonNode) -> tuple[str, ...]:
-    _check_length(node, "names")
+    if not isinstance(node.value, str):
+        _check_length(node, "names")
     return tuple(each.text() for each in node.items("name"))
 
 
