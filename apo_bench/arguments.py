@@ -42,7 +42,7 @@ def check_arguments(public: Public) -> Public:
     Raises:
         ArgumentError: When called with an argument of another type.
     """
-    function: Any = public.__init__ if isinstance(public, type) else public
+    function: Any = vars(public)["__init__"] if isinstance(public, type) else public
     called = public.__qualname__.removesuffix(".__call__")
     positional = function.__code__.co_varnames[: function.__code__.co_argcount]
     types: dict[str, _Type] = {}
@@ -90,12 +90,17 @@ def _read(hint: Any) -> _Type:
         return _array(is_truth=np.dtype[np.bool_] in within)
     if not isinstance(origin, type) or _is_unchecked_protocol(origin):
         return _ANYTHING
+    if issubclass(origin, tuple) and hasattr(origin, "_fields"):
+        return _named_tuple(origin)
     if issubclass(origin, Mapping) and within:
         return _mapping(*map(_read, within))
     if issubclass(origin, Collection) and within:
         return _several(origin, within)
-    article = "an" if origin.__name__[0] in "AEIOU" else "a"
-    return _Type(f"{article} {origin.__name__}", lambda value: _require(isinstance(value, origin), value))
+    return _Type(_with_article(origin), lambda value: _require(isinstance(value, origin), value))
+
+
+def _with_article(origin: type) -> str:
+    return f"{'an' if origin.__name__[0] in 'AEIOU' else 'a'} {origin.__name__}"
 
 
 def _is_unchecked_protocol(origin: type) -> bool:
@@ -158,7 +163,7 @@ def _array(is_truth: bool) -> _Type:
             _require(np.isin(array, (0, 1)).all(), value)
         return array
 
-    return _Type("an array of True and False" if is_truth else "an array of numbers", take)
+    return _Type("an array of True and False" if is_truth else "an array of real numbers", take)
 
 
 def _mapping(name: _Type, entry: _Type) -> _Type:
@@ -195,6 +200,20 @@ def _several(origin: type, within: tuple[Any, ...]) -> _Type:
     if count is None:
         return _Type(f"a list, each entry {entries[0].words},", take)
     return _Type(f"a list of {' and '.join(one.words for one in entries)}", take)
+
+
+def _named_tuple(origin: Any) -> _Type:
+    """A record that is a tuple; a plain one, or a list, is made one."""
+    types = [_read(hint) for hint in get_type_hints(origin, include_extras=True).values()]
+    least = len(types) - len(origin._field_defaults)
+
+    def take(value: Any) -> Any:
+        _require(isinstance(value, tuple | list) and least <= len(value) <= len(types), value)
+        taken = origin(*map(_take_entry, types, value))
+        unchanged = isinstance(value, origin) and all(a is b for a, b in zip(taken, value, strict=True))
+        return value if unchanged else taken
+
+    return _Type(_with_article(origin), take)
 
 
 def _take_entry(of: _Type, value: Any) -> Any:

@@ -50,7 +50,7 @@ def kind(value: Any) -> str:
     """What a value is, for a sentence: `a str`, `an int`, `None`, `a class`."""
     if value is None or isinstance(value, type):
         return "None" if value is None else "a class"
-    name = type(value).__name__
+    name = type(value).__name__.removeprefix("nd")  # an array of NumPy
     return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
 
 

@@ -47,11 +47,6 @@ def correct(observation: Observation, corrector: Any = CORRECTOR, look: Look | N
         CorrectorMisbehaved: It raised an error, or returned something else, or a schedule that makes no sense.
     """
     check_observations((observation,))
-    if look is not None and not isinstance(look, Look):
-        raise InputError(
-            f"a look of {look!r} was given, which cannot be called or does not say how many are left; give an "
-            "apo_bench.observation.looking.Looks."
-        )
     chosen = checked_corrector(corrector)
     name = corrector if isinstance(corrector, str) else getattr(chosen, "__name__", type(chosen).__name__)
     ours = _ours(chosen)
@@ -160,15 +155,6 @@ def correct_many(
     Raises:
         InputError: They are not, one makes no sense, or a covariance is not positive definite.
     """
-    require(
-        not isinstance(observations, Observation) and isinstance(observations, Sequence),
-        "correct_many needs a list of observations; ask `correct` for one, or make a list of them.",
-    )
-    require(
-        isinstance(corrector, ContactCorrector | RobustCorrector),
-        f"correct_many was given {corrector!r}; give a ContactCorrector, such as ContactCorrector('drop'), or a "
-        "RobustCorrector.",
-    )
     if not observations:
         return ()
     check_observations(observations)

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Sequence
-from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Outcome, Poses, Snapshot
-from apo_bench.envs.episode import asked_options, check_flag
+from apo_bench.envs.episode import asked_options
 from apo_bench.envs.spaces import PIXELS, as_seen, insert_space
 from apo_bench.envs.starts import Begun, RobotSettings, Trials, judged
 from apo_bench.errors import InputError, require, shown, unknown
@@ -138,13 +137,9 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         if reward not in _REWARDS:
             raise InputError(unknown("reward", str(reward), _REWARDS))
         for name, size in (("shift_mm", shift_mm), ("turn_deg", turn_deg), ("fails_above_n", fails_above_n)):
-            is_size = isinstance(size, Real) and 0.0 < size < math.inf
-            require(is_size, f"{name} {size!r} was given; a number above 0 is allowed.")
+            require(0.0 < size < math.inf, f"{name} {size!r} was given; a number above 0 is allowed.")
         for name, count in (("horizon", horizon), ("layouts", layouts)):
-            is_count = isinstance(count, Real) and math.isfinite(count) and count == int(count) > 0
-            require(is_count, f"{name} {count!r} was given; a whole number above 0 is allowed.")
-        for name, flag in (("residual", residual), ("pixels", pixels)):
-            check_flag(name, flag)
+            require(count > 0, f"{name} {count!r} was given; a whole number above 0 is allowed.")
         check("seed", first_trial)
         check("careless", careless)
         self.render_mode = render_mode

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Observation, Outcome, ReplayResult, Step
 from apo_bench.envs.apo_replay import APOReplay
-from apo_bench.envs.episode import VERDICTS, check_flag, step_info, verdicts
+from apo_bench.envs.episode import VERDICTS, step_info, verdicts
 from apo_bench.envs.spaces import Seen, packed, track_spaces
 from apo_bench.envs.tracking import Act, Policy, Tracked, exactly_at, first_seen
 from apo_bench.errors import InputError, shown
@@ -66,7 +66,6 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
 
     def __init__(self, scenario: Any = "stick_in_tower", replay: bool = True, **of_replay: Any) -> None:
         self._base = APOReplay(scenario, **of_replay)
-        check_flag("replay", replay)
         self._replay = replay
         self.render_mode = self._base.render_mode
         n = len(self._base.assembly)

@@ -13,7 +13,7 @@ from typing import Any, final
 import numpy as np
 
 from apo_bench.assembly import Observation, Outcome
-from apo_bench.errors import InputError, require, unknown
+from apo_bench.errors import InputError, unknown
 from apo_bench.judging.verdict import Verdict
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level
@@ -76,11 +76,6 @@ def asked_options(options: object, allowed: Sequence[str]) -> dict[str, Any]:
         if name not in allowed:
             raise InputError(unknown("option of reset()", str(name), allowed))
     return asked
-
-
-def check_flag(name: str, value: object) -> None:
-    """Raise an `InputError` unless an argument is True or False."""
-    require(isinstance(value, bool | np.bool_), f"{name} {value!r} was given; True or False is allowed.")
 
 
 def with_options(usual: Settings, options: object, eye: str) -> Settings:

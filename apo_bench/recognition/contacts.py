@@ -50,7 +50,7 @@ def recognise(
     Raises:
         InputError: Something else was given.
     """
-    observation = without_contacts(observation, rules, "recognise")
+    observation = without_contacts(observation)
     assembly = observation.assembly
     belief = initial_belief(observation)
     evidence = list[Evidence]()

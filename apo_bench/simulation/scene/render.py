@@ -3,7 +3,7 @@
 import weakref
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
@@ -18,7 +18,7 @@ from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import World, initial_state, place
 
 _Image = NDArray[np.uint8]
-SceneCamera = str | mujoco.MjvCamera
+SceneCamera: TypeAlias = str | mujoco.MjvCamera
 """The name of a camera of the room, or a `mujoco.MjvCamera`."""
 _VIDEO_ENDINGS = (".mp4", ".gif")
 
