@@ -54,8 +54,8 @@ def check_arguments(public: Public) -> Public:
             return types[name].take(value)
         except _Unfit as unfit:
             within = "" if unfit.entry is None or unfit.entry is value else f" with {shown(unfit.entry)} in it"
-            given = f"{shown(value)}{within} was given as {name} of {called}"
-            raise ArgumentError(f"{given}; {types[name].words} is needed.") from None
+            wanted = f"{name} of {called} must be {types[name].words}"
+            raise ArgumentError(f"{wanted}, got {shown(value)}{within}.") from None
 
     @wraps(function)
     def checked(*given: Any, **named: Any) -> Any:
@@ -82,7 +82,8 @@ def _read(hint: Any) -> _Type:
         return _one_of([*map(_read, within)])
     if origin is Literal:
         return _Type(
-            " or ".join(map(repr, within)), lambda value: _require(isinstance(value, str) and value in within, value)
+            f"one of {', '.join(map(repr, within))}",
+            lambda value: _require(isinstance(value, str) and value in within, value),
         )
     if origin is Callable:
         return _Type("a function", lambda value: _require(callable(value), value))
@@ -143,7 +144,8 @@ def _one_of(types: Sequence[_Type]) -> _Type:
                 last = unfit
         raise last
 
-    return _Type(" or ".join(dict.fromkeys(each.words for each in types)), take)
+    *words, last = dict.fromkeys(each.words for each in types)
+    return _Type(f"{', '.join(words)} or {last}" if words else last, take)
 
 
 def _array(is_truth: bool) -> _Type:
@@ -198,7 +200,7 @@ def _several(origin: type, within: tuple[Any, ...]) -> _Type:
         return several if unchanged else made(taken)
 
     if count is None:
-        return _Type(f"a list, each entry {entries[0].words},", take)
+        return _Type(f"a list (each entry {entries[0].words})", take)
     return _Type(f"a list of {' and '.join(one.words for one in entries)}", take)
 
 

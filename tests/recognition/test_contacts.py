@@ -191,7 +191,7 @@ def test_recognised_twice_sees_as_much_as_once() -> None:
 @pytest.mark.parametrize("wrong", [("seen.csv",), (None,), ("seen", "fixed"), ("seen", None), ("seen", Rules)])
 def test_what_is_no_observation_and_no_rules_is_said(wrong: tuple[Any, ...]) -> None:
     given = [seen_at(scenes.bridge(), 0, 0.5) if x == "seen" else x for x in wrong]
-    with pytest.raises(InputError, match=r"as (observation|rules) of recognise; an? (Observation|Rules) is needed"):
+    with pytest.raises(InputError, match=r"(observation|rules) of recognise must be an? (Observation|Rules), got"):
         recognise(*given)
 
 

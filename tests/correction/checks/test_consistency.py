@@ -240,7 +240,9 @@ def test_a_level_that_is_none_is_refused(level: float) -> None:
 
 
 def test_a_policy_that_is_none_is_refused() -> None:
-    with pytest.raises(InputError, match=r"^'hope' was given as doubt of ContactCorrector; 'apply' or 'warn' or"):
+    with pytest.raises(
+        InputError, match=r"^doubt of ContactCorrector must be one of 'apply', 'warn', 'refuse', 'drop', got 'hope'\.$"
+    ):
         ContactCorrector("hope")  # type: ignore[arg-type]
 
 

@@ -86,9 +86,11 @@ def test_of_many_the_one_is_named(case: str) -> None:
 
 def test_many_needs_a_list_and_a_corrector_of_its_kind() -> None:
     for given in (seen(), None, [seen(), None]):
-        with pytest.raises(InputError, match="was given as observations of correct_many; a list, each entry an Obs"):
+        with pytest.raises(InputError, match="observations of correct_many must be a list .each entry an Observation"):
             correct_many(given)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="'paper' was given as corrector of correct_many; a ContactCorrector or a Rob"):
+    with pytest.raises(
+        InputError, match="corrector of correct_many must be a ContactCorrector or a RobustCorrector, got 'paper'"
+    ):
         correct_many([seen()], "paper")  # type: ignore[arg-type]
 
 
@@ -114,12 +116,12 @@ def test_the_gaps_that_a_corrector_claims_are_measured() -> None:
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        ({"sentence": None}, "None was given as sentence of Correction; a text is needed"),
+        ({"sentence": None}, "sentence of Correction must be a text, got None"),
         ({"sentence": " "}, "returned ' ' as its sentence"),
         ({"sentence": "a\nb"}, "as its sentence"),
-        ({"test": 3}, "3 was given as test of Correction; a Consistency or None is needed"),
+        ({"test": 3}, "test of Correction must be a Consistency or None, got 3"),
         ({"dropped": ("R99",)}, "returned 'R99' in `dropped`; return a tuple of relations, such as 'R1'"),
-        ({"dropped": ([],)}, "a tuple with a list in it was given as dropped of Correction"),
+        ({"dropped": ([],)}, "dropped of Correction must be a list (each entry a text), got a tuple with a list in it"),
     ],
 )
 def test_words_that_nobody_can_read_are_refused(changed: dict[str, Any], message: str) -> None:
