@@ -15,7 +15,6 @@ from typing import Any, final
 
 import numpy as np
 
-from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Correction, Observation
 from apo_bench.correction.own_code.own import OwnCorrectors
 from apo_bench.errors import require, unknown
@@ -90,7 +89,6 @@ def sequential_test(
     return Decision(passed, successes, trials, f"{successes} of {trials} trials succeeded: {verdict}{undecided}")
 
 
-@check_arguments
 def assert_success_rate(
     method: str | Callable[[Observation], Correction],
     trials: str | Path | TrialSettings | Mapping[str, Any],

@@ -155,9 +155,7 @@ def test_seen_is_true_or_false_and_start_is_of_parts_that_there_are() -> None:
     n = len(observation.goals)
     assert dataclasses.replace(observation, seen=[1] * n).seen.all()
     for seen in ([2] * n, [np.nan] * n, ["yes"] * n):
-        with pytest.raises(
-            apo_bench.InputError, match="^seen of Observation must be an array of True and False, got a list"
-        ):
+        with pytest.raises(apo_bench.InputError, match="seen of Observation must be an array of True"):
             dataclasses.replace(observation, seen=seen)
     start = {**observation.start, "stik": np.eye(4)}
     shown = {"careless": observation.covariance, "final": {}}

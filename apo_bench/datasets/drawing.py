@@ -185,8 +185,7 @@ def pairs(
     Raises:
         InputError: There is no such scenario or noise model, or a number is not allowed.
     """
-    is_count = isinstance(n, int | np.integer) and 1 <= n <= _MOST
-    require(is_count, f"{n!r} pairs were asked for; give a whole number from 1 to {_MOST}.")
+    require(1 <= n <= _MOST, f"{n!r} pairs were asked for; give a whole number from 1 to {_MOST}.")
     blocks = list[Pairs]()
     for block in endless_pairs(scenarios, noise, seed, level=level, careless=careless):
         blocks.append(block)

@@ -211,7 +211,6 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         """The operation of this episode, from 1."""
         return self._now().start.operation + 1
 
-    @check_arguments
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
         """Begin at one of the starts.
 

@@ -216,7 +216,6 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             raise gymnasium.error.ResetNeeded(f"{missing} yet; call reset() first.")
         return self._episode
 
-    @check_arguments
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
         """Watch another demonstration; `seed=k` is trial k.
 

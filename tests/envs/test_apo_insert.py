@@ -169,12 +169,12 @@ def test_many_environments_and_a_history() -> None:
         ({"corrector": "oracle+feel"}, "give what is before it"),
         ({"corrector": "orcale"}, "did you mean 'oracle'"),
         ({"render_mode": "human"}, "render mode"),
-        ({"residual": "no"}, "residual 'no' was given; True or False"),
-        ({"pixels": 2}, "pixels 2 was given; True or False"),
-        ({"horizon": "a"}, "horizon 'a' was given"),
-        ({"horizon": float("inf")}, "horizon inf was given"),
-        ({"turn_deg": "a"}, "turn_deg 'a' was given"),
-        ({"first_trial": "x"}, "seed of x"),
+        ({"residual": "no"}, "residual of APOInsert must be True or False, got 'no'"),
+        ({"pixels": 2}, "pixels of APOInsert must be True or False, got 2"),
+        ({"horizon": "a"}, "horizon of APOInsert must be a whole number, got 'a'"),
+        ({"horizon": float("inf")}, "horizon of APOInsert must be a whole number, got inf"),
+        ({"turn_deg": "a"}, "turn_deg of APOInsert must be a number, got 'a'"),
+        ({"first_trial": "x"}, "first_trial of APOInsert must be a whole number"),
     ],
 )
 def test_wrong_arguments_are_refused_in_one_sentence(wrong: dict[str, Any], said: str) -> None:
