@@ -114,8 +114,15 @@ def _require(fits: object, value: Any) -> Any:
     return value
 
 
-def _is_number(value: Any, of: type) -> bool:
-    return isinstance(value, of) and not isinstance(value, bool)
+def _number(value: Any) -> Any:
+    return _require(isinstance(value, Real) and not isinstance(value, bool), value)
+
+
+def _whole(value: Any) -> Any:
+    """A whole number as it is, or a number that is one, such as 2.0."""
+    if isinstance(value, Integral):
+        return _number(value)
+    return int(_require(float(_number(value)).is_integer(), value))
 
 
 _ANYTHING = _Type("anything", lambda value: value)
@@ -127,8 +134,8 @@ _PLAIN: Mapping[Any, _Type] = {
     NoneType: _NONE,
     str: _Type("a text", lambda value: _require(isinstance(value, str), value)),
     bool: _Type("True or False", lambda value: _require(isinstance(value, bool | np.bool_), value)),
-    int: _Type("a whole number", lambda value: _require(_is_number(value, Integral), value)),
-    float: _Type("a number", lambda value: _require(_is_number(value, Real), value)),
+    int: _Type("a whole number", _whole),
+    float: _Type("a number", _number),
 }
 
 

@@ -411,7 +411,7 @@ def test_plain_pairs_are_steps() -> None:
             {"schedule": (0, "1", 2)},
             "schedule of Correction must be a list (each entry a Step), got a tuple with 0 in it",
         ),
-        ({"schedule": (Step(0.0), Step(1), Step(2))}, "got a tuple with 0.0 in it"),
+        ({"schedule": (Step(0.5), Step(1), Step(2))}, "got a tuple with 0.5 in it"),
         ({"schedule": "1 2 3"}, "schedule of Correction must be a list (each entry a Step), got '1 2 3'"),
         ({"schedule": ((0, False, 3),)}, "got a tuple with a tuple in it"),
         ({"freed": (99, -5)}, "returned the operation 99 in `freed`; return whole numbers from 0 to 2"),

@@ -86,9 +86,7 @@ def test_of_many_the_one_is_named(case: str) -> None:
 
 def test_many_needs_a_list_and_a_corrector_of_its_kind() -> None:
     for given in (seen(), None, [seen(), None]):
-        with pytest.raises(
-            InputError, match=r"observations of correct_many must be a list \(each entry an Observation\)"
-        ):
+        with pytest.raises(InputError, match=r"correct_many must be a list \(each entry an Observation\)"):
             correct_many(given)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="must be a ContactCorrector or a RobustCorrector, got 'paper'"):
         correct_many([seen()], "paper")  # type: ignore[arg-type]
