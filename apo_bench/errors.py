@@ -2,6 +2,8 @@
 
 from collections.abc import Collection, Iterable
 from difflib import get_close_matches
+from numbers import Real
+from pathlib import PurePath
 from typing import Any
 
 _MOST = 24
@@ -16,6 +18,10 @@ RAISED = (Exception, SystemExit)
 
 class InputError(ValueError):
     """A request or a file that cannot be honoured; its message is one clear sentence (CLI: exit code 2)."""
+
+
+class ArgumentError(InputError):
+    """An argument of a public function, or a field of a public record, that is not what it takes."""
 
 
 def unknown(kind: str, given: str, allowed: Iterable[str]) -> str:
@@ -37,7 +43,7 @@ def one_line(text: str, longest: int) -> str:
 def failed(what: str, error: BaseException) -> InputError:
     """`the noise model 'mine' failed: it raised RuntimeError('oops'); mend it, or use another.`, to raise from it."""
     try:
-        text = " ".join(str(error).split()) if type(error) is ValueError else ""
+        text = " ".join(str(error).split()) if type(error) in (ValueError, ArgumentError) else ""
         said = text.rstrip(".") or f"it raised {' '.join(repr(error).split())}"
     except Exception:
         said = f"it raised {type(error).__name__}"
@@ -53,8 +59,15 @@ def kind(value: Any) -> str:
     """What a value is, for a sentence: `a str`, `an int`, `None`, `a class`."""
     if value is None or isinstance(value, type):
         return "None" if value is None else "a class"
-    name = type(value).__name__
+    name = type(value).__name__.removeprefix("nd")  # an array of NumPy
     return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
+
+
+def shown(value: Any) -> str:
+    """A value for a sentence: a text or a number itself, of anything else what it is."""
+    if isinstance(value, str | PurePath):
+        return repr(value)[:_LONGEST]
+    return str(value) if isinstance(value, Real) else kind(value)
 
 
 def require_text(called: str, value: Any) -> None:

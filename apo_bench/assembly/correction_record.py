@@ -6,6 +6,7 @@ from typing import NamedTuple, Protocol, final, runtime_checkable
 
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly.goals import Observation, Plan, Step
 from apo_bench.assembly.topology import Contact
 from apo_bench.errors import require
@@ -79,6 +80,7 @@ class Consistency:
 
 
 @final
+@check_arguments
 @copyable
 @dataclass(frozen=True, eq=False)
 class Hypothesis:
@@ -106,6 +108,7 @@ class Hypothesis:
 
 
 @final
+@check_arguments
 @copyable
 @dataclass(frozen=True, eq=False)
 class Correction:
@@ -158,6 +161,7 @@ class Correction:
     def ok(self) -> bool:
         return self.status == "converged"
 
+    @check_arguments
     def plan(self, observation: Observation) -> Plan:
         """What the robot is to do after this correction of `observation`.
 

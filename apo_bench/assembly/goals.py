@@ -12,9 +12,10 @@ from typing import NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly.error_models import OutlierModel, SharedError, Tails
 from apo_bench.assembly.topology import Assembly
-from apo_bench.errors import require
+from apo_bench.errors import ArgumentError, require, require_known
 from apo_bench.geometry import Array, copyable, freeze, pose
 
 Poses = Mapping[str, Array]
@@ -23,6 +24,7 @@ SCHEDULE_REMEDY = "do operations in order, undo the last one that is done, and h
 
 
 @final
+@check_arguments
 @copyable
 @dataclass(frozen=True, eq=False)
 class Layout:
@@ -36,6 +38,7 @@ class Layout:
 
 
 @final
+@check_arguments
 @copyable
 @dataclass(frozen=True, eq=False)
 class Demonstration:
@@ -61,9 +64,11 @@ class Demonstration:
     def __post_init__(self) -> None:
         n = len(self.assembly)
         freeze(self, goals=(n, 4, 4), careless=(n, 6, 6), start=(4, 4), final=(4, 4))
+        _check_parts(self.assembly, self.start, self.final)
 
 
 @final
+@check_arguments
 @copyable
 @dataclass(frozen=True, eq=False)
 class Observation:
@@ -91,15 +96,18 @@ class Observation:
     def __post_init__(self) -> None:
         n = len(self.assembly)
         freeze(self, goals=(n, 4, 4), covariance=(n, 6, 6), start=(4, 4))
+        _check_parts(self.assembly, self.start)
         object.__setattr__(self, "shared", tuple(self.shared))
         for error in self.shared:
             if max(error.operations, default=-1) >= n:
-                raise ValueError(f"the shared error '{error.name}' names operation {max(error.operations) + 1} of {n}")
+                raise ArgumentError(
+                    f"the shared error '{error.name}' names operation {max(error.operations) + 1} of {n}"
+                )
         if self.tails is not None and len(self.tails.frames) != n:
-            raise ValueError(f"tails of {len(self.tails.frames)} operations were given for {n}")
+            raise ArgumentError(f"tails of {len(self.tails.frames)} operations were given for {n}")
         seen = np.array(self.seen, dtype=np.bool_)
         if seen.shape != (n,):
-            raise ValueError(f"`seen` needs shape ({n},), {seen.shape} was given")
+            raise ArgumentError(f"`seen` needs shape ({n},), {seen.shape} was given")
         seen.flags.writeable = False
         object.__setattr__(self, "seen", seen)
 
@@ -117,6 +125,12 @@ class Observation:
         return Plan(self.assembly, self.start, self.goals)
 
 
+def _check_parts(assembly: Assembly, *placed: Poses) -> None:
+    """Raise an `InputError` if poses are of a part that the assembly does not have."""
+    for part in {part: None for poses in placed for part in poses}:
+        require_known("part in the poses", part, assembly.solids)
+
+
 class Step(NamedTuple):
     """One entry of a schedule: do an operation (counted from 0), or undo it."""
 
@@ -130,6 +144,7 @@ def once_each(n: int) -> tuple[Step, ...]:
 
 
 @final
+@check_arguments
 @copyable
 @dataclass(frozen=True, eq=False)
 class Plan:
@@ -148,12 +163,14 @@ class Plan:
     def __post_init__(self) -> None:
         n = len(self.assembly)
         freeze(self, goals=(n, 4, 4), start=(4, 4))
+        _check_parts(self.assembly, self.start)
         if not self.schedule:
             object.__setattr__(self, "schedule", once_each(n))
         if not len(self.targets):
             object.__setattr__(self, "targets", self.goals[[step.operation for step in self.schedule]])
         freeze(self, targets=(len(self.schedule), 4, 4))
 
+    @check_arguments
     def with_goals(self, goals: Array) -> "Plan":
         """The plan with other goals, (n, 4, 4), and with them where its schedule brings parts to the old ones."""
         done = [step.operation for step in self.schedule]

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import final
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly.goals import Poses, Step
 from apo_bench.geometry import copyable, freeze
 
@@ -93,6 +94,7 @@ class Felt:
 
 
 @final
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class ReplayResult:
     """One replay: what was reached and how it went."""

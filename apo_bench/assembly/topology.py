@@ -14,6 +14,7 @@ from typing import Literal, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly.facing_round import WALLS, contact_kind, geometric_play
 from apo_bench.geometry import Array, Face, RoundFace, Solid, copyable, freeze, frozen, pose, remembered
 
@@ -66,6 +67,7 @@ class Gap(NamedTuple):
 
 
 @final
+@check_arguments
 @dataclass(frozen=True)
 class Operation:
     """One act, without numbers: who moves, which contacts it makes, whom it carries."""
@@ -102,6 +104,7 @@ class Relation(NamedTuple):
 
 
 @final
+@check_arguments
 @copyable
 @dataclass(frozen=True, eq=False)
 class Assembly:
@@ -226,6 +229,7 @@ class Assembly:
             together.setdefault((made, frozenset(of.part for of in contact)), []).append(i)
         return tuple(map(tuple, together.values()))
 
+    @check_arguments
     def without(self, left_out: Collection[str]) -> NDArray[np.bool_]:
         """Which contacts are left, (c,) in the order of `relations()`, without some.
 

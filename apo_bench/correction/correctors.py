@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Correction, Look, LookingCorrector, Observation, lowered_observation
 from apo_bench.correction.checks.correction_checks import RIGID, check_correction, check_near, check_observations
 from apo_bench.correction.checks.status import gap_of, goals_as_given, opposing
 from apo_bench.correction.contact.contact import ContactCorrector
 from apo_bench.correction.robust.robust import RobustCorrector, contact_robust
-from apo_bench.errors import RAISED, InputError, failed, kind, require
+from apo_bench.errors import RAISED, ArgumentError, InputError, failed, kind, require
 from apo_bench.geometry import Array, NotReal, is_rigid, real
 from apo_bench.names import resolve
 from apo_bench.records import CORRECTOR, CORRECTORS
@@ -31,6 +32,7 @@ class CorrectorMisbehaved(InputError):
     """A corrector raised an error, or returned what it must not: its own failure, not that of the request."""
 
 
+@check_arguments
 def correct(observation: Observation, corrector: Any = CORRECTOR, look: Look | None = None) -> Correction:
     """What the corrector makes of an observation.
 
@@ -45,11 +47,6 @@ def correct(observation: Observation, corrector: Any = CORRECTOR, look: Look | N
         CorrectorMisbehaved: It raised an error, or returned something else, or a schedule that makes no sense.
     """
     check_observations((observation,))
-    if look is not None and not isinstance(look, Look):
-        raise InputError(
-            f"a look of {look!r} was given, which cannot be called or does not say how many are left; give an "
-            "apo_bench.observation.looking.Looks."
-        )
     chosen = checked_corrector(corrector)
     name = corrector if isinstance(corrector, str) else getattr(chosen, "__name__", type(chosen).__name__)
     ours = _ours(chosen)
@@ -67,6 +64,8 @@ def correct(observation: Observation, corrector: Any = CORRECTOR, look: Look | N
     except InputError as error:
         if ours or isinstance(error, CorrectorMisbehaved):
             raise
+        if isinstance(error, ArgumentError):
+            raise CorrectorMisbehaved(str(failed(f"the corrector '{name}'", error))) from error
         raise CorrectorMisbehaved(str(error)) from error
     except RAISED as error:
         raise CorrectorMisbehaved(str(failed(f"the corrector '{name}'", error))) from error
@@ -143,6 +142,7 @@ LARGEST_JACOBIANS = 96_000
 """Entries of all their Jacobians: more would leave the cache of the processor."""
 
 
+@check_arguments
 def correct_many(
     observations: Sequence[Observation], corrector: ContactCorrector | RobustCorrector = contact_robust
 ) -> tuple[Correction, ...]:
@@ -155,15 +155,6 @@ def correct_many(
     Raises:
         InputError: They are not, one makes no sense, or a covariance is not positive definite.
     """
-    require(
-        not isinstance(observations, Observation) and isinstance(observations, Sequence),
-        "correct_many needs a list of observations; ask `correct` for one, or make a list of them.",
-    )
-    require(
-        isinstance(corrector, ContactCorrector | RobustCorrector),
-        f"correct_many was given {corrector!r}; give a ContactCorrector, such as ContactCorrector('drop'), or a "
-        "RobustCorrector.",
-    )
     if not observations:
         return ()
     check_observations(observations)

@@ -16,6 +16,7 @@ from typing import final
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import (
     ODL,
     Assembly,
@@ -125,6 +126,7 @@ class Explanation:
     """What else may be believed of what was seen, each with its weight, as of the correction."""
 
 
+@check_arguments
 def explain(observation: Observation, goals: Array | Correction, dropped: Collection[str] = ()) -> Explanation:
     """What the contacts determine at goals that satisfy them, and how uncertain these are after what was seen.
 

@@ -14,6 +14,7 @@ from zlib import crc32
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Demonstration, Layout, Observation, Operation
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
@@ -158,6 +159,7 @@ class Pairs:
 _ARRAYS = tuple(field.name for field in fields(Pairs))[:6]
 
 
+@check_arguments
 def pairs(
     scenarios: Given | Sequence[Given],
     noise: Any = USUAL,
@@ -183,8 +185,7 @@ def pairs(
     Raises:
         InputError: There is no such scenario or noise model, or a number is not allowed.
     """
-    is_count = isinstance(n, int | np.integer) and 1 <= n <= _MOST
-    require(is_count, f"{n!r} pairs were asked for; give a whole number from 1 to {_MOST}.")
+    require(1 <= n <= _MOST, f"{n!r} pairs were asked for; give a whole number from 1 to {_MOST}.")
     blocks = list[Pairs]()
     for block in endless_pairs(scenarios, noise, seed, level=level, careless=careless):
         blocks.append(block)
@@ -194,6 +195,7 @@ def pairs(
     return Pairs(**arrays, scenarios=blocks[0].scenarios, together=blocks[0].together)
 
 
+@check_arguments
 def endless_pairs(
     scenarios: Given | Sequence[Given],
     noise: Any = USUAL,

@@ -1,14 +1,15 @@
 """The environments for Gymnasium, and for `dm_env`."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import gymnasium
+
+from apo_bench.arguments import check_arguments
 from apo_bench.errors import missing_package
 
-if TYPE_CHECKING:
-    import gymnasium
 
-
-def to_dm_env(env: "gymnasium.Env[Any, Any]", *, seed: int | None = None) -> Any:
+@check_arguments
+def to_dm_env(env: gymnasium.Env[Any, Any], *, seed: int | None = None) -> Any:
     """The environment as a `dm_env.Environment`.
 
     Args:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Callable, Sequence
-from numbers import Real
 from pathlib import Path
 from typing import Any
 
@@ -11,11 +10,12 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Outcome, Poses, Snapshot
-from apo_bench.envs.episode import asked_options, check_flag
+from apo_bench.envs.episode import asked_options
 from apo_bench.envs.spaces import PIXELS, as_seen, insert_space
 from apo_bench.envs.starts import Begun, RobotSettings, Trials, judged
-from apo_bench.errors import InputError, require, unknown
+from apo_bench.errors import InputError, require, shown, unknown
 from apo_bench.geometry import Array
 from apo_bench.names import resolve
 from apo_bench.observation.noise import Level, make_noise
@@ -50,6 +50,7 @@ _STARTS = ("training", "evaluation")
 _PLANS = ("none", "oracle", "by-heart")
 
 
+@check_arguments
 class APOInsert(gymnasium.Env[Seen, Action]):
     """Insert one part that the robot holds before its mouth.
 
@@ -155,13 +156,9 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         if starts not in _STARTS:
             raise InputError(unknown("kind of starts", str(starts), _STARTS))
         for name, size in (("shift_mm", shift_mm), ("turn_deg", turn_deg), ("fails_above_n", fails_above_n)):
-            is_size = isinstance(size, Real) and 0.0 < size < math.inf
-            require(is_size, f"{name} {size!r} was given; a number above 0 is allowed.")
+            require(0.0 < size < math.inf, f"{name} {size!r} was given; a number above 0 is allowed.")
         for name, count in (("horizon", horizon), ("layouts", layouts)):
-            is_count = isinstance(count, Real) and math.isfinite(count) and count == int(count) > 0
-            require(is_count, f"{name} {count!r} was given; a whole number above 0 is allowed.")
-        for name, flag in (("residual", residual), ("pixels", pixels)):
-            check_flag(name, flag)
+            require(count > 0, f"{name} {count!r} was given; a whole number above 0 is allowed.")
         check("seed", first_trial)
         check("careless", careless)
         self.render_mode = render_mode
@@ -282,7 +279,7 @@ class APOInsert(gymnasium.Env[Seen, Action]):
         except (TypeError, ValueError):
             given = np.zeros(0, dtype=np.float32)
         if not self.action_space.contains(given):
-            raise InputError(f"the action {action!r} was given; seven numbers from -1 to 1 are allowed.")
+            raise InputError(f"the action {shown(action)} was given; seven numbers from -1 to 1 are allowed.")
         control = self._at_work()
         self._actions.append(given.copy())
         before = self._best

@@ -7,6 +7,7 @@ from typing import Any, final
 
 import gymnasium
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan, Step
 from apo_bench.envs.episode import VERDICTS, Episode, Scenes, Settings, step_info, verdicts, watch_human, with_options
 from apo_bench.envs.rendering import FPS, MODES, Rendering
@@ -44,6 +45,7 @@ from apo_bench.trial.stages import (
 
 
 @final
+@check_arguments
 class APOReplay(gymnasium.Env[Seen, Action]):
     """Replay an observed assembly.
 
@@ -225,7 +227,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
             InputError: Another option, a value that is not allowed, or no demonstration comes out right.
         """
         if seed is not None:
-            check("seed", int(seed))
+            check("seed", seed)
         self._set(with_options(self._usual, options, self._eye))
         super().reset(seed=seed)
         self._over = True
@@ -240,6 +242,7 @@ class APOReplay(gymnasium.Env[Seen, Action]):
         self._rendering.begin(simulated.layout.start)
         return as_seen_entries(seen), {"demonstration": simulated.demonstration.code}
 
+    @check_arguments
     def step(self, action: Action) -> tuple[Seen, float, bool, bool, dict[str, Any]]:
         """Replay the goals, each moved by its twist.
 

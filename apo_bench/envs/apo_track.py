@@ -6,12 +6,13 @@ import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Observation, Outcome, ReplayResult, Step
 from apo_bench.envs.apo_replay import APOReplay
-from apo_bench.envs.episode import VERDICTS, check_flag, step_info, verdicts
+from apo_bench.envs.episode import VERDICTS, step_info, verdicts
 from apo_bench.envs.spaces import Seen, packed, track_spaces
 from apo_bench.envs.tracking import Act, Policy, Tracked, exactly_at, first_seen
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, shown
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import judge
 from apo_bench.records import Criteria, sentence
@@ -21,6 +22,7 @@ DO, UNDO, FINISH = range(3)
 
 
 @final
+@check_arguments
 class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
     """Follow a human, operation by operation.
 
@@ -64,7 +66,6 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
 
     def __init__(self, scenario: Any = "stick_in_tower", replay: bool = True, **of_replay: Any) -> None:
         self._base = APOReplay(scenario, **of_replay)
-        check_flag("replay", replay)
         self._replay = replay
         self.render_mode = self._base.render_mode
         n = len(self._base.assembly)
@@ -76,6 +77,7 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
         self._done = self._shown = self._acts = 0
         self._over = True
 
+    @check_arguments
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Seen, dict[str, Any]]:
         """Watch another demonstration; `seed=k` is trial k."""
         super().reset(seed=seed)
@@ -98,8 +100,8 @@ class APOTrack(gymnasium.Env[Seen, dict[str, Any]]):
             raise gymnasium.error.ResetNeeded("the episode is over, or there is none; call reset().")
         if not self.action_space.contains(action):
             raise InputError(
-                f"the action {action!r} was given; a dict of 'act', 0 to 2, and 'twist', (6,) within 0.1 m and 0.5 "
-                "rad, is allowed, as `env.action_space` says."
+                f"the action {shown(action)} was given; a dict of 'act', 0 to 2, and 'twist', (6,) within 0.1 m and "
+                "0.5 rad, is allowed, as `env.action_space` says."
             )
         act = int(action["act"])
         self._acts += 1

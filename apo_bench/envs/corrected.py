@@ -1,9 +1,11 @@
 """The with-correction arm of an experiment: a wrapper that corrects what `APOReplay-v0` shows."""
 
+from collections.abc import Callable
 from typing import Any, final
 
 import gymnasium
 
+from apo_bench.arguments import check_arguments
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.spaces import Action, Seen, packed
 from apo_bench.errors import InputError
@@ -12,6 +14,7 @@ from apo_bench.records import CORRECTOR, CORRECTORS, SIMULATED
 
 
 @final
+@check_arguments
 class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.RecordConstructorArgs):
     """Correct what was seen, at every reset: the with-correction arm of an experiment.
 
@@ -21,7 +24,7 @@ class Corrected(gymnasium.Wrapper[Seen, Action, Seen, Action], gymnasium.utils.R
     again is executed with its schedule; the twist of an operation then acts on every target of that operation.
     """
 
-    def __init__(self, env: gymnasium.Env[Seen, Action], corrector: Any = CORRECTOR) -> None:
+    def __init__(self, env: gymnasium.Env[Seen, Action], corrector: str | Callable[..., Any] = CORRECTOR) -> None:
         """Wrap an `APOReplay` environment.
 
         Args:

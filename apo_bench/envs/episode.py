@@ -13,7 +13,7 @@ from typing import Any, final
 import numpy as np
 
 from apo_bench.assembly import Observation, Outcome
-from apo_bench.errors import InputError, require, unknown
+from apo_bench.errors import InputError, shown, unknown
 from apo_bench.judging.verdict import Verdict
 from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Level
@@ -70,17 +70,14 @@ def asked_options(options: object, allowed: Sequence[str]) -> dict[str, Any]:
     if options is None:
         return {}
     if not isinstance(options, Mapping):
-        raise InputError(f"the options {options!r} were given to reset(); a dict with {', '.join(allowed)} is allowed.")
+        raise InputError(
+            f"{shown(options)} was given as options of reset(); a dict with {', '.join(allowed)} is allowed."
+        )
     asked = {name: value for name, value in options.items() if name not in _OF_TOOLS}
     for name in asked:
         if name not in allowed:
             raise InputError(unknown("option of reset()", str(name), allowed))
     return asked
-
-
-def check_flag(name: str, value: object) -> None:
-    """Raise an `InputError` unless an argument is True or False."""
-    require(isinstance(value, bool | np.bool_), f"{name} {value!r} was given; True or False is allowed.")
 
 
 def with_options(usual: Settings, options: object, eye: str) -> Settings:

@@ -10,7 +10,6 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly import Correction, Observation, Outcome, Plan, Reached, Snapshot, placements
-from apo_bench.errors import kind, require
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import Verdict, judge
 from apo_bench.observation.noise import Noise
@@ -55,12 +54,8 @@ class RobotSettings(NamedTuple):
         """The same, spelled as rows spell them.
 
         Raises:
-            InputError: An unknown name, a number that is not allowed, or no truth value.
+            InputError: An unknown name, or a number that is not allowed.
         """
-        require(
-            isinstance(self.feels, bool | np.bool_),
-            f"{kind(self.feels)} was given as feels; True or False is allowed: whether the robot feels.",
-        )
         error = checked_robot_error(self.robot_error)
         return RobotSettings(
             error, bool(self.feels), checked_wrench(self.wrench), checked_stated_error(self.stated_error)

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Observation
 from apo_bench.errors import require
 from apo_bench.files import json_reading
@@ -23,6 +24,7 @@ class ObservationFile(NamedTuple):
     """Whether a standard deviation had to be assumed."""
 
 
+@check_arguments
 def read_observation(
     path: str | Path,
     scenario: Scenario | str | Path,

@@ -11,6 +11,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from apo_bench.errors import ArgumentError, kind
+
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Record = TypeVar("Record")
@@ -21,7 +23,7 @@ _MOST_ANSWERS = 16
 """Answers that are kept of one object; further ones are worked out each time."""
 
 
-class NotReal(ValueError):
+class NotReal(ArgumentError):
     """Complex numbers, whose imaginary parts numpy would drop."""
 
 
@@ -45,17 +47,22 @@ def frozen(value: ArrayLike, *shape: int | None) -> Array:
         shape: The shape it must have; `None` stands for any length.
 
     Raises:
-        ValueError: The shape differs, or a number is complex or not finite.
+        ArgumentError: It holds no numbers, the shape differs, or a number is complex or not finite.
     """
-    array = real(value)
+    try:
+        array = real(value)
+    except NotReal:
+        raise
+    except (TypeError, ValueError):
+        raise ArgumentError(f"an array of numbers is needed, {kind(value)} was given") from None
     fits = array.shape == shape or (
         array.ndim == len(shape) and all(s in (None, n) for s, n in zip(shape, array.shape, strict=True))
     )
     if shape and not fits:
         wanted = ", ".join("*" if s is None else str(s) for s in shape)
-        raise ValueError(f"an array of shape ({wanted}) is needed, {array.shape} was given")
+        raise ArgumentError(f"an array of shape ({wanted}) is needed, {array.shape} was given")
     if 0 in np.isfinite(array).tobytes():  # three times as quick as `all`
-        raise ValueError("every number must be finite, a NaN or an infinity was given")
+        raise ArgumentError("every number must be finite, a NaN or an infinity was given")
     array.setflags(write=False)
     return array
 
@@ -66,16 +73,22 @@ def freeze(record: Any, **shapes: tuple[int | None, ...] | None) -> None:
     Args:
         shapes: Field -> the shape of its array, as in `frozen`, or of each array in it, if it is a mapping; None: it is
             a mapping of other things.
+
+    Raises:
+        ArgumentError: An array is not as `frozen` needs it, with the name of the field.
     """
     for name, shape in shapes.items():
         value = getattr(record, name)
         if value is None:
             continue
-        if isinstance(value, Mapping):
-            kept = value if shape is None else {key: frozen(each, *shape) for key, each in value.items()}
-            object.__setattr__(record, name, MappingProxyType(dict(kept)))
-        elif shape is not None:
-            object.__setattr__(record, name, frozen(value, *shape))
+        try:
+            if isinstance(value, Mapping):
+                kept = value if shape is None else {key: frozen(each, *shape) for key, each in value.items()}
+                object.__setattr__(record, name, MappingProxyType(dict(kept)))
+            elif shape is not None:
+                object.__setattr__(record, name, frozen(value, *shape))
+        except ArgumentError as error:
+            raise ArgumentError(f"{name} of {type(record).__name__}: {error}.") from None
 
 
 def copyable(record: type[Record]) -> type[Record]:

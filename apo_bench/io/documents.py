@@ -150,13 +150,17 @@ class JsonNode:
         return self.fields(("schema", *required), optional)
 
     def items(self, name: str, count: int | None = None) -> Sequence[JsonNode]:
-        """The entries of a list, called `name 1`, `name 2`, ...; `count` of them if that is given."""
-        self.require(isinstance(self.value, list), "a list is needed")
+        """The entries of a list, called `name 1`, `name 2`, ...; `count` of them if that is given.
+
+        A text in place of a list is its one entry.
+        """
+        values = [self.value] if isinstance(self.value, str) else self.value
+        self.require(isinstance(values, list), "a list is needed")
         require(
-            count is None or len(self.value) == count,
-            f"{self.file}, {self.key}: {count} entries are needed, {len(self.value)} were given.",
+            count is None or len(values) == count,
+            f"{self.file}, {self.key}: {count} entries are needed, {len(values)} were given.",
         )
-        return [JsonNode(value, self.file, f"{name} {i}") for i, value in enumerate(self.value, start=1)]
+        return [JsonNode(value, self.file, f"{name} {i}") for i, value in enumerate(values, start=1)]
 
     def numbers(self, *shape: int) -> Array:
         """Finite numbers in nested lists of this shape."""

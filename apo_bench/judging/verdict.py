@@ -13,8 +13,9 @@ from typing import final
 
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Contact, Poses, Reached, Relation, Snapshot, placements
-from apo_bench.geometry import Array, Overlap, nearest_alike, pose
+from apo_bench.geometry import Array, Overlap, frozen, nearest_alike, pose
 from apo_bench.judging.contacts import (
     ContactJudge,
     ContactMoment,
@@ -206,6 +207,7 @@ def _corners_at_end(assembly: Assembly, reached: Reached) -> Iterator[tuple[str,
 
 
 @final
+@check_arguments
 @dataclass(frozen=True)
 class Verdict:
     """Whether an assembly succeeded, by both rules."""
@@ -238,6 +240,7 @@ class Verdict:
         return self.demonstrated if strict else self.finished
 
 
+@check_arguments
 def judge(assembly: Assembly, reached: Reached, reference: Array, criteria: Criteria) -> Verdict:
     """Judge what was reached.
 
@@ -247,6 +250,7 @@ def judge(assembly: Assembly, reached: Reached, reference: Array, criteria: Crit
         reference: (n, 4, 4), the true goals, world frame, [m]; they say how large an overlap should be, how far
             apart faces may be, and which of a part's symmetries is meant.
     """
+    reference = frozen(reference, len(assembly), 4, 4)
     sound = Reached(after=tuple(map(_sound, reached.after)), final=_sound(reached.final))
     return Verdict(
         criteria.success_means,

@@ -11,13 +11,15 @@ from typing import Any, final
 
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Demonstration, Observation
-from apo_bench.errors import RAISED, InputError, failed, require
+from apo_bench.errors import RAISED, ArgumentError, InputError, failed, require
 from apo_bench.geometry import Array, is_rigid
 from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.records import check, level_pair
 
 
+@check_arguments
 def observe(
     demonstration: Demonstration,
     noise: Noise | type | str,
@@ -48,9 +50,9 @@ def observe(
     try:
         seen = noise(demonstration.assembly, demonstration, rng)
         complaint = _complaint(demonstration, seen)
-    except InputError:
-        raise
     except RAISED as error:
+        if isinstance(error, InputError) and not isinstance(error, ArgumentError):
+            raise
         raise failed(f"the noise model '{name}'", error) from error
     require(not complaint, f"the noise model '{name}' {complaint}.")
     return replace(seen, gap_m=demonstration.gap_m, play_m=demonstration.play_m)

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Contact, Facing, Observation, placements
 from apo_bench.assembly.touching import facing
 from apo_bench.geometry import Array
@@ -32,6 +33,7 @@ _BEGINNINGS = 12
 """Candidates that are tried as the first of an operation, at most."""
 
 
+@check_arguments
 def recognise(observation: Observation, rules: Rules = RULES_BY_NOISE) -> Recognised:
     """Find the face contacts of every operation; those that the observation came with are not looked at.
 
@@ -44,7 +46,7 @@ def recognise(observation: Observation, rules: Rules = RULES_BY_NOISE) -> Recogn
     Raises:
         InputError: Something else was given.
     """
-    observation = without_contacts(observation, rules, "recognise")
+    observation = without_contacts(observation)
     assembly = observation.assembly
     belief = initial_belief(observation)
     evidence = list[Evidence]()

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Contact, Observation, placements
 from apo_bench.geometry import Array
 from apo_bench.recognition.estimate import estimate
@@ -36,6 +37,7 @@ _LOST = 16.0
 evidence away, beyond what physics says against the best."""
 
 
+@check_arguments
 def recognise_jointly(observation: Observation, rules: Rules = GENEROUS_RULES) -> Recognised:
     """Find the face contacts of every operation together; those that the observation came with are not looked at.
 
@@ -45,7 +47,7 @@ def recognise_jointly(observation: Observation, rules: Rules = GENEROUS_RULES) -
     Raises:
         InputError: Something else was given.
     """
-    seen = without_contacts(observation, rules, "recognise_jointly")
+    seen = without_contacts(observation)
     kept = [_History()]
     known = set(seen.assembly.fixed)
     for k, operation in enumerate(seen.assembly.operations):

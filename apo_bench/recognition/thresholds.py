@@ -9,7 +9,7 @@ from typing import NamedTuple, final
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Facing, Observation, Poses, face_gap
-from apo_bench.errors import kind, require
+from apo_bench.errors import require
 from apo_bench.geometry import Array
 
 CONTACT_SOFT_M = 0.1e-3
@@ -155,18 +155,8 @@ class Recognised:
     rival: Rival | None = None
 
 
-def without_contacts(observation: Observation, rules: Rules, verb: str) -> Observation:
-    """What was seen, with no contact of any operation.
-
-    Raises:
-        InputError: Something else was given to the verb.
-    """
-    for argument, wanted in ((observation, Observation), (rules, Rules)):
-        require(
-            isinstance(argument, wanted),
-            f"{kind(argument)} was given to {verb}; an Observation is allowed (read_observation reads one from a "
-            "file), and as rules RULES_BY_NOISE or Rules(...) of apo_bench.recognition.thresholds.",
-        )
+def without_contacts(observation: Observation) -> Observation:
+    """What was seen, with no contact of any operation."""
     return replace(observation, assembly=replace(with_contacts(observation.assembly, ()), gaps={}))
 
 

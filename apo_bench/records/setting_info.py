@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from numbers import Integral, Real
 from typing import Any, final
 
-from apo_bench.errors import InputError, require, unknown
+from apo_bench.errors import InputError, require, shown, unknown
 
 
 @final
@@ -80,16 +80,16 @@ def check_value(info: SettingInfo, value: object, called: str = "", meaning: str
     """
     if info.choices:
         if not isinstance(value, str) or value not in info.choices:
-            raise InputError(unknown(info.called, str(value), info.choices))
+            raise InputError(unknown(info.called, value if isinstance(value, str) else shown(value), info.choices))
     elif info.called:
         low, high = info.range
         name = called or info.called
         number = float(value) if isinstance(value, Real) and not isinstance(value, bool) else math.nan
         require(
             not info.is_whole or (isinstance(value, Integral) and low <= number <= high),
-            f"a {name} of {value} was given; whole numbers from {low} to {high} are allowed.",
+            f"a {name} of {shown(value)} was given; whole numbers from {low} to {high} are allowed.",
         )
         if not low <= number <= high:
-            text = repr(value) if math.isnan(number) else f"{number:g}"
+            text = shown(value) if math.isnan(number) else f"{number:g}"
             why = meaning or info.meaning
             raise InputError(f"a {name} of {text} was given; a number from {low:g} to {high:g} is allowed, {why}.")

@@ -6,6 +6,8 @@ Wall time that things may take [s], where nothing else is said.
 from dataclasses import dataclass
 from typing import Literal, final
 
+from apo_bench.arguments import check_arguments
+
 Meaning = Literal["assembled", "as_demonstrated"]
 """What `success` asks for: that the finished assembly is right, or that it was also made as demonstrated."""
 MEANINGS: tuple[Meaning, ...] = ("assembled", "as_demonstrated")
@@ -38,6 +40,7 @@ class Thresholds:
 
 
 @final
+@check_arguments
 @dataclass(frozen=True)
 class Criteria:
     """What the judge decides by: `Scene.criteria` has those of a scene."""

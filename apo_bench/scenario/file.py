@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Gap
 from apo_bench.errors import require, require_known
 from apo_bench.generated import generated_file, is_generated, whole_name
@@ -37,6 +38,7 @@ def is_named(given: str) -> bool:
     return is_generated(given) or given in scenario_names()
 
 
+@check_arguments
 def load_scenario(given: str | Path | Scenario) -> Scenario:
     """The scenario of a short name, `generated:SEED` or `generated:FAMILY:SEED`, of a TOML file anywhere, or the
     object itself.

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Layout, Poses
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, extent, physical_pieces, pose
@@ -18,6 +19,7 @@ from apo_bench.insertion.arrival import Arrival, OperationMacros, Preference, un
 from apo_bench.scenario.scenario import Scenario
 
 
+@check_arguments
 def draw_layout(scenario: Scenario, rng: np.random.Generator, clearance_mm: float | None = None) -> Layout:
     """A consistent layout: every contact of the scenario stays closed.
 

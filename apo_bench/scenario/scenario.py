@@ -10,6 +10,7 @@ from typing import NamedTuple, final
 
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Layout, Operation, Poses, placements, touched_contacts
 from apo_bench.geometry import Array, copyable, freeze, pose
 from apo_bench.insertion.arrival import Attach
@@ -113,6 +114,7 @@ class Carelessness:
 
 
 @final
+@check_arguments
 @copyable
 @dataclass(frozen=True, eq=False)
 class Scenario:

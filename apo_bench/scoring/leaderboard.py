@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.errors import InputError, require
 from apo_bench.io import check_target, default_looks, grouped, save_figure, write_file
 from apo_bench.report.tables.table import Column, Table
@@ -57,6 +58,7 @@ def ranked(entries: Sequence[Entry], salts: frozenset[str] = frozenset()) -> lis
     return [Line(i, entry, _is_verified(entry, salts)) for i, entry in enumerate(order, start=1)]
 
 
+@check_arguments
 def read_entries(folder: str | Path) -> tuple[list[Entry], list[str]]:
     """The entries of a folder (`*.json`), and a sentence for each file that is left out.
 

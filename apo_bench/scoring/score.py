@@ -10,6 +10,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from apo_bench.arguments import check_arguments
 from apo_bench.io import brief, clean, grouped
 from apo_bench.records import SETTINGS, Row
 from apo_bench.records.run.run_file import read_run
@@ -22,6 +23,7 @@ _HEX = 16
 _CELL = tuple(name for name in Place.__match_args__ if name != "method")
 
 
+@check_arguments
 def score(
     method: str,
     tracks: Sequence[Track],

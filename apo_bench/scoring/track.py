@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import final
 
+from apo_bench.arguments import check_arguments
 from apo_bench.errors import require, unknown
 from apo_bench.io import read_bytes, read_toml
 from apo_bench.records import TrialSettings
@@ -78,6 +79,7 @@ def track_names() -> tuple[str, ...]:
     return tuple(sorted(path.stem for path in (folder("scenarios") / "tracks").glob("*.toml")))
 
 
+@check_arguments
 def read_track(given: str | Path) -> Track:
     """A track by name, or out of a file.
 
@@ -113,6 +115,7 @@ def read_track(given: str | Path) -> Track:
     )
 
 
+@check_arguments
 def read_tracks(names: Sequence[str]) -> tuple[Track, ...]:
     """Tracks by name or file; all that come with the package if none is named.
 

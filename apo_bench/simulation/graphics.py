@@ -12,7 +12,7 @@ import warnings
 from types import ModuleType
 from typing import Any
 
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.io import SAFE_PATH, environment
 
 _VARIABLE = "MUJOCO_GL"
@@ -57,8 +57,13 @@ def renderer(model: Any, width: int, height: int) -> Any:
     """MuJoCo's renderer; on a Linux machine without a display it draws through EGL, unless MUJOCO_GL says otherwise.
 
     Raises:
-        InputError: There is nothing to draw with.
+        InputError: There is nothing to draw with, or the picture is too large.
     """
+    most = model.vis.global_.offwidth, model.vis.global_.offheight
+    require(
+        1 <= width <= most[0] and 1 <= height <= most[1],
+        f"a picture of {width} x {height} pixels was given; 1 x 1 to {most[0]} x {most[1]} are allowed.",
+    )
     try:
         import mujoco
         from mujoco.rendering.classic import gl_context

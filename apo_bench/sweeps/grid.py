@@ -7,6 +7,7 @@ from itertools import product
 from numbers import Real
 from typing import Any, final
 
+from apo_bench.arguments import check_arguments
 from apo_bench.errors import require
 from apo_bench.io import UNSHOWN, grouped
 from apo_bench.records import (
@@ -49,6 +50,7 @@ _Level = float | tuple[float, float]
 
 
 @final
+@check_arguments
 @dataclass(frozen=True)
 class SweepSettings:
     """What a sweep varies; it runs every combination, with the same seeds in every cell."""
@@ -84,7 +86,7 @@ class SweepSettings:
 
     def __post_init__(self) -> None:
         for info in AXES:
-            entries = map(_whole if info.is_whole else _plain, getattr(self, info.axis))
+            entries = getattr(self, info.axis) if info.is_whole else map(_plain, getattr(self, info.axis))
             values = tuple(dict.fromkeys(map(info.spelled, entries) if info.spelled else entries))
             require(
                 values or info.name in _MAY_BE_EMPTY,
@@ -247,12 +249,6 @@ def _met_by(grid: SweepSettings, method: str) -> list[dict[str, Any]]:
 def _ways(grid: SweepSettings) -> list[dict[str, Any]]:
     """Eye and noise model, of every way of seeing; a range finder has no noise model."""
     return [{"eye": eye, "noise": x} for eye in grid.eyes for x in ((RANGE,) if eye == RANGE else grid.noises)]
-
-
-def _whole(value: Any) -> Any:
-    """A whole number as rows spell it; what is none is refused where it is checked."""
-    number = isinstance(value, Real) and not isinstance(value, bool) and float(value).is_integer()
-    return int(value) if number else value
 
 
 def _plain(value: Any) -> Any:

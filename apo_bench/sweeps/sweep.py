@@ -20,6 +20,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from apo_bench.arguments import check_arguments
 from apo_bench.errors import InputError, require, require_known
 from apo_bench.io import JsonNode, grouped, read_toml
 from apo_bench.records import (
@@ -54,6 +55,7 @@ _LARGEST_WORKERS = 256
 _BACKENDS = ("local", "ray")
 
 
+@check_arguments
 def run_sweep(
     grids: SweepSettings | Sequence[SweepSettings],
     out: str | Path,
@@ -216,6 +218,7 @@ def is_sweep_file(text: str) -> bool:
     return "scenarios" in keys or not {"parts", "operations"} & set(keys)
 
 
+@check_arguments
 def read_sweep(
     path: str | Path, overrides: Mapping[str, Any] | None = None, besides: Sequence[str] = ()
 ) -> tuple[SweepSettings, ...]:
@@ -268,6 +271,8 @@ def _value(key: str, node: JsonNode) -> Any:
 
 
 def _entries(node: JsonNode, key: str, of: str) -> Sequence[JsonNode]:
+    if isinstance(node.value, str):
+        return [node]
     if not isinstance(node.value, list) or not node.value:
         empty = "an empty grid has no trials, so name at least one or leave the key out"
         node.fail(f"a list of {of} is needed", empty if node.value == [] else f"write {key} = [...]")

@@ -10,6 +10,7 @@ from typing import NamedTuple, final
 
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Correction, Observation, Plan, goals_in_force
 from apo_bench.assembly.equations import equations
 from apo_bench.errors import InputError
@@ -68,6 +69,7 @@ class FittingPlan:
         return f"moved where contacts leave it free: {', '.join(named)}; otherwise {self.why}"
 
 
+@check_arguments
 def fitting_plan(correction: Correction, observation: Observation, where: Scene | Scenario) -> FittingPlan:
     """What the robot is to do after a correction, with free directions chosen so that it fits.
 

@@ -3,9 +3,11 @@
 How the robot of a trial feels: what it believes of itself before it touches anything, and what its wrist is like.
 """
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, cast
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Correction, Observation, Plan
 from apo_bench.correction.correctors import CorrectorMisbehaved
 from apo_bench.correction.own_code.own import CorrectorLost
@@ -31,6 +33,7 @@ from apo_bench.records import (
 from apo_bench.records.run.validation import unwritable
 from apo_bench.simulation.execution import ReplayCache
 from apo_bench.simulation.execution.feel.feeling import ACTS, Feels
+from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.outcome_columns import (
@@ -92,14 +95,15 @@ MEASURED: Row = {"level": None, "level_deg": None, "careless": None, "noise": "m
 """What a row says of a trial that was not drawn."""
 
 
+@check_arguments
 def run_trial(
     settings: TrialSettings,
     scene: Scene | None = None,
     *,
     simulated: SimulatedDemonstration | None = None,
     content: str | None = None,
-    method: Any = None,
-    watch: Any = None,
+    method: str | Callable[..., Any] | None = None,
+    watch: Hooks | Callable[[Any], None] | None = None,
     cache: ReplayCache | None = None,
 ) -> Row:
     """Run one trial.

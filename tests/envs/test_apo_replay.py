@@ -401,8 +401,8 @@ def test_poses_may_be_measured_in_depth_images() -> None:
     [
         ({"scenario": "stick_in_towr"}, "did you mean 'stick_in_tower'"),
         ({"eye": "rang"}, "did you mean 'range'"),
-        ({"level": "1"}, "the level '1' was given"),
-        ({"level": True}, "the level True was given"),
+        ({"level": "1"}, "level of APOReplay must be a number or a list"),
+        ({"level": True}, "level of APOReplay must be a number or a list"),
         ({"level": -1}, "level in mm of -1"),
         ({"level": (1, 2, 3)}, "a pair of mm and degrees"),
         ({"careless": float("nan")}, "carelessness of nan"),

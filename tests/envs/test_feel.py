@@ -65,9 +65,9 @@ def test_a_wrong_name_is_one_sentence(wrong: str, said: str) -> None:
 
 
 def test_whether_it_feels_is_true_or_false() -> None:
-    with pytest.raises(InputError, match="a str was given as feels; True or False is allowed"):
+    with pytest.raises(InputError, match="feels of APOReplay must be True or False, got 'no'"):
         APOReplay(SCENARIO, feels="no")  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="None was given as wrench sensor"):
+    with pytest.raises(InputError, match="wrench of APOReplay must be a text, got None"):
         APOReplay(SCENARIO, wrench=None)  # type: ignore[arg-type]
 
 

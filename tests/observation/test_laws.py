@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from apo_bench import Demonstration, Layout, Observation, TrialSettings, draw_layout, load_scenario, observe
+from apo_bench import Demonstration, Layout, Observation, Scene, TrialSettings, draw_layout, load_scenario, observe
 from apo_bench.assembly import placements
 from apo_bench.envs.spaces import LARGEST_DEVIATION, ROOM_M, packed
 from apo_bench.geometry import Array, pose
@@ -132,7 +132,12 @@ def in_another_world(scene: scenes.Scene, name: str, W: Array, monkeypatch: pyte
         sight = W[:3, :3] @ camera.line_of_sight()
         monkeypatch.setattr(camera, "line_of_sight", lambda: sight)
         turn = np.kron(np.eye(2), W[:3, :3].T)
-        rng = SimpleNamespace(standard_normal=lambda size: np.random.default_rng(3).standard_normal(size) @ turn)
+
+        class Turned(np.random.Generator):
+            def standard_normal(self, size: Any) -> Array:  # type: ignore[override]
+                return super().standard_normal(size) @ turn
+
+        rng = Turned(np.random.PCG64(3))
     return observe(scenes.shown(scenes.turned(scene, W)), noise, rng)
 
 
@@ -209,7 +214,8 @@ def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPat
     final = placements(scenario.assembly, layout.start, layout.goals)[-1]
     n = len(scenario.assembly)
     demonstration = Demonstration(scenario.assembly, layout.start, layout.goals, final, np.zeros((n, 6, 6)))
-    scene: Any = SimpleNamespace(scenario=scenario, clearance_mm=0.25, arm=SimpleNamespace(mjcf=""))
+    scene = object.__new__(Scene)
+    vars(scene).update(scenario=scenario, clearance_mm=0.25, arm=SimpleNamespace(mjcf=""))
     simulated = SimulatedDemonstration(Layout(layout.goals, layout.start), demonstration)
     carried_out: list[Any] = []
 

@@ -111,12 +111,12 @@ def test_one_declaration_alone_is_not_enough() -> None:
 @pytest.mark.parametrize(
     ("returned", "message"),
     [
-        (None, "failed: an array of shape"),
+        (None, "failed: goals of Observation"),
         ("goals", "failed: "),
         (SimpleNamespace(), "failed: "),
         (np.zeros((3, 4, 4)), "goal for operation 1 that is not a rigid pose"),
-        (TOWER.goals[:2], "failed: an array of shape"),
-        (TOWER.goals * np.nan, "failed: every number must be finite"),
+        (TOWER.goals[:2], "failed: goals of Observation"),
+        (TOWER.goals * np.nan, "failed: goals of Observation: every number must be finite"),
     ],
 )
 def test_what_a_plain_function_must_not_return(returned: object, message: str) -> None:

@@ -171,7 +171,7 @@ def test_parts_that_touch_nothing_have_no_contact_and_can_be_corrected() -> None
 @pytest.mark.parametrize("wrong", [("seen.csv",), (None,), ("seen", "fixed"), ("seen", None), ("seen", Rules)])
 def test_what_is_no_observation_and_no_rules_is_said(wrong: tuple[Any, ...]) -> None:
     given = [seen_at(scenes.bridge(), 0, 0.5) if x == "seen" else x for x in wrong]
-    with pytest.raises(InputError, match="was given to recognise; an Observation is allowed"):
+    with pytest.raises(InputError, match=r"(observation|rules) of recognise must be an? (Observation|Rules), got"):
         recognise(*given)
 
 

@@ -179,5 +179,5 @@ def test_round_faces_are_recognised_with_flat_ones() -> None:
 
 @pytest.mark.parametrize("given", [None, {"rules": 3}])
 def test_anything_else_is_refused(given: Any) -> None:
-    with pytest.raises(InputError, match="was given to recognise_jointly"):
+    with pytest.raises(InputError, match=r"(observation|rules) of recognise_jointly must be"):
         recognise_jointly(*([None] if given is None else [beside(1.0, 1.0)]), **(given or {}))

@@ -241,7 +241,7 @@ def test_what_is_no_text_file(tmp_path: Path):
 def test_what_is_no_name():
     assert "did you mean 'stick_in_tower'" in refused("stick_in_towr")
     for wrong in (3, None, b"stick_in_tower"):
-        with pytest.raises(InputError, match="short name"):
+        with pytest.raises(InputError, match="given of load_scenario must be a text, a Path or a Scenario, got"):
             load_scenario(wrong)
 
 

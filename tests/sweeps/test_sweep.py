@@ -107,7 +107,7 @@ def test_only_methods_that_can_ask_look_again() -> None:
     trials = [t for unit in units([spec], load_all([spec])) for t in unit.trials]
     met = {m: {t.looks for t in trials if t.method == m} for m in spec.methods}
     assert met == {"oracle": {0}, "none": {0}, "contact": {0}, "contact-robust": {0, 2}}
-    with pytest.raises(InputError, match=r"a number of looks of 1.5 was given; whole numbers from 0 to 100"):
+    with pytest.raises(InputError, match=r"must be a list \(each entry a whole number\), got a tuple with 1\.5"):
         replace(SPEC, looks=(1.5,))
 
 

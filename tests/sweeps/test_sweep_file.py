@@ -138,7 +138,6 @@ BAD: list[tuple[str | bytes, str]] = [
     (NEEDS + "trials = true", "trials: a whole number from 1 to 1000000 is needed, true was given"),
     (NEEDS + "seed = -1", "seed: a whole number from 0"),
     (NEEDS + "seed = 9007199254740991", "a seed of 9007199254741090 was given"),
-    (NEEDS + "methods = 'paper'", 'methods: a list of texts in quotes is needed, "paper" was given'),
     (NEEDS + "methods = [1]", "methods, entry 1: a text in quotes is needed, 1 was given"),
     (NEEDS + "methods = ['papr']", "unknown method 'papr'; did you mean 'paper'?"),
     (NEEDS + "grasps = ['glue']", "unknown grasp 'glue'"),

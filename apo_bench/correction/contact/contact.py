@@ -16,6 +16,7 @@ from typing import Literal, final
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import (
     Assembly,
     Consistency,
@@ -89,6 +90,7 @@ DROPS = 3
 
 
 @final
+@check_arguments
 @dataclass(frozen=True)
 class ContactCorrector:
     """Nearest consistent goals; what to do if the test of the correction fails is said beforehand."""
@@ -107,14 +109,11 @@ class ContactCorrector:
 
     def __post_init__(self) -> None:
         require(
-            self.doubt in ("apply", "warn", "refuse", "drop"),
-            f"doubt={self.doubt!r} was given; apply, warn, refuse or drop is allowed.",
-        )
-        require(
-            isinstance(self.level, float | int) and 0.0 < self.level < 1.0,
+            0.0 < self.level < 1.0,
             f"a test level of {self.level!r} was given; a number between 0 and 1 is allowed.",
         )
 
+    @check_arguments
     def __call__(self, observation: Observation) -> Correction:
         """Correct an observation.
 
@@ -148,6 +147,7 @@ class ContactCorrector:
                 results[i] = correction
         return [correction for correction in results if correction is not None]
 
+    @check_arguments
     def leaving_out(self, observation: Observation, dropped: tuple[str, ...]) -> Correction:
         """Correct an observation by all contacts but those of some relations."""
         problem = problem_of((observation,), self.level, self.compiled)

@@ -8,6 +8,7 @@ from typing import Any, final
 import numpy as np
 from shapely import Polygon, unary_union
 
+from apo_bench.arguments import check_arguments
 from apo_bench.geometry import WHOLE_TURN, Array, Face, Hull, RoundFace, straightened
 from apo_bench.parts.making.body import Body, extruded, summed
 from apo_bench.parts.making.cells import bands, bore_cell, clipped, convex_cells, wedges
@@ -34,6 +35,7 @@ class Bore:
         return max(max(step.radii) / np.cos(np.pi / step.count) for step in self.steps)
 
 
+@check_arguments
 def bore(
     at: tuple[float, float],
     radius: float,
@@ -54,6 +56,7 @@ def bore(
     return Bore(at, tuple(chamfered(wall, chamfer_low, chamfer_high, 1.0)))
 
 
+@check_arguments
 def extrude(
     outline: Outline,
     low: float,

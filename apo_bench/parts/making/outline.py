@@ -7,6 +7,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.arguments import check_arguments
 from apo_bench.geometry import Array, sides_of
 from apo_bench.parts.making.body import Moments, polygon_moments, segment_moments
 
@@ -57,6 +58,7 @@ class OutlineArc(NamedTuple):
         return self.first + self.turn / 2.0
 
 
+@check_arguments
 def polygon(
     *corners: tuple[float, float], names: Mapping[int, str] | Sequence[str] = (), fit: Sequence[str] = ()
 ) -> Outline:
@@ -70,6 +72,7 @@ def polygon(
     return [Edge(at, named.get(i, ""), named.get(i, "") in fit and i in named) for i, at in enumerate(corners)]
 
 
+@check_arguments
 def rectangle(
     width: float, depth: float, at: tuple[float, float] = (0.0, 0.0), names: Sequence[str] = (), fit: Sequence[str] = ()
 ) -> Outline:
@@ -80,6 +83,7 @@ def rectangle(
     return polygon((x - a, y - b), (x + a, y - b), (x + a, y + b), (x - a, y + b), names=names, fit=fit)
 
 
+@check_arguments
 def circle(
     radius: float, at: tuple[float, float] = (0.0, 0.0), name: str = "", fit: bool = False, sides: int | None = None
 ) -> Outline:
@@ -87,6 +91,7 @@ def circle(
     return [Edge((at[0] + sign * radius, at[1]), name, fit, at, sides=sides) for sign in (1.0, -1.0)]
 
 
+@check_arguments
 def slot(
     length: float,
     width: float,
@@ -103,6 +108,7 @@ def slot(
     return [Edge(*each[:2], fit, each[2]) for each in zip(corners, names, middles, strict=True)]
 
 
+@check_arguments
 def rounded(outline: Outline, radius: float, corners: Sequence[int] | None = None, sides: int | None = None) -> Outline:
     """An outline of straight sides with corners, else all, rounded."""
     edges: list[Edge] = []

@@ -6,6 +6,7 @@ from itertools import pairwise
 import numpy as np
 from shapely import Polygon
 
+from apo_bench.arguments import check_arguments
 from apo_bench.geometry import Array, Cylinder, Face, Hull, cylinder_hull, polygons_of, rings_of
 from apo_bench.parts.making.body import Body, summed
 from apo_bench.parts.making.cells import clipped, wedges
@@ -25,6 +26,7 @@ _SAME_MM = 1e-6
 _NARROW_MM = 6e-3
 
 
+@check_arguments
 def turned(
     outer: Sequence[Frustum],
     inner: Sequence[Frustum] = (),
@@ -55,6 +57,7 @@ def turned(
     )
 
 
+@check_arguments
 def shaft(
     radius: float,
     low: float,

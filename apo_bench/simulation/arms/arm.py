@@ -11,6 +11,7 @@ from typing import final
 
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.errors import require
 from apo_bench.geometry import Array, copyable, freeze, frozen, pose
 from apo_bench.io import JsonNode, named_files, read_toml
@@ -103,6 +104,7 @@ class Hand:
 
 
 @final
+@check_arguments
 @copyable
 @dataclass(frozen=True, eq=False)
 class Arm:
@@ -183,6 +185,7 @@ class SlideGripper:
 
 
 @final
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class GripperDescription:
     """The gripper, and how it is driven; None: found in the model."""
@@ -206,6 +209,7 @@ class GripperDescription:
 
 
 @final
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class ArmDescription:
     """An arm as its file says it."""
@@ -304,7 +308,8 @@ def _beside(path: Path, node: JsonNode) -> Path:
 
 
 def _names(node: JsonNode) -> tuple[str, ...]:
-    _check_length(node, "names")
+    if not isinstance(node.value, str):
+        _check_length(node, "names")
     return tuple(each.text() for each in node.items("name"))
 
 

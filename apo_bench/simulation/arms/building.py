@@ -8,6 +8,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, pose
 from apo_bench.simulation.arms.arm import Arm, ArmDescription, ArmLimits, GripperDescription, read_description
@@ -37,6 +38,7 @@ _MOST_BUILT = 8
 _BUILT: dict[tuple[tuple[str, int], ...], Arm] = {}
 
 
+@check_arguments
 def read_arm(path: str | Path) -> Arm:
     """The arm of an arm file, built and measured.
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot, Step, goals_in_force
 from apo_bench.prediction.stability import first_unstable
 from apo_bench.records import sentence, touching_sentence
@@ -39,6 +40,7 @@ _STEPS = ((1.14, 3), (0.86, 2), (0.58, 8), (0.3, 4), (0.0, 1))
 steps quarters end 17, halves 10, and all of these in turn every one."""
 
 
+@check_arguments
 def replay(
     plan: Plan,
     scene: Scene,

@@ -12,6 +12,7 @@ from typing import Any, final
 import mujoco
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Demonstration, Layout, Poses, Reached, Snapshot, placements
 from apo_bench.geometry import Array, pose
 from apo_bench.insertion.arrival import Arrival
@@ -220,6 +221,7 @@ def _first(stroke: Trajectory, fraction: float) -> Trajectory:
     return Trajectory(stroke.start, stroke.poses(np.array([fraction]))[0], stroke.seconds * 0.5, minimum_jerk)
 
 
+@check_arguments
 def demonstrate(
     scene: Scene,
     layout: Layout,

@@ -4,14 +4,15 @@ import weakref
 from collections.abc import Callable, Iterable
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Poses
-from apo_bench.errors import InputError, missing_package, require
+from apo_bench.errors import InputError, missing_package, require, require_known
 from apo_bench.geometry import Array
 from apo_bench.io import write_file
 from apo_bench.simulation.graphics import need_window, renderer
@@ -19,11 +20,12 @@ from apo_bench.simulation.scene.scene import Scene
 from apo_bench.simulation.scene.world import World, initial_state, place
 
 _Image = NDArray[np.uint8]
-SceneCamera = Any
+SceneCamera: TypeAlias = str | mujoco.MjvCamera
 """The name of a camera of the room, or a `mujoco.MjvCamera`."""
 _VIDEO_ENDINGS = (".mp4", ".gif")
 
 
+@check_arguments
 def picture(
     scene: Scene,
     poses: Poses,
@@ -90,6 +92,7 @@ def arm_home(scene: Scene, data: Any) -> None:
         data.joint(f"arm/{finger}").qpos = at
 
 
+@check_arguments
 def camera_view(
     look_at: Array, distance_m: float = 0.45, azimuth_deg: float = 130.0, elevation_deg: float = -22.0
 ) -> SceneCamera:
@@ -102,6 +105,7 @@ def camera_view(
     return camera
 
 
+@check_arguments
 class Film:
     """Takes pictures of a replay: pass it as `watch`."""
 
@@ -125,6 +129,7 @@ class Film:
         self.fps = fps
         self.camera = camera or camera_view(middle, 0.85, 128.0, -24.0)
         self.frames: list[_Image] = []
+        _check_camera(scene.work, self.camera)
         self._renderer = renderer(scene.work.model, width, height)
         self._renderer.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = shadows
         self._close = weakref.finalize(self, _release, self._renderer)
@@ -141,6 +146,7 @@ class Film:
         self._renderer.update_scene(data, camera=self.camera)
         return np.array(self._renderer.render())
 
+    @check_arguments
     def save(self, path: str | Path) -> None:
         """Write the film, by its ending as MP4 or GIF.
 
@@ -222,11 +228,18 @@ class ReplayWindow:
 def _drawn(
     world: World, data: Any, width: int, height: int, camera: SceneCamera, more: Callable[[Any], None] | None = None
 ) -> _Image:
+    _check_camera(world, camera)
     with renderer(world.model, width, height) as draws:
         draws.update_scene(data, camera=camera)
         if more is not None:
             more(draws.scene)
         return np.array(draws.render())
+
+
+def _check_camera(world: World, camera: SceneCamera) -> None:
+    names = [world.model.camera(i).name for i in range(world.model.ncam)]
+    if isinstance(camera, str):
+        require_known("camera", camera, names, rest=" Or give a camera_view.")
 
 
 def _at(world: World, scene: Scene, poses: Poses) -> Any:

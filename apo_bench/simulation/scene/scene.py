@@ -10,6 +10,7 @@ from typing import Any, Literal, final
 import mujoco
 import numpy as np
 
+from apo_bench.arguments import check_arguments
 from apo_bench.errors import InputError
 from apo_bench.geometry import Piece, all_boxes, held_span, physical_pieces
 from apo_bench.records import Criteria, check
@@ -98,6 +99,7 @@ end within 2 micrometres of where they would."""
 
 
 @final
+@check_arguments
 @dataclass(frozen=True, eq=False)
 class Scene:
     """Everything compiled: reusable for any number of trials, which leave nothing behind in it."""
@@ -121,6 +123,7 @@ class Scene:
         return Criteria(self.scenario.thresholds, self.clearance_mm, self.scenario.success_means)
 
 
+@check_arguments
 def build_scene(
     scenario: Scenario,
     *,

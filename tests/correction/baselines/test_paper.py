@@ -407,16 +407,19 @@ def test_plain_pairs_are_steps() -> None:
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        ({"schedule": (0, "1", 2)}, "returned '1' as step 2 of its schedule; return `Step(operation, undo)`"),
-        ({"schedule": (Step(0.0), Step(1), Step(2))}, "as step 1 of its schedule"),
-        ({"schedule": "1 2 3"}, "returned '1' as step 1"),
-        ({"schedule": ((0, False, 3),)}, "returned (0, False, 3) as step 1"),
+        (
+            {"schedule": (0, "1", 2)},
+            "schedule of Correction must be a list (each entry a Step), got a tuple with 0 in it",
+        ),
+        ({"schedule": (Step(0.5), Step(1), Step(2))}, "got a tuple with 0.5 in it"),
+        ({"schedule": "1 2 3"}, "schedule of Correction must be a list (each entry a Step), got '1 2 3'"),
+        ({"schedule": ((0, False, 3),)}, "got a tuple with a tuple in it"),
         ({"freed": (99, -5)}, "returned the operation 99 in `freed`; return whole numbers from 0 to 2"),
-        ({"freed": "abc"}, "returned the operation 'abc' in `freed`"),
-        ({"gap_after_m": None}, "returned None as gap_after_m; return a length in metres"),
-        ({"tried": ("x",)}, "returned 'x' among `tried`"),
+        ({"freed": "abc"}, "freed of Correction must be a list (each entry a whole number), got 'abc'"),
+        ({"gap_after_m": None}, "gap_after_m of Correction must be a number, got None"),
+        ({"tried": ("x",)}, "tried of Correction must be a list (each entry a Try), got a tuple with 'x' in it"),
         ({"tried": (Try(7, (0,), 0.0),)}, "returned the operation 7 in `tried`"),
-        ({"tried": (Try(1, (0,), "much"),)}, "returned 'much' as gap_m of `tried`"),
+        ({"tried": (Try(1, (0,), "much"),)}, "got a tuple with 'much' in it"),
         (
             {"schedule": steps("1 2 3"), "targets": np.tile(np.eye(4), (3, 1, 1))},
             "returned a last target for operation 1 that is not its goal",

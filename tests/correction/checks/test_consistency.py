@@ -240,7 +240,7 @@ def test_a_level_that_is_none_is_refused(level: float) -> None:
 
 
 def test_a_policy_that_is_none_is_refused() -> None:
-    with pytest.raises(InputError, match=r"^doubt='hope' was given; apply, warn, refuse or drop is allowed\.$"):
+    with pytest.raises(InputError, match=r"must be one of 'apply', 'warn', 'refuse', 'drop', got 'hope'\.$"):
         ContactCorrector("hope")  # type: ignore[arg-type]
 
 

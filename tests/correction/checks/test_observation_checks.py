@@ -49,8 +49,6 @@ def lopsided(covariance: Array) -> None:
 
 
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
-    "none": (lambda: None, "an Observation is needed, None was given"),
-    "list": (lambda: [seen()], "an Observation is needed, a list was given"),
     "stretched": (lambda: edited("goals", stretched), "the goal of operation 2 in the observation is not a rigid pose"),
     "mirrored": (lambda: edited("goals", mirrored), "the goal of operation 3 in the observation is not a rigid pose"),
     "far": (lambda: edited("goals", far), "the goal of operation 1 in the observation has a position of 1e+200 m"),
@@ -62,7 +60,6 @@ WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "play negative": (lambda: replace(seen(), play_m=-1e-3), "states play_m=-0.001"),
     "gap nan": (lambda: replace(seen(), gap_m=float("nan")), "states gap_m=nan; a finite length above 0 is needed"),
     "gap zero": (lambda: replace(seen(), gap_m=0.0), "states gap_m=0.0"),
-    "gap text": (lambda: replace(seen(), gap_m="1"), "states gap_m='1'"),  # type: ignore[arg-type]
     "no start": (lambda: replace(seen(), start={}), "the observation has no start of the part"),
 }
 
@@ -78,7 +75,7 @@ def test_an_observation_that_makes_no_sense_is_blamed_itself(case: str, correcto
     assert "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize("case", [case for case in WRONG if case != "list"])
+@pytest.mark.parametrize("case", WRONG)
 def test_of_many_the_one_is_named(case: str) -> None:
     make, message = WRONG[case]
     with pytest.raises(InputError) as refused:
@@ -88,10 +85,10 @@ def test_of_many_the_one_is_named(case: str) -> None:
 
 
 def test_many_needs_a_list_and_a_corrector_of_its_kind() -> None:
-    for given in (seen(), iter([seen()]), None):
-        with pytest.raises(InputError, match="correct_many needs a list of observations"):
+    for given in (seen(), None, [seen(), None]):
+        with pytest.raises(InputError, match=r"correct_many must be a list \(each entry an Observation\)"):
             correct_many(given)  # type: ignore[arg-type]
-    with pytest.raises(InputError, match="'paper'; give a ContactCorrector"):
+    with pytest.raises(InputError, match="must be a ContactCorrector or a RobustCorrector, got 'paper'"):
         correct_many([seen()], "paper")  # type: ignore[arg-type]
 
 
@@ -117,12 +114,12 @@ def test_the_gaps_that_a_corrector_claims_are_measured() -> None:
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        ({"sentence": None}, "returned None as its sentence; return one line of plain text"),
+        ({"sentence": None}, "sentence of Correction must be a text, got None"),
         ({"sentence": " "}, "returned ' ' as its sentence"),
         ({"sentence": "a\nb"}, "as its sentence"),
-        ({"test": 3}, "returned 3 as `test`; return a Consistency or None"),
+        ({"test": 3}, "test of Correction must be a Consistency or None, got 3"),
         ({"dropped": ("R99",)}, "returned 'R99' in `dropped`; return a tuple of relations, such as 'R1'"),
-        ({"dropped": ([],)}, "returned [] in `dropped`"),
+        ({"dropped": ([],)}, "dropped of Correction must be a list (each entry a text), got a tuple with a list in it"),
     ],
 )
 def test_words_that_nobody_can_read_are_refused(changed: dict[str, Any], message: str) -> None:

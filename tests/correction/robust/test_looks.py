@@ -129,5 +129,5 @@ def test_a_broad_view_counts_less():
 
 @pytest.mark.parametrize("wrong", [2, "twice"])
 def test_what_is_no_look_is_refused(wrong):
-    with pytest.raises(InputError, match="cannot be called"):
+    with pytest.raises(InputError, match="look of correct must be a Look or None"):
         correct(look("block_on_block", 1), "contact-robust", wrong)

@@ -1,0 +1,233 @@
+"""Check the arguments of public functions and constructors against their annotations.
+
+An argument of another type raises one sentence. NumPy's numbers count as numbers, lists are taken for tuples and
+arrays, and a text where several names may stand is one name, never its letters. Functions check ranges and shapes
+themselves.
+"""
+
+from collections.abc import Callable, Collection, Mapping, Sequence
+from functools import wraps
+from numbers import Integral, Real
+from types import NoneType, UnionType
+from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args, get_origin, get_type_hints
+
+import numpy as np
+
+from apo_bench.errors import ArgumentError, shown
+
+Public = TypeVar("Public", bound=Callable[..., Any])
+
+
+class _Unfit(Exception):
+    """A value is not of a type."""
+
+    entry: Any = None
+    """The entry of the value that is not of its type, where the value has entries."""
+
+
+class _Type(NamedTuple):
+    """What an annotation stands for."""
+
+    words: str
+    """What is needed: `a number`."""
+    take: Callable[[Any], Any]
+    """Returns a value as the function takes it, or raises `_Unfit`."""
+
+
+def check_arguments(public: Public) -> Public:
+    """Have a function, or the constructor of a class, check its arguments against its annotations.
+
+    Annotations are read at the first call. Python itself refuses an argument that is missing or unknown.
+
+    Raises:
+        ArgumentError: When called with an argument of another type.
+    """
+    function: Any = vars(public)["__init__"] if isinstance(public, type) else public
+    called = public.__qualname__.removesuffix(".__call__")
+    positional = function.__code__.co_varnames[: function.__code__.co_argcount]
+    types: dict[str, _Type] = {}
+
+    def take(name: str, value: Any) -> Any:
+        if name not in types:
+            return value
+        try:
+            return types[name].take(value)
+        except _Unfit as unfit:
+            within = "" if unfit.entry is None or unfit.entry is value else f" with {shown(unfit.entry)} in it"
+            wanted = f"{name} of {called} must be {types[name].words}"
+            raise ArgumentError(f"{wanted}, got {shown(value)}{within}.") from None
+
+    @wraps(function)
+    def checked(*given: Any, **named: Any) -> Any:
+        if not types:
+            types.update({name: _read(hint) for name, hint in get_type_hints(function, include_extras=True).items()})
+        values = (*map(take, positional, given), *given[len(positional) :])
+        return function(*values, **{name: take(name, value) for name, value in named.items()})
+
+    if isinstance(public, type):
+        public.__init__ = checked  # type: ignore[misc]
+        return public
+    return checked  # type: ignore[return-value]
+
+
+def _read(hint: Any) -> _Type:
+    """What an annotation stands for."""
+    origin = get_origin(hint) or hint
+    within = get_args(hint)
+    if hint in _PLAIN:
+        return _PLAIN[hint]
+    if origin is Annotated:
+        return _read(within[0])
+    if origin in (Union, UnionType):
+        return _one_of([*map(_read, within)])
+    if origin is Literal:
+        return _Type(
+            f"one of {', '.join(map(repr, within))}",
+            lambda value: _require(isinstance(value, str) and value in within, value),
+        )
+    if origin is Callable:
+        return _Type("a function", lambda value: _require(callable(value), value))
+    if origin is np.ndarray:
+        return _array(is_truth=np.dtype[np.bool_] in within)
+    if not isinstance(origin, type) or _is_unchecked_protocol(origin):
+        return _ANYTHING
+    if issubclass(origin, tuple) and hasattr(origin, "_fields"):
+        return _named_tuple(origin)
+    if issubclass(origin, Mapping) and within:
+        return _mapping(*map(_read, within))
+    if issubclass(origin, Collection) and within:
+        return _several(origin, within)
+    return _Type(_with_article(origin), lambda value: _require(isinstance(value, origin), value))
+
+
+def _with_article(origin: type) -> str:
+    return f"{'an' if origin.__name__[0] in 'AEIOU' else 'a'} {origin.__name__}"
+
+
+def _is_unchecked_protocol(origin: type) -> bool:
+    return getattr(origin, "_is_protocol", False) and not getattr(origin, "_is_runtime_protocol", False)
+
+
+def _require(fits: object, value: Any) -> Any:
+    if not fits:
+        raise _Unfit
+    return value
+
+
+def _number(value: Any) -> Any:
+    return _require(isinstance(value, Real) and not isinstance(value, bool), value)
+
+
+def _whole(value: Any) -> Any:
+    """A whole number as it is, or a number that is one, such as 2.0."""
+    if isinstance(value, Integral):
+        return _number(value)
+    return int(_require(float(_number(value)).is_integer(), value))
+
+
+_ANYTHING = _Type("anything", lambda value: value)
+_NONE = _Type("None", lambda value: _require(value is None, value))
+_PLAIN: Mapping[Any, _Type] = {
+    Any: _ANYTHING,
+    object: _ANYTHING,
+    None: _NONE,
+    NoneType: _NONE,
+    str: _Type("a text", lambda value: _require(isinstance(value, str), value)),
+    bool: _Type("True or False", lambda value: _require(isinstance(value, bool | np.bool_), value)),
+    int: _Type("a whole number", _whole),
+    float: _Type("a number", _number),
+}
+
+
+def _one_of(types: Sequence[_Type]) -> _Type:
+    """The first of several types that a value is of."""
+
+    def take(value: Any) -> Any:
+        last = _Unfit()
+        for each in types:
+            try:
+                return each.take(value)
+            except _Unfit as unfit:
+                last = unfit
+        raise last
+
+    *words, last = dict.fromkeys(each.words for each in types)
+    return _Type(f"{', '.join(words)} or {last}" if words else last, take)
+
+
+def _array(is_truth: bool) -> _Type:
+    """An array of real numbers; or of truth values, which may be 0 and 1."""
+
+    usual = np.dtype(np.bool_ if is_truth else np.float64)
+
+    def take(value: Any) -> Any:
+        if type(value) is np.ndarray and value.dtype == usual and value.ndim:
+            return value
+        try:
+            array = np.asarray(value)
+        except ValueError:
+            raise _Unfit from None
+        _require(array.ndim and array.dtype.kind in "biuf", value)
+        if is_truth:
+            _require(np.isin(array, (0, 1)).all(), value)
+        return array
+
+    return _Type("an array of True and False" if is_truth else "an array of real numbers", take)
+
+
+def _mapping(name: _Type, entry: _Type) -> _Type:
+    """A mapping, which stays as it is."""
+
+    def take(value: Any) -> Any:
+        _require(isinstance(value, Mapping), value)
+        for key, each in value.items():
+            _take_entry(name, key)
+            _take_entry(entry, each)
+        return value
+
+    return _Type(f"a mapping from {name.words} to {entry.words}", take)
+
+
+def _several(origin: type, within: tuple[Any, ...]) -> _Type:
+    """Several values, made a tuple or a set where one is needed; a text is one of them, never its letters."""
+    entries = [_read(each) for each in within if each is not Ellipsis]
+    count = len(entries) if origin is tuple and Ellipsis not in within else None
+    made: Any = origin if origin in (tuple, list, set, frozenset) else tuple
+
+    def take(value: Any) -> Any:
+        several = (value,) if isinstance(value, str) else value
+        try:
+            given = tuple(several)
+        except TypeError:
+            raise _Unfit from None
+        _require(count in (None, len(given)), value)
+        types = entries if count else entries * len(given)
+        taken = [_take_entry(one, each) for one, each in zip(types, given, strict=True)]
+        unchanged = isinstance(several, origin) and all(a is b for a, b in zip(taken, given, strict=True))
+        return several if unchanged else made(taken)
+
+    if count is None:
+        return _Type(f"a list (each entry {entries[0].words})", take)
+    return _Type(f"a list of {' and '.join(one.words for one in entries)}", take)
+
+
+def _named_tuple(origin: Any) -> _Type:
+    """A record that is a tuple; a plain one, or a list, is made one."""
+    types = [_read(hint) for hint in get_type_hints(origin, include_extras=True).values()]
+    least = len(types) - len(origin._field_defaults)
+
+    def take(value: Any) -> Any:
+        _require(isinstance(value, tuple | list) and least <= len(value) <= len(types), value)
+        taken = origin(*map(_take_entry, types, value))
+        unchanged = isinstance(value, origin) and all(a is b for a, b in zip(taken, value, strict=True))
+        return value if unchanged else taken
+
+    return _Type(_with_article(origin), take)
+
+
+def _take_entry(of: _Type, value: Any) -> Any:
+    try:
+        return of.take(value)
+    except _Unfit as unfit:
+        unfit.entry = value if unfit.entry is None else unfit.entry
+        raise

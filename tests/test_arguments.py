@@ -1,0 +1,237 @@
+"""What is public answers arguments of a wrong type in one sentence, and takes a text for one name."""
+
+from __future__ import annotations
+
+import dataclasses
+import inspect
+from collections.abc import Callable, Iterator, Mapping
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import gymnasium
+import numpy as np
+import pytest
+
+import apo_bench
+from apo_bench.assembly import Operation, Outcome, Reached, Snapshot
+from apo_bench.datasets import endless_pairs
+from apo_bench.envs.apo_replay import APOReplay
+from apo_bench.files.observation import as_planned
+from apo_bench.parts.making import rectangle
+from apo_bench.resources import folder
+from apo_bench.scoring.track import read_track, read_tracks
+from apo_bench.simulation.arms.arm import read_description
+from apo_bench.sweeps.sweep import read_sweep
+from apo_bench.trial.stages import simulate_demonstration
+
+SCENARIO = "stick_on_castles"
+NAMES = sorted(name for name in apo_bench.__all__ if name not in ("__version__", "InputError"))
+ENVIRONMENTS = sorted(name for name in gymnasium.registry if name.startswith("APO"))
+WRONG: tuple[Any, ...] = (None, 2, 1.5, "x", [1.5], [object()], object())
+
+
+@pytest.fixture(scope="module")
+def valid(castles: apo_bench.Scene, tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Any]:
+    """Name of a parameter, or of a record -> what is right; every function that is given all of it ends quickly."""
+    settings = apo_bench.TrialSettings(SCENARIO, abstain=1.0)
+    simulated = simulate_demonstration(castles, settings.careless, settings.seed)
+    shown = simulated.demonstration
+    assembly = shown.assembly
+    observation = apo_bench.observe(shown, "isotropic", np.random.default_rng(0))
+    correction = apo_bench.correct(observation)
+    at_rest = Snapshot(shown.final, 0.0, 0.0, 0.0, True)
+    reached = Reached((at_rest,) * len(assembly), at_rest)
+    reference = simulated.layout.goals
+    made = tmp_path_factory.mktemp("valid")
+    rows = [f"{k},{each.main},0,0,30,1,0,0,0" for k, each in enumerate(assembly.operations, start=1)]
+    (made / "seen.csv").write_text("\n".join(["operation,part,x_mm,y_mm,z_mm,qw,qx,qy,qz", *rows]), encoding="utf-8")
+    records = {
+        "Arm": castles.arm,
+        "Assembly": assembly,
+        "ContactCorrector": apo_bench.ContactCorrector(),
+        "Correction": correction,
+        "Criteria": castles.criteria,
+        "Demonstration": shown,
+        "Layout": simulated.layout,
+        "Observation": observation,
+        "Plan": correction.plan(observation),
+        "ReplayResult": apo_bench.ReplayResult(reached, Outcome("done", "ok", None, "done"), 0.0, 0.0),
+        "Scenario": castles.scenario,
+        "Scene": castles,
+        "SweepSettings": apo_bench.SweepSettings((SCENARIO,), (1.0,), (1.0,), ("contact",), trials=1, abstains=(1.0,)),
+        "TrialSettings": settings,
+        "Verdict": apo_bench.judge(assembly, reached, reference, castles.criteria),
+    }
+    by_record = {
+        "arm": "Arm",
+        "assembly": "Assembly",
+        "correction": "Correction",
+        "criteria": "Criteria",
+        "demonstration": "Demonstration",
+        "layout": "Layout",
+        "observation": "Observation",
+        "plan": "Plan",
+        "scenario": "Scenario",
+        "scene": "Scene",
+        "where": "Scene",
+        "grids": "SweepSettings",
+        "settings": "TrialSettings",
+    }
+    others = {
+        "simulated": simulated,
+        "observations": [observation],
+        "reached": reached,
+        "reference": reference,
+        "goals": reference,
+        "poses": shown.final,
+        "rng": np.random.default_rng(0),
+        "human_error": 1.0,
+        "env": gymnasium.make("APOReplay-v0", scenario=SCENARIO),
+        "noise": "isotropic",
+        "given": SCENARIO,
+        "look_at": np.zeros(3),
+        "width": 32,
+        "height": 24,
+        "most_s": 0.0,
+        "out": made / "rows",
+        "read_observation.path": made / "seen.csv",
+        "read_arm.path": folder("assets") / "arms" / "six_axis.toml",
+    }
+    return {**records, **{name: records[record] for name, record in by_record.items()}, **others}
+
+
+def right_arguments(public: Callable[..., Any], name: str, valid: Mapping[str, Any]) -> dict[str, Any]:
+    """Arguments that a function or record takes."""
+    if name in valid:
+        return {each.name: getattr(valid[name], each.name) for each in dataclasses.fields(valid[name])}
+    found = {key: valid.get(f"{name}.{key}", valid.get(key)) for key in inspect.signature(public).parameters}
+    return {key: value for key, value in found.items() if value is not None}
+
+
+def complaints(public: Callable[..., Any], right: Mapping[str, Any], key: str) -> Iterator[str]:
+    """What is wrong with how a function answers wrong values of one argument."""
+    for value in WRONG:
+        called = f"{public.__qualname__}({key}={value!r})"
+        try:
+            public(**{**right, key: value})
+        except (apo_bench.InputError, gymnasium.error.ResetNeeded) as error:
+            sentence = str(error)
+            if not sentence.strip() or "\n" in sentence or "object at 0x" in sentence:
+                yield f"{called}: {sentence!r}"
+        except Exception as error:
+            # Python itself says that there is no such argument.
+            if not isinstance(error, TypeError) or "unexpected keyword argument" not in str(error):
+                yield f"{called}: {error!r}"
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_wrong_argument_is_answered_in_one_sentence(
+    name: str, valid: Mapping[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    public = getattr(apo_bench, name)
+    right = right_arguments(public, name, valid)
+    if "width" not in right:  # pictures need a graphics driver, and say so
+        assert public(**right) is not None
+    wrong = [each for key in inspect.signature(public).parameters for each in complaints(public, right, key)]
+    assert not wrong, "\n".join(wrong)
+
+
+@pytest.mark.parametrize("name", ENVIRONMENTS)
+def test_an_environment_answers_a_wrong_argument_in_one_sentence(name: str) -> None:
+    right = {"scenario": SCENARIO}
+    env: Any = gymnasium.make(name, **right).unwrapped
+    made = type(env)
+    keys = {key for each in (made, *made.__bases__, APOReplay) for key in inspect.signature(each).parameters}
+    wrong = [each for key in sorted(keys) for each in complaints(made, right, key)]
+    wrong += [each for key in ("seed", "options") for each in complaints(env.reset, {}, key)]
+    wrong += complaints(env.step, {}, "action")
+    assert not wrong, "\n".join(wrong)
+
+
+def test_seen_is_true_or_false_and_start_is_of_parts_that_there_are() -> None:
+    observation = as_planned(apo_bench.load_scenario(SCENARIO), 1.0, 1.0)
+    n = len(observation.goals)
+    assert dataclasses.replace(observation, seen=[1] * n).seen.all()
+    for seen in ([2] * n, [np.nan] * n, ["yes"] * n):
+        with pytest.raises(apo_bench.InputError, match="seen of Observation must be an array of True"):
+            dataclasses.replace(observation, seen=seen)
+    start = {**observation.start, "stik": np.eye(4)}
+    shown = {"careless": observation.covariance, "final": {}}
+    parts = {"assembly": observation.assembly, "goals": observation.goals}
+    for record, more in ((apo_bench.Observation, vars(observation)), (apo_bench.Plan, parts)):
+        with pytest.raises(apo_bench.InputError, match="unknown part in the poses 'stik'; did you mean 'stick'"):
+            record(**{**more, "start": start})
+    for key in ("start", "final"):
+        with pytest.raises(apo_bench.InputError, match="unknown part in the poses 'stik'"):
+            apo_bench.Demonstration(**{**parts, **shown, "start": observation.start, key: start})
+
+
+def test_an_array_of_a_wrong_shape_is_named() -> None:
+    observation = as_planned(apo_bench.load_scenario(SCENARIO), 1.0, 1.0)
+    with pytest.raises(apo_bench.InputError, match=r"^goals of Observation: an array of shape \(\d, 4, 4\) is needed"):
+        dataclasses.replace(observation, goals=observation.goals[:1])
+
+
+def test_a_noise_model_that_makes_a_wrong_record_is_named(castles: apo_bench.Scene) -> None:
+    def mine(assembly: Any, shown: Any, rng: Any) -> Any:
+        return apo_bench.Observation(assembly, shown.start, shown.goals, None, [True] * len(assembly))  # type: ignore[arg-type]
+
+    shown = simulate_demonstration(castles, 0.0, 0).demonstration
+    with pytest.raises(
+        apo_bench.InputError, match=r"^the noise model 'mine' failed: covariance of Observation must be"
+    ):
+        apo_bench.observe(shown, mine, np.random.default_rng(0))
+
+
+def written(path: Path, text: str) -> Path:
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+ONE_NAME: tuple[tuple[str, Callable[[Path], Any], Any], ...] = (
+    ("settings of a sweep", lambda at: apo_bench.SweepSettings(SCENARIO).scenarios, (SCENARIO,)),
+    ("methods", lambda at: apo_bench.SweepSettings(SCENARIO, methods="paper").methods, ("paper",)),
+    (
+        "sweep file",
+        lambda at: read_sweep(written(at, f"scenarios = '{SCENARIO}'\nmethods = 'paper'"))[0].methods,
+        ("paper",),
+    ),
+    (
+        "track",
+        lambda at: (
+            read_track(
+                written(
+                    at,
+                    f"scenarios = '{SCENARIO}'\n[track]\nschema = 'apo-bench/track/1'\ntitle = 'x'\narms = 'six_axis'",
+                )
+            ).arms
+        ),
+        ("six_axis",),
+    ),
+    ("tracks", lambda at: [track.name for track in read_tracks("range")], ["range"]),
+    (
+        "arm",
+        lambda at: read_description(written(at, "schema = 'apo-bench/arm/1'\nmjcf = 'a.xml'\njoints = 'hinge'")).joints,
+        ("hinge",),
+    ),
+    ("data set", lambda at: next(islice(endless_pairs(SCENARIO), 1)).scenarios, (SCENARIO,)),
+    ("parts", lambda at: apo_bench.Assembly({}, (), "table").fixed, frozenset({"table"})),  # type: ignore[arg-type]
+    ("carried parts", lambda at: Operation("a", carries="bc").carries, ("bc",)),
+    ("names of edges", lambda at: [edge.name for edge in rectangle(1.0, 1.0, names="ab")][:1], ["ab"]),
+)
+
+
+@pytest.mark.parametrize(("read", "expected"), [case[1:] for case in ONE_NAME], ids=[case[0] for case in ONE_NAME])
+def test_a_text_where_several_names_may_stand_is_one_name(
+    read: Callable[[Path], Any], expected: Any, tmp_path: Path
+) -> None:
+    assert read(tmp_path / "file.toml") == expected
+
+
+def test_a_relation_that_is_left_out_may_be_one_text() -> None:
+    observation = as_planned(apo_bench.load_scenario(SCENARIO), 1.0, 1.0)
+    one, several, all_of_them = (apo_bench.explain(observation, observation.goals, x) for x in ("R1", ("R1",), ()))
+    assert one.redundant == several.redundant < all_of_them.redundant
+    assert (observation.assembly.without("R1") == observation.assembly.without(("R1",))).all()
