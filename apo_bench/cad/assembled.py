@@ -5,13 +5,13 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.pieces.misfit import surface_points
 from apo_bench.cad.solids.bodies import body_of
-from apo_bench.cad.solids.raw_solid import RawSolid
+from apo_bench.cad.solids.raw_solid import Mesh, RawSolid
 from apo_bench.geometry import Array, pose
 
 _STEP_MM = 1.0
 """Points of others are so far apart, and so are the places on their way."""
+_MOST_POINTS = 60_000
 _NEAR_MM = 1.5
 _BITS = 20
 """Of the number of a place along each axis."""
@@ -45,6 +45,17 @@ def coming_near(raws: Sequence[RawSolid]) -> list[Array]:
         # What passes a place again and again counts there once.
         near[i] = [_each_once(np.concatenate(near[i]))]
     return [each[0] for each in near]
+
+
+def surface_points(mesh: Mesh, step: float) -> Array:
+    """Corners of a closed mesh, and points on its sides between them, (k, 3).
+
+    Args:
+        step: How far apart neighbours are at most, farther on large parts, [mm].
+    """
+    area = float(np.linalg.norm(mesh.across, axis=1).sum()) / 2.0
+    fine = body_of(mesh).refine_to_length(max(step, (2.0 * area / _MOST_POINTS) ** 0.5)).to_mesh64()
+    return np.unique(np.asarray(fine.vert_properties)[:, :3].astype(np.float64), axis=0)
 
 
 def mates_of(raws: Sequence[RawSolid]) -> list[Any]:

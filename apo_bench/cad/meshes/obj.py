@@ -11,33 +11,27 @@ from typing import Any
 import numpy as np
 
 from apo_bench.cad.solids.raw_solid import Mesh, square_to
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
 
 _SAME_AREA = 1e-6
 """Triangles cover a polygon once if their areas add up to its area within this part."""
 
 
-def read_obj(path: Path, raw: bytes, most_triangles: int) -> Mesh:
+def read_obj(path: Path, raw: bytes) -> Mesh:
     """The mesh of all faces of a file.
 
     Raises:
-        InputError: It is no OBJ file, has too many triangles, or a polygon crosses itself.
+        InputError: It is no OBJ file, or a polygon crosses itself.
     """
     try:
         corners, polygons = _read_polygons(raw)
     except (ValueError, OverflowError) as error:
         raise InputError(f"{path}: this is no OBJ file that can be read; save the part again.") from error
-    count = sum(len(polygon) - 2 for polygon in polygons)
-    if count > most_triangles:
-        raise InputError(
-            f"{path}: the file has {count:,} triangles; {most_triangles:,} are the most, so save a coarser mesh."
-        )
     triangles = [np.zeros((0, 3), dtype=np.int64)]
     for number, polygon in enumerate(polygons, start=1):
-        cut = polygon[None] if len(polygon) == 3 else _triangulated(corners[polygon], polygon)
-        if cut is None:
-            raise InputError(f"{path}: face {number:,} crosses itself; save the part with triangles only.")
+        cut = polygon[None] if len(polygon) == 3 else _triangulate(corners[polygon], polygon)
+        require(cut is not None, f"{path}: face {number:,} crosses itself; save the part with triangles only.")
         triangles.append(cut)
     return Mesh(corners, np.concatenate(triangles))
 
@@ -70,7 +64,7 @@ def _read_polygons(raw: bytes) -> tuple[Array, list[Any]]:
     return corners, polygons
 
 
-def _triangulated(points: Array, polygon: Any) -> Any:
+def _triangulate(points: Array, polygon: Any) -> Any:
     """Triangles, (n - 2, 3), of a polygon with these points, (n, 3); None if they cannot cover it once."""
     import manifold3d
 

@@ -8,7 +8,6 @@ from typing import Any, Literal, NamedTuple, final
 import numpy as np
 
 from apo_bench.geometry import WHOLE_TURN, Array
-from apo_bench.parts.making.body import Moments
 
 RegionKind = Literal["plane", "cylinder", "cone", "other"]
 Rgb = tuple[float, float, float]
@@ -208,10 +207,6 @@ class RawSolid:
     """What was mended."""
     regions: tuple[Region, ...] = ()
     """Its faces, once they are found."""
-    facets: Any = None
-    """The flat piece that each triangle belongs to, (t,), once they are found."""
-    moments: Moments | None = None
-    """As the file has them, where it has more than triangles, [mm]."""
 
     def named(self) -> Mapping[str, Region]:
         return {region.name: region for region in self.regions if region.name}

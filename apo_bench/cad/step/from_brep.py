@@ -6,19 +6,15 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.faces.facets import facets_of
 from apo_bench.cad.faces.fitting import Round, border_of, plane_region, round_region, turn_of
-from apo_bench.cad.meshes.closing import has_three
-from apo_bench.cad.meshes.shells import INSIDE_OUT, check_closed, check_uncrossed
+from apo_bench.cad.meshes.joining import SAME_CORNER, join_corners
+from apo_bench.cad.meshes.shells import INSIDE_OUT, check_closed
 from apo_bench.cad.solids.naming import with_names
 from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, Region, connected, put_together, square_to
-from apo_bench.cad.step.surfaces import TRIANGLES_RAD, BrepFace, BrepSolid, Flat, Wall, is_same, surface_of
-from apo_bench.errors import InputError
+from apo_bench.cad.step.surfaces import BrepFace, BrepSolid, Flat, Wall, is_same, surface_of
+from apo_bench.errors import require
 from apo_bench.geometry import WHOLE_TURN, Array
-from apo_bench.parts.making.body import Moments
 
-_SAME_CORNER = 1e-7
-"""Corners nearer to each other than this part of the size are one."""
 _LEVEL = 1e-6
 _SAME_RAD = 1e-5
 _FEWEST = 6
@@ -31,13 +27,11 @@ def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
     Raises:
         InputError: A face of it could not be cut into triangles, or its shell is open.
     """
-    if any(face.kind == "none" for face in solid.faces):
-        raise InputError(f"{path}: a face of '{solid.name}' cannot be cut into triangles; mend it where it was drawn.")
+    is_whole = all(face.kind != "none" for face in solid.faces)
+    require(is_whole, f"{path}: a face of '{solid.name}' cannot be cut into triangles; mend it where it was drawn.")
     mesh, owner = _mesh(solid.faces)
     check_closed(path, mesh)
     surfaces = [surface_of(face) for face in solid.faces]
-    off = np.array([_sagitta(face, surface) for face, surface in zip(solid.faces, surfaces, strict=True)])
-    check_uncrossed(path, mesh, off[owner])
     mended = (INSIDE_OUT,) if mesh.volume < 0.0 else ()
     mesh = mesh.flipped() if mended else mesh
     # Faces that touch on one surface are one region; from here on `owner` is the region of each triangle.
@@ -52,39 +46,15 @@ def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
         region = _region(mesh, np.flatnonzero(owner == g), members[0])
         regions.append(replace(region, residual=max(region.residual, residual)))
     named = with_names(mesh, sorted(regions, key=lambda region: int(region.triangles[0])))
-    return RawSolid(solid.name, mesh, solid.places, mended, named, facets_of(mesh).of, _moments(solid))
-
-
-def _sagitta(face: BrepFace, surface: Flat | Wall | None) -> float:
-    """How far triangles of a face may be from it, [mm]: the sagitta of the angle between neighbours."""
-    radius = float(np.ptp(face.corners, axis=0).max())
-    if isinstance(surface, Wall):
-        radius = surface.surface.radius + abs(surface.surface.slope) * radius
-    return 0.0 if isinstance(surface, Flat) else float((1.0 - np.cos(TRIANGLES_RAD / 2.0)) * radius)
-
-
-def _moments(solid: BrepSolid) -> Moments:
-    """About the origin. The integral of x x^T is trace(J) / 2 - J, J being the inertia."""
-    J = solid.inertia if solid.size > 0.0 else -solid.inertia
-    second = np.trace(J) / 2.0 * np.eye(3) - J
-    return Moments(abs(solid.size), np.zeros(3), second).moved(np.eye(3), solid.centroid)
+    return RawSolid(solid.name, mesh, solid.places, mended, named)
 
 
 def _mesh(faces: tuple[BrepFace, ...]) -> tuple[Mesh, Any]:
     """The triangles of all faces with common corners, and the face of each."""
-    from scipy.spatial import cKDTree
-
     whole = put_together([Mesh(face.corners, face.triangles) for face in faces])
     owner = np.repeat(np.arange(len(faces)), [len(face.triangles) for face in faces])
-    # One group of near corners is its first one.
-    near = _SAME_CORNER * max(float(np.ptp(whole.corners, axis=0).max()), 1e-9)
-    count = len(whole.corners)
-    groups, group = connected(cKDTree(whole.corners).query_pairs(near, output_type="ndarray"), count)
-    first = np.full(groups, count)
-    np.minimum.at(first, group, np.arange(count))
-    triangles = group[whole.triangles]
-    sound = has_three(triangles)
-    return Mesh(whole.corners[first], triangles[sound]), owner[sound]
+    mesh, has_three = join_corners(whole, SAME_CORNER * max(whole.extent, 1e-9))
+    return mesh, owner[has_three]
 
 
 def _in_strips(mesh: Mesh, owner: Any, surfaces: list[Flat | Wall | None]) -> tuple[Mesh, Any]:

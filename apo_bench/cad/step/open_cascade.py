@@ -1,10 +1,6 @@
-"""Solids of a STEP file as Open CASCADE reads them, in a process of its own: names, places, colours, faces."""
+"""Solids of a STEP file as Open CASCADE reads them: names, places, colours, faces."""
 
-import os
-import pickle
 import re
-import resource
-import sys
 from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -18,9 +14,7 @@ from OCP import (
     BRep,
     BRepAdaptor,
     BRepBndLib,
-    BRepGProp,
     BRepMesh,
-    GProp,
     IFSelect,
     Quantity,
     STEPCAFControl,
@@ -37,7 +31,7 @@ from OCP import (
 from OCP import collections as sequences
 
 from apo_bench.cad.solids.raw_solid import Rgb, SolidPlace
-from apo_bench.cad.step.surfaces import READER_BYTES, READER_S, TRIANGLES_RAD, BrepFace, BrepSolid
+from apo_bench.cad.step.surfaces import TRIANGLES_RAD, BrepFace, BrepSolid
 from apo_bench.geometry import Array
 
 _NO_NAME = re.compile(
@@ -158,16 +152,7 @@ def _solids(name: str, shape: Any, places: tuple[SolidPlace, ...]) -> Iterator[B
         every = [shape]
     for i, each in enumerate(every, start=1):
         own_name = name if len(every) == 1 else f"{name}_{i}"
-        yield BrepSolid(own_name, tuple(_faces(each)), *_mass_properties(each), places)
-
-
-def _mass_properties(shape: Any) -> tuple[float, Array, Array]:
-    """Volume, centroid, inertia about it."""
-    properties = GProp.GProp_GProps()
-    BRepGProp.BRepGProp.VolumeProperties_s(shape, properties)
-    J = properties.MatrixOfInertia()
-    inertia = np.array([[J.Value(i, k) for k in range(1, 4)] for i in range(1, 4)])
-    return properties.Mass(), _xyz(properties.CentreOfMass()), inertia
+        yield BrepSolid(own_name, tuple(_faces(each)), places)
 
 
 def _faces(shape: Any) -> Iterator[BrepFace]:
@@ -176,7 +161,7 @@ def _faces(shape: Any) -> Iterator[BrepFace]:
     size = float(np.sqrt(box.SquareExtent())) if not box.IsVoid() else 1.0
     BRepMesh.BRepMesh_IncrementalMesh(shape, _SAGITTA * size, False, TRIANGLES_RAD, False)
     for each in _shapes_in(shape, TopAbs.TopAbs_FACE):
-        yield _face(TopoDS.TopoDS.Face_s(each) if hasattr(TopoDS.TopoDS, "Face_s") else TopoDS.TopoDS.Face(each))
+        yield _face(TopoDS.TopoDS.Face(each))
 
 
 def _face(face: Any) -> BrepFace:
@@ -228,22 +213,3 @@ def _samples(surface: Any, mesh: Any, triangles: Any) -> tuple[Array, Array]:
 
 def _xyz(each: Any) -> Array:
     return np.array([each.X(), each.Y(), each.Z()])
-
-
-def write_solids(path: str) -> None:
-    """Read a file with little memory and time, and write what it holds to the standard output, pickled.
-
-    What the reader prints goes elsewhere.
-    """
-    out = os.dup(1)
-    os.dup2(2, 1)
-    limits = {resource.RLIMIT_AS: READER_BYTES, resource.RLIMIT_CPU: READER_S, resource.RLIMIT_CORE: 0}
-    for what, most in limits.items():
-        with suppress(OSError, ValueError):
-            resource.setrlimit(what, (most, most))
-    try:
-        solids = pickle.dumps(solids_of(Path(path)))
-    except (MemoryError, RuntimeError, ValueError, TypeError) as error:
-        sys.exit(f"{type(error).__name__}: {error}")
-    with os.fdopen(out, "wb") as file:
-        file.write(solids)

@@ -8,8 +8,6 @@ from apo_bench.cad.faces.fitting import Round, axis_of, circle_through, refined
 from apo_bench.cad.solids.raw_solid import SolidPlace
 from apo_bench.geometry import Array
 
-READER_BYTES = 2_000_000_000
-READER_S = 20
 TRIANGLES_RAD = 0.2
 """The angle between neighbours on round walls, the same on walls around one axis."""
 _SPLINE_MM = 5e-4
@@ -48,11 +46,6 @@ class BrepSolid(NamedTuple):
 
     name: str
     faces: tuple[BrepFace, ...]
-    size: float
-    """Volume, [mm^3]."""
-    centroid: Array
-    inertia: Array
-    """About the centroid, [mm^5]."""
     places: tuple[SolidPlace, ...]
 
 

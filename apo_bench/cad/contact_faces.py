@@ -1,15 +1,12 @@
-"""Regions become what a part file states: faces that can make contacts, and moments, [m]."""
+"""Regions become the faces of a part that can make contacts, [m]."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.pieces.cutting import Cut
-from apo_bench.cad.solids.bodies import mesh_of
-from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, Region, square_to
-from apo_bench.geometry import Array, Face, Hull, RoundFace, sides_of, straightened
-from apo_bench.parts.making.body import Moments
+from apo_bench.cad.solids.raw_solid import RawSolid, Region, square_to
+from apo_bench.geometry import Array, Face, RoundFace, sides_of, straightened
 from apo_bench.parts.making.outline import COARSE_SIDES
 
 _THINNEST_MM = 0.05
@@ -106,73 +103,3 @@ def _circle(raw: RawSolid, region: Region, beside: set[int], hole: bool) -> Arra
     n = max(sides_of(1e-3 * max(wall.radii)), COARSE_SIDES)
     angle = 2.0 * np.pi * (np.arange(n) + 0.5) / n
     return wall.around(height, r / np.cos(np.pi / n) if hole else r, angle)
-
-
-def solid_moments(raw: RawSolid, cut: Cut) -> Moments:
-    """[m]: of the mesh and what lies between its strips and walls that pieces are rebuilt for.
-
-    Of the pieces where these stand for free shapes, or fill holes; where there are other curved faces, as the file has
-    it. It is not asked of flat and round solids: a kernel integrates faces that are trimmed badly up to a hundredth
-    wrong.
-    """
-    if cut.hulls or cut.filled:
-        return moments_of_pieces(cut.pieces)
-    if raw.moments is not None and not all(r.kind == "plane" or r.square for r in raw.regions):
-        moments = raw.moments
-    else:
-        moments = _mesh_moments(raw.mesh)
-        for region in raw.regions:
-            if region.square:
-                moments = moments.plus(_behind_strips(raw, region))
-    return moments.in_metres
-
-
-def moments_of_pieces(pieces: Iterable[Hull]) -> Moments:
-    """[m]: of what the pieces fill."""
-    import manifold3d
-
-    hulls = [manifold3d.Manifold.hull_points(1e3 * piece.corners) for piece in pieces]
-    return _mesh_moments(mesh_of(manifold3d.Manifold.batch_boolean(hulls, manifold3d.OpType.Add))).in_metres
-
-
-def _mesh_moments(mesh: Mesh) -> Moments:
-    """[mm]: the sum of the tetrahedra from the middle to every triangle.
-
-    Of a tetrahedron with one corner at the origin and the others a, b, c the volume is V = a . (b x c) / 6, the
-    integral of x is V s / 4 and that of x x^T is V (a a^T + b b^T + c c^T + s s^T) / 20, with s = a + b + c.
-    """
-    middle = mesh.corners.mean(axis=0)
-    points = mesh.corners[mesh.triangles] - middle
-    sizes = (points[:, 0] * np.cross(points[:, 1], points[:, 2])).sum(axis=1) / 6.0
-    total = points.sum(axis=1)
-    first = sizes @ total / 4.0
-    second = (np.einsum("t,tia,tib->ab", sizes, points, points) + np.einsum("t,ta,tb->ab", sizes, total, total)) / 20.0
-    return Moments(float(sizes.sum()), first, second).moved(np.eye(3), middle)
-
-
-def _behind_strips(raw: RawSolid, region: Region) -> Moments:
-    """Between chords and arcs of one round face; negative for a hole."""
-    corners = raw.mesh.corners[raw.mesh.triangles[region.triangles]]
-    weight = np.linalg.norm(raw.mesh.across[region.triangles], axis=1) / 2.0
-    strips, of = np.unique(raw.facets[region.triangles], return_inverse=True)
-    areas = np.bincount(of, weight)
-    middles = corners.mean(axis=1)
-    centers = np.stack([np.bincount(of, weight * middles[:, k]) / areas for k in range(3)], axis=1)
-    # The angle about the axis that each strip spans; a corner on the axis, the tip of a cone, has none.
-    height, distance, middle = region.polar(centers)
-    _, far, angle = region.polar(corners.reshape(-1, 3))
-    off = (angle - middle[np.repeat(of, 3)] + np.pi) % (2.0 * np.pi) - np.pi
-    off = np.where(far < 1e-9 + 1e-6 * max(region.radii), 0.0, off)
-    reach = np.zeros((len(strips), 2))
-    np.maximum.at(reach, np.repeat(of, 3), np.column_stack([off, -off]))
-    span = reach.sum(axis=1)
-    # Behind a strip lies a segment of a circle, r^2 (span - sin span) / 2, times its length along the axis.
-    r = region.radius_at(height)
-    tall = areas / np.maximum(2.0 * r * np.sin(span / 2.0), 1e-300) / np.sqrt(1.0 + region.slope**2)
-    sizes = (-1.0 if region.hole else 1.0) * tall * r**2 / 2.0 * (span - np.sin(span))
-    # The centroid of a thin segment of height h is 0.4 h from its chord c. It is put at 0.6 h: so x x^T about the axis
-    # has the spread across the strip, too, as 2 r 0.2 h = c^2 / 20 with c^2 = 8 r h. On a whole turn x adds up to 0.
-    out = centers - region.point - height[:, None] * region.direction
-    at: Array = centers + out * ((0.4 * distance + 0.6 * r) / np.maximum(distance, 1e-300) - 1.0)[:, None]
-    along = (tall**2 / 12.0) @ sizes * np.outer(region.direction, region.direction)
-    return Moments(float(sizes.sum()), sizes @ at, np.einsum("s,sa,sb->ab", sizes, at, at) + along)
