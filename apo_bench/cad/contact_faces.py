@@ -1,12 +1,10 @@
 """Regions become the faces of a part that can make contacts, [m]."""
 
-from collections.abc import Iterator
-from typing import Any
-
 import numpy as np
 
+from apo_bench.cad.faces.fitting import ON_WALL
 from apo_bench.cad.solids.raw_solid import RawSolid, Region, square_to
-from apo_bench.geometry import Array, Face, RoundFace, sides_of, straightened
+from apo_bench.geometry import Array, Face, RoundFace, rings_of, sides_of, straightened
 from apo_bench.parts.making.outline import COARSE_SIDES
 
 _THINNEST_MM = 0.05
@@ -38,68 +36,32 @@ def _flat_face(raw: RawSolid, region: Region) -> Face | None:
 
     None if it has no single outline.
     """
+    import shapely
+
     n = region.direction
     flat = np.array(square_to(n))
-    offset = 1e-3 * float(n @ region.point) * n
-    outlines: list[Array] = []
-    holes: list[Array] = []
-    for corners, beside in _loops(raw, region):
-        # The material is left of a border: outlines run counter-clockwise seen against n, holes the other way.
-        area = _area(raw.mesh.corners[corners] @ flat.T)
-        ring = _circle(raw, region, beside, area < 0.0)
-        points = 1e-3 * (raw.mesh.corners[corners] if ring is None else ring)
-        kept = straightened(points @ flat.T)
-        if area * _area(kept) < 0.0:
-            kept = kept[::-1]
-        if len(kept) >= 3:
-            (outlines if area > 0.0 else holes).append(kept @ flat + offset)
-    return Face(region.name, outlines[0], tuple(holes)) if len(outlines) == 1 else None
-
-
-def _area(ring: Array) -> float:
-    """Of a polygon (k, 2), negative if it is clockwise."""
-    x, y = (ring - ring[0]).T
-    return float(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2.0
-
-
-def _loops(raw: RawSolid, region: Region) -> Iterator[tuple[Any, set[int]]]:
-    """The borders of a region: corners in their order, and the regions on the other side."""
-    mesh = raw.mesh
-    of = np.full(len(mesh.triangles), -1)
-    for k, each in enumerate(raw.regions):
-        of[each.triangles] = k
-    mine = np.isin(np.arange(len(mesh.triangles)), region.triangles)
-    # Border edges as the triangle inside has them; an edge is directed as in the first of its two neighbours.
-    i, k = mesh.neighbours.T
-    forth = mine[i] & ~mine[k]
-    back = mine[k] & ~mine[i]
-    edges = np.concatenate([mesh.edges[forth], mesh.edges[back][:, ::-1]]).tolist()
-    others = np.concatenate([of[k[forth]], of[i[back]]]).tolist()
-    # From each corner to the next one, until a loop closes; a corner in which two loops touch has two ways on.
-    after: dict[int, list[tuple[int, int]]] = {}
-    for (a, b), other in zip(edges, others, strict=True):
-        after.setdefault(a, []).append((b, other))
-    while after:
-        at = min(after)
-        corners: list[int] = []
-        beside = set()
-        while at in after and at not in corners[:1]:
-            corners.append(at)
-            at, other = after[at].pop()
-            beside.add(other)
-            if not after[corners[-1]]:
-                del after[corners[-1]]
-        yield np.array(corners), beside
-
-
-def _circle(raw: RawSolid, region: Region, beside: set[int], hole: bool) -> Array | None:
-    """A border that is the whole end of a round wall, as a finer polygon than the mesh has, [mm]."""
-    wall = raw.regions[beside.pop()]
-    if beside or not wall.square:
+    triangles = raw.mesh.corners[raw.mesh.triangles[region.triangles]] @ flat.T
+    area = shapely.coverage_union_all(shapely.polygons(triangles))
+    if area.geom_type != "Polygon":
         return None
+    offset = float(n @ region.point) * n
+    rings = [ring @ flat + offset for ring in rings_of(area, 1.0)]
+    drawn = [_circle(raw, region, ring, k > 0) @ flat.T for k, ring in enumerate(rings)]
+    outline, *holes = (straightened(1e-3 * ring) @ flat + 1e-3 * offset for ring in drawn)
+    return Face(region.name, outline, tuple(holes))
+
+
+def _circle(raw: RawSolid, region: Region, ring: Array, hole: bool) -> Array:
+    """A border, (k, 3); one that is the whole end of a round wall as a finer polygon than the mesh has, [mm]."""
+    near = ON_WALL * raw.mesh.extent
+    wall = next((each for each in raw.regions if each.square and each.is_on_wall(ring, near).all()), None)
+    if wall is None:
+        return ring
     # Where the axis meets the plane; corners between those of the wall's pieces, for a hole on a circle around it.
-    height = float((region.point - wall.point) @ region.direction / (wall.direction @ region.direction))
+    along = float(wall.direction @ region.direction)
+    height = float((region.point - wall.point) @ region.direction / along)
     r = float(wall.radius_at(height))
     n = max(sides_of(1e-3 * max(wall.radii)), COARSE_SIDES)
-    angle = 2.0 * np.pi * (np.arange(n) + 0.5) / n
-    return wall.around(height, r / np.cos(np.pi / n) if hole else r, angle)
+    # An outline is counter-clockwise seen against the normal of its face, a hole clockwise.
+    turn = -1.0 if hole == (along > 0.0) else 1.0
+    return wall.around(height, r / np.cos(np.pi / n) if hole else r, turn * 2.0 * np.pi * (np.arange(n) + 0.5) / n)

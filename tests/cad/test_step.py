@@ -149,7 +149,7 @@ def test_units_are_those_of_the_file(tmp_path: Path) -> None:
     assert file.unit == "cm"
     assert raw.mesh.extent == pytest.approx(300.0)
     path.write_text(text.replace("SI_UNIT(.CENTI.,.METRE.)", "SI_UNIT($,.METRE.)"))
-    with pytest.raises(InputError, match=r"3e\+04 mm long \(unit m, stated in the file\)"):
+    with pytest.raises(InputError, match=r"is 3e\+04 mm .of a solid in it; unit m, stated in the file."):
         raw_solids(path, None)
 
 
