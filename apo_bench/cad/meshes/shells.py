@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.cad.meshes.joining import SAME_CORNER, join_corners
-from apo_bench.cad.solids.bodies import body_of, mesh_of
+from apo_bench.cad.solids.bodies import body_of, mesh_of, simplify
 from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, SolidPlace, connected, put_together
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
@@ -22,10 +22,8 @@ _NARROWEST = 1e-3
 """Triangles of less height, in parts of the size of the solid, are noise."""
 _COMMON = 1e-6
 """Solids that have less than this part of the smaller one in common only touch."""
-_FLAT = 1e-6
-"""Corners this near to a flat piece, in parts of the size, are left out of it."""
 _FEWER = 0.9
-"""... if so many triangles or less are left then."""
+"""Corners in flat pieces are left out if so many triangles or less are left then."""
 INSIDE_OUT = "it was inside out, and was turned"
 
 
@@ -47,7 +45,9 @@ def closed_solids(path: Path, name: str, mesh: Mesh) -> Iterator[RawSolid]:
     for i, solid in enumerate(solids, start=1):
         _check_unfolded(path, solid)
         own_name = name if len(solids) == 1 else f"{name}_{i}"
-        yield RawSolid(own_name, _simplify(solid), (SolidPlace(own_name, np.eye(4)),), mended)
+        fewer = simplify(solid)
+        plain = fewer if len(fewer.triangles) < _FEWER * len(solid.triangles) else solid
+        yield RawSolid(own_name, plain, (SolidPlace(own_name, np.eye(4)),), mended)
 
 
 def _runs(mesh: Mesh) -> Iterator[Mesh]:
@@ -74,9 +74,6 @@ def _shells(path: Path, mesh: Mesh) -> list[Mesh]:
     body = body_of(mesh)
     if body.status() != manifold3d.Error.NoError:
         check_closed(path, mesh)
-        raise InputError(
-            f"{path}: neighbouring triangles look different ways; save the part again from where it was drawn."
-        )
     bodies = body.decompose()
     # One shell stays as the file has it, so that copies of a solid have their triangles in the same order.
     shells = [mesh] if len(bodies) == 1 and mesh.is_closed else [mesh_of(each) for each in bodies]
@@ -88,11 +85,15 @@ def _shells(path: Path, mesh: Mesh) -> list[Mesh]:
 
 
 def check_closed(path: Path, mesh: Mesh) -> None:
-    """Raise an `InputError` unless every edge has two triangles."""
+    """Raise an `InputError` unless every edge has two triangles that look the same way."""
+    import manifold3d
+
     counts = np.unique(np.sort(mesh.sides, axis=1), axis=0, return_counts=True)[1]
     single, many = (counts == 1).sum(), (counts > 2).sum()
     require(not single, f"{path}: the shell is open: {single:,} edges have a triangle on one side only; close it.")
     require(not many, f"{path}: {many:,} edges are beside more than two triangles; save each solid on its own.")
+    is_solid = body_of(mesh).status() == manifold3d.Error.NoError
+    require(is_solid, f"{path}: neighbouring triangles look different ways; mend the solid where it was drawn.")
 
 
 def _unite(shells: Sequence[Mesh]) -> list[Mesh]:
@@ -153,9 +154,3 @@ def _check_unfolded(path: Path, mesh: Mesh) -> None:
             f"{path}: the surface folds back onto itself at ({at}) mm, as where a concave face was cut into a fan of "
             "triangles; save the part again from where it was drawn, or as STEP."
         )
-
-
-def _simplify(mesh: Mesh) -> Mesh:
-    """Without corners in flat pieces, if these are many."""
-    fewer = mesh_of(body_of(mesh).simplify(_FLAT * mesh.extent))
-    return fewer if len(fewer.triangles) < _FEWER * len(mesh.triangles) else mesh
