@@ -11,7 +11,7 @@ from apo_bench.cad.meshes.joining import SAME_CORNER, join_corners
 from apo_bench.cad.meshes.shells import INSIDE_OUT, check_closed
 from apo_bench.cad.solids.naming import with_names
 from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, Region, connected, put_together
-from apo_bench.cad.step.surfaces import BrepFace, BrepSolid, Flat, Wall, is_same, surface_of
+from apo_bench.cad.step.surfaces import BrepFace, BrepSolid, Flat, Wall, is_same
 from apo_bench.errors import require
 from apo_bench.geometry import WHOLE_TURN
 
@@ -25,11 +25,11 @@ def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
     Raises:
         InputError: A face of it could not be cut into triangles, or its shell is open.
     """
-    is_whole = all(face.kind != "none" for face in solid.faces)
+    is_whole = all(len(face.triangles) for face in solid.faces)
     require(is_whole, f"{path}: a face of '{solid.name}' cannot be cut into triangles; mend it where it was drawn.")
     mesh, owner = _mesh(solid.faces)
     check_closed(path, mesh)
-    surfaces = [surface_of(face) for face in solid.faces]
+    surfaces = [face.surface for face in solid.faces]
     mended = (INSIDE_OUT,) if mesh.volume < 0.0 else ()
     mesh = mesh.flipped() if mended else mesh
     # Faces that touch on one surface are one region; from here on `owner` is the region of each triangle.
