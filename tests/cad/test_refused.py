@@ -169,7 +169,7 @@ def test_what_pieces_leave_out_is_no_matter_of_the_part_up_to_a_hundredth(
     larger(0.004)
     assert import_part(raw, "a", tmp_path, "a.stl").solid.volume == pytest.approx(1e-9 * raw.mesh.volume)
     larger(0.02)
-    with pytest.raises(InputError, match="its convex pieces make no part .a.toml, volume_mm3"):
+    with pytest.raises(InputError, match=r"its convex pieces make no part .a\.toml, volume_mm3"):
         import_part(raw, "a", tmp_path, "a.stl")
 
 

@@ -183,7 +183,7 @@ def test_supports_are_left_out_and_counted_also_where_an_object_around_them_is_o
         (of_production(placed_from(2, "gone", 0), '<item objectid="2"/>'), "the model '3d/objects/gone.model' that"),
         (
             of_production(placed_from(2, "inch", 0), '<item objectid="2"/>'),
-            "one model of the 3MF file is in mm, another in in",
+            "model of the 3MF file is in mm, another in in",
         ),
         (of_production(box(1, 5, 5, 5), '<item objectid="1"/>', "p b"), "need the extension 'http://example.com/latt"),
         (of_production(box(1, 5, 5, 5), '<item objectid="1"/>', "q"), "need the extension 'q'"),
