@@ -22,7 +22,6 @@ TETRAHEDRON = (
     + "</triangles></mesh>"
 )
 MESH = f'<object id="1">{TETRAHEDRON}</object>'
-MOST = 400_000
 
 
 def model(objects: str, items: str = '<item objectid="1"/>', head: str = "") -> str:
@@ -84,15 +83,8 @@ REFUSED: dict[str, tuple[Callable[[], bytes], str]] = {
 def test_what_is_no_3mf_file_is_refused_in_one_sentence(case: str) -> None:
     make, sentence = REFUSED[case]
     with pytest.raises(InputError, match=sentence) as raised:
-        read_3mf(Path("a.3mf"), make(), MOST)
+        read_3mf(Path("a.3mf"), make())
     assert "\n" not in str(raised.value)
-
-
-def test_what_is_placed_is_counted_before_it_is_built() -> None:
-    placed = packed(model(MESH, '<item objectid="1"/>' * 1000))
-    assert len(read_3mf(Path("a.3mf"), placed, 4000).meshes) == 1000
-    with pytest.raises(InputError, match="has 4,000 triangles; 3,999 are the most"):
-        read_3mf(Path("a.3mf"), placed, 3999)
 
 
 def test_nested_objects_are_placed_by_the_product_of_their_places() -> None:
@@ -100,7 +92,7 @@ def test_nested_objects_are_placed_by_the_product_of_their_places() -> None:
     turn = "0 1 0 -1 0 0 0 0 1 0 0 0"
     inner = f'<object id="2"><components><component objectid="1" transform="{move}"/></components></object>'
     raw = packed(model(MESH + inner, f'<item objectid="2" transform="{turn}"/>'))
-    [(name, mesh)] = read_3mf(Path("a.3mf"), raw, MOST).meshes
+    [(name, mesh)] = read_3mf(Path("a.3mf"), raw).meshes
     assert name == "object1"
     assert mesh.corners[:2].tolist() == [[0.0, 5.0, 0.0], [0.0, 15.0, 0.0]]
 
@@ -141,7 +133,7 @@ def placed_from(number: int, path: str, x: float) -> str:
 
 
 def sizes(raw: bytes) -> list[list[float]]:
-    meshes = read_3mf(Path("a.3mf"), raw, MOST).meshes
+    meshes = read_3mf(Path("a.3mf"), raw).meshes
     return [(mesh.corners.max(axis=0) - mesh.corners.min(axis=0)).tolist() for _, mesh in meshes]
 
 
@@ -156,7 +148,7 @@ def test_a_root_that_holds_no_mesh_takes_objects_of_other_models() -> None:
     root = of_production(placed_from(2, "plate", 0) + placed_from(3, "pin", 60), items)
     raw = several(root=root, pin=of_production(box(1, 12, 12, 40)), plate=of_production(box(1, 30, 20, 10)))
     assert sizes(raw) == [[30, 20, 10], [12, 12, 40]]
-    (_, mesh) = read_3mf(Path("a.3mf"), raw, MOST).meshes[1]
+    (_, mesh) = read_3mf(Path("a.3mf"), raw).meshes[1]
     assert mesh.corners.min(axis=0).tolist() == [60, 0, 0]
 
 
@@ -169,12 +161,10 @@ def test_an_item_of_the_build_may_name_another_model_and_builds_of_other_models_
 def test_supports_are_left_out_and_counted_also_where_an_object_around_them_is_one(kind: str) -> None:
     around = refers(3, 1).replace("<object ", f'<object type="{kind}" ')
     items = "".join(f'<item objectid="{number}"/>' for number in (1, 2, 3))
-    file = read_3mf(
-        Path("a.3mf"), packed(model(box(1, 5, 5, 5, "model") + box(2, 9, 9, 9, kind) + around, items)), MOST
-    )
+    file = read_3mf(Path("a.3mf"), packed(model(box(1, 5, 5, 5, "model") + box(2, 9, 9, 9, kind) + around, items)))
     assert (len(file.meshes), file.left_out) == (1, 2)
     with pytest.raises(InputError, match="all that the 3MF file places are supports"):
-        read_3mf(Path("a.3mf"), packed(model(box(1, 5, 5, 5, kind))), MOST)
+        read_3mf(Path("a.3mf"), packed(model(box(1, 5, 5, 5, kind))))
 
 
 @pytest.mark.parametrize(
@@ -192,16 +182,14 @@ def test_supports_are_left_out_and_counted_also_where_an_object_around_them_is_o
 def test_what_would_give_other_shapes_is_refused(root: str, sentence: str) -> None:
     raw = several(root=root, inch=of_production(box(1, 5, 5, 5), unit="inch"))
     with pytest.raises(InputError, match=sentence) as raised:
-        read_3mf(Path("a.3mf"), raw, MOST)
+        read_3mf(Path("a.3mf"), raw)
     assert "\n" not in str(raised.value)
 
 
 def test_models_that_name_each_other_in_a_circle_are_read_once_and_refused() -> None:
     back = of_production(placed_from(1, "a", 0))
     with pytest.raises(InputError, match="object '1' of the 3MF file is in itself"):
-        read_3mf(
-            Path("a.3mf"), several(root=of_production(placed_from(2, "a", 0), '<item objectid="2"/>'), a=back), MOST
-        )
+        read_3mf(Path("a.3mf"), several(root=of_production(placed_from(2, "a", 0), '<item objectid="2"/>'), a=back))
 
 
 @pytest.mark.parametrize("make", [corrupt, negative_offset])

@@ -76,7 +76,7 @@ def read_meshes(path: Path, unit: str | None = None) -> tuple[CadFile, list[tupl
 def _read(path: Path, raw: bytes, suffix: str) -> tuple[str | None, list[tuple[str, Mesh]], tuple[str, ...]]:
     """The unit that a file states, its objects by name, and what a user must know of how they were read."""
     if suffix == ".3mf":
-        package = read_3mf(path, raw, MOST_CAD_TRIANGLES)
+        package = read_3mf(path, raw)
         other = f"{package.left_out} meshes of the build are supports or other objects that are no parts: left out"
         return package.unit, package.meshes, (other,) * (package.left_out > 0)
     if suffix == ".obj":

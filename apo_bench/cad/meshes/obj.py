@@ -4,7 +4,6 @@ Read here and not by trimesh 5.2, which cuts every polygon into a fan from its f
 another surface.
 """
 
-from array import array
 from pathlib import Path
 from typing import Any
 
@@ -42,26 +41,21 @@ def _read_polygons(raw: bytes) -> tuple[Array, list[Any]]:
     Raises:
         ValueError: A line is not as OBJ has it.
     """
-    numbers = array("d")
+    corners = []
     polygons = []
     for line in raw.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines():
         key, *words = line.split() or [b""]
         if key == b"v":
-            numbers.extend([float(word) for word in words[:3]])
-            if len(words) < 3 or len(numbers) % 3:
-                raise ValueError("a corner without three numbers")
+            x, y, z, *_ = map(float, words)
+            corners.append((x, y, z))
         elif key == b"f":
-            have = len(numbers) // 3
             # Corners count from 1, or backwards from the last one that was read.
             given = np.array([int(word.split(b"/")[0]) for word in words])
-            polygon = np.where(given > 0, given - 1, given + have)
-            if len(given) < 3 or (given == 0).any() or (polygon < 0).any():
-                raise ValueError("a face without three corners")
-            polygons.append(polygon)
-    corners = np.array(numbers).reshape(-1, 3)
-    if any(polygon.max() >= len(corners) for polygon in polygons) or not np.isfinite(corners).all():
+            polygons.append(np.where(given > 0, given - 1, np.where(given < 0, given + len(corners), -1)))
+    every = np.array(corners).reshape(-1, 3)
+    if not np.isfinite(every).all() or any(len(p) < 3 or p.min() < 0 or p.max() >= len(every) for p in polygons):
         raise ValueError("a face without its corners")
-    return corners, polygons
+    return every, polygons
 
 
 def _triangulate(points: Array, polygon: Any) -> Any:

@@ -59,15 +59,6 @@ class _Object(NamedTuple):
     components: list[_Place]
 
 
-class _Placed(NamedTuple):
-    """An object of the build at one of its places."""
-
-    name: str
-    mesh: Mesh
-    T: Array
-    is_part: bool
-
-
 class _Package(NamedTuple):
     """Objects of all models of a file, and which of them the build of the root model places."""
 
@@ -76,7 +67,7 @@ class _Package(NamedTuple):
     items: list[_Place]
 
 
-def read_3mf(path: Path, raw: bytes, most_triangles: int) -> ThreeMf:
+def read_3mf(path: Path, raw: bytes) -> ThreeMf:
     """The unit of a file, and a mesh for each place of an object in its build; supports are left out.
 
     Raises:
@@ -85,21 +76,16 @@ def read_3mf(path: Path, raw: bytes, most_triangles: int) -> ThreeMf:
     try:
         with ZipFile(BytesIO(raw)) as archive:
             package = _read_package(path, archive)
-        nothing = _Placed("", Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)), np.eye(4), True)
-        every = [*islice(_placed(path, package, package.items, nothing, ()), _MOST_PLACES + 1)]
+        every = [*islice(_placed(path, package, package.items, _Within(np.eye(4))), _MOST_PLACES + 1)]
     except InputError:
         raise
     except Exception as error:  # zipfile and what it calls raise a dozen kinds for what is no zip
         raise InputError(f"{path}: this is no 3MF file that can be read; save the part again.") from error
     require(len(every) <= _MOST_PLACES, f"{path}: the 3MF file places more than {_MOST_PLACES:,} objects; split it.")
-    placed = [each for each in every if len(each.mesh.triangles)]
-    count = sum(len(each.mesh.triangles) for each in placed)
-    require(count <= most_triangles, f"{path}: the file has {count:,} triangles; {most_triangles:,} are the most.")
-    meshes = [(each.name, _moved(each.mesh, each.T)) for each in placed if each.is_part]
-    require(
-        meshes or not placed, f"{path}: all that the 3MF file places are supports or other objects that are no parts."
-    )
-    return ThreeMf(package.unit, meshes, len(placed) - len(meshes))
+    meshes = [(name, mesh) for name, mesh, is_part in every if is_part and len(mesh.triangles)]
+    left_out = sum(len(mesh.triangles) > 0 for _, mesh, _ in every) - len(meshes)
+    require(meshes or not left_out, f"{path}: all that the 3MF file places are supports or others that are no parts.")
+    return ThreeMf(package.unit, meshes, left_out)
 
 
 def _read_package(path: Path, archive: ZipFile) -> _Package:
@@ -201,23 +187,27 @@ def _as_name(target: str) -> str:
     return target.strip("/").lower()
 
 
-def _placed(
-    path: Path, package: _Package, places: Sequence[_Place], around: _Placed, within: tuple[_Key, ...]
-) -> Iterator[_Placed]:
-    """All objects in the build, where they are.
+class _Within(NamedTuple):
+    """What is around an object at its place."""
 
-    Args:
-        around: The object that these are in, whose name those without one have.
-        within: All objects around these.
-    """
+    T: Array
+    name: str = ""
+    is_part: bool = True
+    keys: tuple[_Key, ...] = ()
+
+
+def _placed(
+    path: Path, package: _Package, places: Sequence[_Place], around: _Within
+) -> Iterator[tuple[str, Mesh, bool]]:
+    """All objects in the build where they are: name, mesh, and whether it is a part."""
     for key, T in places:
         require(key in package.objects, f"{path}: object '{key[1]}' is not in the 3MF file; save the part again.")
-        require(key not in within, f"{path}: object '{key[1]}' of the 3MF file is in itself; save the part again.")
+        require(key not in around.keys, f"{path}: object '{key[1]}' of the 3MF file is in itself; save it again.")
         each = package.objects[key]
         is_part = around.is_part and each.kind in _MODEL_TYPES
-        placed = _Placed(each.name or around.name, each.mesh, around.T @ T, is_part)
-        yield placed._replace(name=placed.name or f"object{key[1]}")
-        yield from _placed(path, package, each.components, placed, (*within, key))
+        here = _Within(around.T @ T, each.name or around.name, is_part, (*around.keys, key))
+        yield here.name or f"object{key[1]}", _moved(each.mesh, here.T), is_part
+        yield from _placed(path, package, each.components, here)
 
 
 def _moved(mesh: Mesh, T: Array) -> Mesh:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from apo_bench.cad.pieces.corners import LEFT_MM, is_thick, reduced
-from apo_bench.cad.pieces.cut_part import SLIVER, CutPart, bodies_of
+from apo_bench.cad.pieces.cut_part import SLIVER, CutPart, cut_through
 from apo_bench.cad.solids.bodies import mesh_of
 from apo_bench.cad.solids.raw_solid import Mesh, square_to
 from apo_bench.geometry import Array
@@ -168,18 +168,7 @@ def _best(part: CutPart, worst: _Worst, least: float, hair: float) -> list[CutPa
         x, y = square_to(mean / max(float(np.linalg.norm(mean)), 1e-12))
         _, first = np.unique(np.round(normals, 3), axis=0, return_index=True)
         normals = np.array([*normals[np.sort(first)][:3], *np.eye(3), x, y, (x + y) / 2**0.5, (x - y) / 2**0.5])
-    best = [part]
-    smallest = np.inf
-    for n in normals:
-        halves = part.halves(n, float(n @ worst.point), hair)
-        if min(half.body.volume() for half in halves) < least:
-            continue
-        bodies = bodies_of(halves, least)
-        filled = float(sum(each.body.hull().volume() for each in bodies))
-        if filled < smallest:
-            smallest = filled
-            best = bodies
-    return best
+    return cut_through(part, worst.point, normals, least, hair)
 
 
 def _within(part: CutPart, beside: Beside) -> CutPart:
