@@ -33,7 +33,7 @@ def draw_part(raw: RawSolid, refused: Container[str], title: str, path: Path) ->
 
 def _draw(axes: Any, raw: RawSolid, colors: Array, elevation: float, azimuth: float) -> None:
     """The triangles that look to the eye, and the name of each face on the largest of its own."""
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
 
     mesh = raw.mesh
     e, a = np.radians([elevation, azimuth])
