@@ -159,7 +159,8 @@ def _held(body: Body, least: float, refused: dict[str, str]) -> tuple[Body, dict
     solid = solid_of("part", body)
     flats = {face.name: face for face in body.flats}
     shares: dict[str, float] = {}
-    for face in (*body.flats, *body.rounds):
+    faces: list[Face | RoundFace] = [*body.flats, *body.rounds]
+    for face in faces:
         if not (reason := _why_not(solid, face)):
             continue
         less = supported(face, solid.pieces) if isinstance(face, Face) else None
@@ -184,7 +185,8 @@ def _mended(body: Body, path: Path, error: InputError, refused: dict[str, str], 
         if 0.0 < abs(own.size - body.moments.size) < _SLIVERS * own.size:
             return replace(body, moments=own)
     face = _FACE.match(why)
-    if face is None or face[1] not in {each.name for each in (*body.flats, *body.rounds)}:
+    names = {*(each.name for each in body.flats), *(each.name for each in body.rounds)}
+    if face is None or face[1] not in names:
         cause = why.split("; ")[0].rstrip(".")
         raise InputError(f"{source}: its convex pieces make no part ({cause}); leave out fillets.") from error
     refused[face[1]] = face[2]

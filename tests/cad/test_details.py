@@ -54,11 +54,6 @@ def test_corners_that_nearly_meet_are_joined(tmp_path: Path) -> None:
     assert raw.mesh.volume == pytest.approx(8000.0)
 
 
-def test_a_part_of_three_metres_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"longest side is 3000 mm .* parts of 1 mm to 2 m are allowed"):
-        raw_solids(write_stl(block(30, 30, 30), tmp_path / "a.stl", 0.1), "m")
-
-
 @pytest.mark.parametrize("vertex", ["0 0 x", "0 0", "0 0 0"])
 def test_a_text_stl_without_its_corners_is_refused(vertex: str, tmp_path: Path) -> None:
     path = tmp_path / "a.stl"

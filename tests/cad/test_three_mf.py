@@ -12,7 +12,6 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.cad.meshes.three_mf import read_3mf
-from apo_bench.cli.app import main
 
 TETRAHEDRON = (
     "<mesh><vertices>"
@@ -85,6 +84,12 @@ def test_what_is_no_3mf_file_is_refused_in_one_sentence(case: str) -> None:
     with pytest.raises(InputError, match=sentence) as raised:
         read_3mf(Path("a.3mf"), make())
     assert "\n" not in str(raised.value)
+
+
+def test_a_unit_and_names_are_those_of_the_file() -> None:
+    text = model(MESH.replace("<object ", '<object name="brick" ')).replace("millimeter", "inch")
+    file = read_3mf(Path("a.3mf"), packed(text))
+    assert (file.unit, [name for name, _ in file.meshes]) == ("in", ["brick"])
 
 
 def test_nested_objects_are_placed_by_the_product_of_their_places() -> None:
@@ -190,11 +195,3 @@ def test_models_that_name_each_other_in_a_circle_are_read_once_and_refused() -> 
     back = of_production(placed_from(1, "a", 0))
     with pytest.raises(InputError, match="object '1' of the 3MF file is in itself"):
         read_3mf(Path("a.3mf"), several(root=of_production(placed_from(2, "a", 0), '<item objectid="2"/>'), a=back))
-
-
-@pytest.mark.parametrize("make", [corrupt, negative_offset])
-def test_the_command_says_so(make: Callable[[], bytes], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    path = tmp_path / "a.3mf"
-    path.write_bytes(make())
-    assert main(["part", "import", str(path), "--out", str(tmp_path / "out")]) == 2
-    assert capsys.readouterr().err == f"apo-bench: {path}: this is no 3MF file that can be read; save the part again.\n"

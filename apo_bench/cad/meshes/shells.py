@@ -135,7 +135,7 @@ def _with_cavities(shells: Sequence[Mesh]) -> list[Mesh]:
     within = _within(_common(bodies), bodies)
     depth = within.sum(axis=1)
     solids = []
-    for k in np.flatnonzero(depth % 2 == 0):
+    for k in np.flatnonzero(depth % 2 == 0).tolist():
         cavities = np.flatnonzero(within[:, k] & (depth == depth[k] + 1))
         solids.append(put_together([shells[k], *(shells[m].flipped() for m in cavities)]))
     return solids
