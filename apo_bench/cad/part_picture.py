@@ -33,21 +33,19 @@ def draw_part(raw: RawSolid, refused: Container[str], title: str, path: Path) ->
 
 def _draw(axes: Any, raw: RawSolid, colors: Array, elevation: float, azimuth: float) -> None:
     """The triangles that look to the eye, and the name of each face on the largest of its own."""
-    from mpl_toolkits.mplot3d.art3d import Poly3DCollection  # type: ignore[import-untyped]
-
     mesh = raw.mesh
     e, a = np.radians([elevation, azimuth])
     eye = np.array([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)])
     height = mesh.across @ eye
     points = mesh.corners[mesh.triangles]
-    axes.add_collection3d(Poly3DCollection(points[height > 0.0], facecolors=colors[height > 0.0], shade=True))
+    for color in np.unique(colors[height > 0.0]).tolist():
+        triangles = mesh.triangles[(colors == color) & (height > 0.0)]
+        axes.plot_trisurf(*mesh.corners.T, triangles=triangles, color=color, linewidth=0.0, antialiased=False)
     box = {"facecolor": "white", "alpha": 0.6, "edgecolor": "none", "pad": 1.0}
     for name, region in raw.named().items():
         largest = region.triangles[int(height[region.triangles].argmax())]
         if height[largest] > 0.0:
             at = points[largest].mean(axis=0) + 0.02 * mesh.extent * eye
             axes.text(*at, name, ha="center", fontsize=9, zorder=1000, bbox=box)
-    low, high = points.min(axis=(0, 1)), points.max(axis=(0, 1))
-    axes.auto_scale_xyz(*np.transpose([low, high]))
     axes.set_aspect("equal")
     axes.view_init(elevation, azimuth)
