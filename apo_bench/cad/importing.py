@@ -185,8 +185,7 @@ def _mended(body: Body, path: Path, error: InputError, refused: dict[str, str], 
         if 0.0 < abs(own.size - body.moments.size) < _SLIVERS * own.size:
             return replace(body, moments=own)
     face = _FACE.match(why)
-    names = {*(each.name for each in body.flats), *(each.name for each in body.rounds)}
-    if face is None or face[1] not in names:
+    if face is None or face[1] in refused:
         cause = why.split("; ")[0].rstrip(".")
         raise InputError(f"{source}: its convex pieces make no part ({cause}); leave out fillets.") from error
     refused[face[1]] = face[2]

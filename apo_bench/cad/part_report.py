@@ -28,7 +28,7 @@ def report_file(file: CadFile, path: Path, parts: Sequence[Imported], poses: Pat
 def report_part(part: Imported) -> dict[str, Any]:
     """One part: size, faces, what can touch nothing, free radii, volume, pieces."""
     raw = part.raw
-    whole_turns = [region for region in raw.regions if region.is_round and not region.name]
+    partly_round = sorted(float(max(region.radii)) for region in raw.regions if region.is_round and not region.name)
     return {
         "part": part.path.stem,
         "title": title_of(raw.name),
@@ -41,7 +41,7 @@ def report_part(part: Imported) -> dict[str, Any]:
         "faces": {name: _report_face(part, name, region) for name, region in raw.named().items()},
         "kinds": dict(Counter(region.kind for region in raw.regions)),
         "without_contact": {
-            "partly_round_radii_mm": sorted(float(max(region.radii)) for region in whole_turns),
+            "partly_round_radii_mm": partly_round,
             "other_surfaces": sum(region.kind == "other" for region in raw.regions),
         },
         "volume_mm3": {"before": raw.mesh.volume, "after": 1e9 * part.solid.volume},
@@ -74,7 +74,8 @@ def _report_face(part: Imported, name: str, region: Region) -> dict[str, Any]:
 def file_lines(file: CadFile, path: Path) -> Iterator[str]:
     """`part.stl: unit mm, taken from the size; the file states none`, and what a user must know of how it was read."""
     yield f"{path}: unit {file.unit}, {file.unit_from}"
-    yield from (f"{path}: {each}" for each in file.said)
+    for each in file.said:
+        yield f"{path}: {each}"
 
 
 def part_lines(report: Mapping[str, Any]) -> Iterator[str]:
@@ -82,7 +83,8 @@ def part_lines(report: Mapping[str, Any]) -> Iterator[str]:
     yield f"{report['part']}: {_numbers(report['size_mm'], ' x ')} mm, {report['triangles']:,} triangles, watertight"
     if report["title"] != report["part"]:
         yield f"  title: {report['title']}"
-    yield from (f"  mended: {mended}" for mended in report["mended"])
+    for mended in report["mended"]:
+        yield f"  mended: {mended}"
     if len(report["places"]) > 1:
         yield f"  places in the file: {len(report['places'])}"
     yield f"  faces: {', '.join(f'{count} {kind}' for kind, count in report['kinds'].items())}"

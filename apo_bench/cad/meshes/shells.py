@@ -106,13 +106,15 @@ def _unite(shells: Sequence[Mesh]) -> list[Mesh]:
     least = np.minimum.outer(*[[body.volume() for body in bodies]] * 2)
     crossing = (common > _COMMON * least) & ~within & ~within.T
     count, group = connected(np.argwhere(crossing), len(shells))
-    clusters = [np.flatnonzero(group == g) for g in range(count)]
-    return [
-        shells[cluster[0]]
-        if len(cluster) == 1
-        else mesh_of(manifold3d.Manifold.batch_boolean([bodies[k] for k in cluster], manifold3d.OpType.Add))
-        for cluster in clusters
-    ]
+    united = []
+    for g in range(count):
+        cluster = np.flatnonzero(group == g).tolist()
+        if len(cluster) == 1:
+            united.append(shells[cluster[0]])
+        else:
+            crossed = [bodies[k] for k in cluster]
+            united.append(mesh_of(manifold3d.Manifold.batch_boolean(crossed, manifold3d.OpType.Add)))
+    return united
 
 
 def _common(bodies: Sequence[Any]) -> Array:
@@ -136,7 +138,7 @@ def _with_cavities(shells: Sequence[Mesh]) -> list[Mesh]:
     depth = within.sum(axis=1)
     solids = []
     for k in np.flatnonzero(depth % 2 == 0).tolist():
-        cavities = np.flatnonzero(within[:, k] & (depth == depth[k] + 1))
+        cavities = np.flatnonzero(within[:, k] & (depth == depth[k] + 1)).tolist()
         solids.append(put_together([shells[k], *(shells[m].flipped() for m in cavities)]))
     return solids
 

@@ -156,17 +156,20 @@ def _read_object(model: str, element: ElementTree.Element) -> _Object:
         KeyError: A number is missing.
         ValueError: One cannot be read, or a triangle has no corners.
     """
-    corners = _numbers(element.iterfind("{*}mesh/{*}vertices/{*}vertex"), ("x", "y", "z"), np.float64)
-    triangles = _numbers(element.iterfind("{*}mesh/{*}triangles/{*}triangle"), ("v1", "v2", "v3"), np.int64)
+    corners = _numbers(element.iterfind("{*}mesh/{*}vertices/{*}vertex"), "x", "y", "z").astype(np.float64)
+    triangles = _numbers(element.iterfind("{*}mesh/{*}triangles/{*}triangle"), "v1", "v2", "v3").astype(np.int64)
     if len(triangles) and not 0 <= triangles.min() <= triangles.max() < len(corners):
         raise ValueError("a triangle without its corners")
     components = _read_places(model, element.iterfind("{*}components/{*}component"))
     return _Object(element.get("name", ""), element.get("type", ""), Mesh(corners, triangles), components)
 
 
-def _numbers(elements: Iterable[ElementTree.Element], names: Sequence[str], dtype: type) -> Any:
+def _numbers(elements: Iterable[ElementTree.Element], a: str, b: str, c: str) -> Any:
     """Three attributes of each element, (n, 3)."""
-    return np.array([[each.attrib[name] for name in names] for each in elements]).reshape(-1, 3).astype(dtype)
+    rows = []
+    for each in elements:
+        rows += [each.attrib[a], each.attrib[b], each.attrib[c]]
+    return np.array(rows, dtype=np.str_).reshape(-1, 3)
 
 
 def _read_places(model: str, elements: Iterable[ElementTree.Element]) -> list[_Place]:
