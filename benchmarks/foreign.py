@@ -30,7 +30,7 @@ import numpy as np
 
 from apo_bench.assembly import contact_kind
 from apo_bench.cad.assembled import coming_near, mates_of
-from apo_bench.cad.import_report import named_places, write_places
+from apo_bench.cad.places import named_places, write_places
 from apo_bench.cad.solids.raw_solid import RawSolid, SolidPlace
 from apo_bench.drafting.checking import check_file
 from apo_bench.drafting.from_cad import import_solid, solids_at

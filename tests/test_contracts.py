@@ -45,8 +45,8 @@ BREACHES = {
         ("apo_bench.cad.solids.raw_solid", "apo_bench.cad.pieces.corners"),
     ],
     "cad-loose": [
-        ("apo_bench.cad.pieces.cutting", "apo_bench.cad.from_regions"),
-        ("apo_bench.cad.solids.naming", "apo_bench.cad.import_report"),
+        ("apo_bench.cad.pieces.cutting", "apo_bench.cad.contact_faces"),
+        ("apo_bench.cad.solids.naming", "apo_bench.cad.part_report"),
     ],
     "correction": [
         ("apo_bench.correction.solvers.gauss_newton", "apo_bench.correction.contact.contact"),

@@ -11,7 +11,6 @@ import pytest
 ROOT = Path(__file__).parent.parent
 PACKAGE = ROOT / "apo_bench"
 EXCEPTIONS = {
-    "cad/step/open_cascade.py": {"fdopen": 1},  # the pipe to the process that waits for the solids
     "correction/own_code/server.py": {"open": 1},  # /proc/self/oom_score_adj
     "io/processes.py": {"fdopen": 1, "os.open": 1},  # standard error, /dev/null
     "io/result_files.py": {"open": 2, "os.open": 3, "os.replace": 1, "os.link": 1, "copyfileobj": 1},  # the function

@@ -5,16 +5,14 @@ from typing import Any
 
 import numpy as np
 
-from apo_bench.cad.pieces.misfit import surface_points
 from apo_bench.cad.solids.bodies import body_of
-from apo_bench.cad.solids.raw_solid import RawSolid
+from apo_bench.cad.solids.raw_solid import Mesh, RawSolid
 from apo_bench.geometry import Array, pose
 
 _STEP_MM = 1.0
 """Points of others are so far apart, and so are the places on their way."""
+_MOST_POINTS = 60_000
 _NEAR_MM = 1.5
-_BITS = 20
-"""Of the number of a place along each axis."""
 _NONE = 1e-5
 """Solids that have less than this part of the smaller one in common do not overlap."""
 
@@ -47,6 +45,17 @@ def coming_near(raws: Sequence[RawSolid]) -> list[Array]:
     return [each[0] for each in near]
 
 
+def surface_points(mesh: Mesh, step: float) -> Array:
+    """Corners of a closed mesh, and points on its sides between them, (k, 3).
+
+    Args:
+        step: How far apart neighbours are at most, farther on large parts, [mm].
+    """
+    area = float(np.linalg.norm(mesh.across, axis=1).sum()) / 2.0
+    fine = body_of(mesh).refine_to_length(max(step, (2.0 * area / _MOST_POINTS) ** 0.5)).to_mesh64()
+    return np.unique(np.asarray(fine.vert_properties)[:, :3].astype(np.float64), axis=0)
+
+
 def mates_of(raws: Sequence[RawSolid]) -> list[Any]:
     """Of each solid all others at their places around one of its own, in its frame, as one body of manifold3d."""
     import manifold3d
@@ -71,12 +80,7 @@ def mates_of(raws: Sequence[RawSolid]) -> list[Any]:
 
 def _each_once(points: Array) -> Array:
     """Points on a grid, in the order of their places, each once."""
-    # Rows are compared as one whole number each, which takes a tenth of the time.
-    bits = np.array([2 * _BITS, _BITS, 0])
-    grid = np.round(2.0 * points / _STEP_MM).astype(np.int64) + (1 << (_BITS - 1))
-    keys = np.unique((grid << bits).sum(axis=1))
-    places = (keys[:, None] >> bits & ((1 << _BITS) - 1)) - (1 << (_BITS - 1))
-    return np.asarray(places * _STEP_MM / 2.0)
+    return np.unique(np.round(2.0 * points / _STEP_MM), axis=0) * _STEP_MM / 2.0
 
 
 def _shifts(own: Any, other: Any, T: Array) -> Iterator[Array]:

@@ -1,48 +1,41 @@
-"""A CAD file becomes part files: raw solids, names, pieces, faces that can make contacts, and what is said of it."""
+"""A CAD file becomes part files: raw solids, names, pieces, and faces that can make contacts."""
 
 import os
 import re
-from collections.abc import Callable, Container, Mapping, Sequence
+from collections.abc import Container, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, final
 
 import numpy as np
 
-from apo_bench.cad.drawn_anew import faces_of
+from apo_bench.cad.contact_faces import contact_faces
 from apo_bench.cad.faces.facets import FEWEST_SIDES
-from apo_bench.cad.from_regions import contact_faces, moments_of_pieces, solid_moments
-from apo_bench.cad.meshes.crossings import uncrossed
+from apo_bench.cad.faces.regions import regions_of
 from apo_bench.cad.meshes.mesh_file import CadFile, read_meshes
-from apo_bench.cad.meshes.shells import CROSSED_A_LITTLE, ROUGH_MM, check_uncrossed, closed_solids
+from apo_bench.cad.meshes.shells import closed_solids
+from apo_bench.cad.moments import moments_of_pieces, solid_moments
 from apo_bench.cad.pieces.cutting import Cut, cut
-from apo_bench.cad.solids.drawn import keep_drawn
 from apo_bench.cad.solids.naming import title_of, with_names
 from apo_bench.cad.solids.raw_solid import RawSolid, without_copies
 from apo_bench.cad.step.step_file import STEP_SUFFIXES, read_step
-from apo_bench.cad.time_limit import limit_of, time_limit
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, Face, Hull, RoundFace, Solid, passage
 from apo_bench.parts import load_part
 from apo_bench.parts.agreement import check_faces, supported
 from apo_bench.parts.allowed import HEAVIEST_KG, LIGHTEST_KG, MOST_CORNERS_IN_ALL, MOST_FACES
 from apo_bench.parts.making import Body, solid_of, write_part
 
-_CUTTING = 3.0
-"""Of the time for reading a file so much may go to cutting each of its solids."""
-_BYTES = 50
-"""Of a triangle in an STL file; in others it has more."""
 _RAYS = 720
 _LEAST_SHARE = 0.5
+"""So much of a flat face must lie on pieces that stand for free shapes."""
 _NEARLY_ALL = 0.98
-"""So much of a flat face must lie on the pieces: where these stand for free shapes, and elsewhere."""
+"""So much of a flat face must lie on other pieces."""
 _SLIVERS = 0.01
 """What is left out of pieces as too thin may be so much of the part; then the part has the volume of its pieces."""
 _MATTER = re.compile(r"\S+, (volume_mm3|centroid_mm|inertia_mm5): ")
-_FILLED = (
-    "the hole is filled: with all of its round holes the part would take too many convex pieces, and nothing that the "
-    "file has comes into this one, or it is one of the smallest"
-)
+_FACE = re.compile(r"\S+, faces, (\w+): ([^;]*)")
+_FILLED = "the hole is filled: with all of its round holes the part would take too many convex pieces"
 
 
 @final
@@ -71,26 +64,11 @@ def raw_solids(path: Path, unit: str | None, fewest_sides: int = FEWEST_SIDES) -
     Raises:
         InputError: The file cannot be read, or holds no closed solid.
     """
-    limit_s = limit_of(path.stat().st_size / _BYTES if path.is_file() else 0)
-    with time_limit(f"{path}: finding the faces", "save it with fewer triangles", limit_s):
-        if path.suffix.lower() in STEP_SUFFIXES:
-            return read_step(path, unit)
-        file, meshes = read_meshes(path, unit)
-        solids = without_copies(raw for name, mesh in meshes for raw in closed_solids(path, name, mesh))
-        return file, [_with_faces(path, raw, fewest_sides) for raw in solids]
-
-
-def _with_faces(path: Path, raw: RawSolid, fewest_sides: int) -> RawSolid:
-    faces = faces_of(raw.mesh, fewest_sides)
-    if CROSSED_A_LITTLE in raw.mended and faces.mesh is raw.mesh:
-        moved = uncrossed(raw.mesh, ROUGH_MM)
-        check_uncrossed(path, moved)
-        far = np.linalg.norm(moved.corners - raw.mesh.corners, axis=1).max()
-        said = f"corners were moved by up to {far:.2g} mm where the surface crossed itself"
-        faces = faces._replace(mesh=moved, said=(*faces.said, said))
-        raw = replace(raw, mended=tuple(each for each in raw.mended if each != CROSSED_A_LITTLE))
-    regions = with_names(faces.mesh, faces.regions)
-    return replace(raw, mesh=faces.mesh, regions=regions, facets=faces.facets, mended=(*raw.mended, *faces.said))
+    if path.suffix.lower() in STEP_SUFFIXES:
+        return read_step(path, unit)
+    file, meshes = read_meshes(path, unit)
+    solids = without_copies(raw for name, mesh in meshes for raw in closed_solids(path, name, mesh))
+    return file, [replace(raw, regions=with_names(raw.mesh, regions_of(raw.mesh, fewest_sides))) for raw in solids]
 
 
 def import_part(
@@ -112,83 +90,54 @@ def import_part(
     Raises:
         InputError: It has more faces or pieces than a part may have, or is too light or too heavy for one.
     """
-    with time_limit(
-        f"{source}: cutting the part into convex pieces",
-        "leave out small holes, fillets and free surfaces",
-        _CUTTING * limit_of(len(raw.mesh.triangles)),
-    ):
-        weight = 1e-9 * density * raw.mesh.volume
-        if not LIGHTEST_KG <= weight <= HEAVIEST_KG:
-            raise InputError(
-                f"{source}: the part weighs {1e3 * weight:.3g} g at {density:g} kg/m^3; {1e3 * LIGHTEST_KG:g} g to "
-                f"{HEAVIEST_KG / 1e3:g} t are allowed, so give another --density, or scale the part."
-            )
-        flats, rounds, refused = contact_faces(raw)
-        _check_touches(source, flats, rounds)
+    weight = 1e-9 * density * raw.mesh.volume
+    require(
+        LIGHTEST_KG <= weight <= HEAVIEST_KG,
+        f"{source}: the part weighs {1e3 * weight:.3g} g at {density:g} kg/m^3; "
+        f"{1e3 * LIGHTEST_KG:g} g to {HEAVIEST_KG / 1e3:g} t are allowed.",
+    )
+    flats, rounds, refused = contact_faces(raw)
+    _check_touches(source, (*flats, *rounds))
+    try:
+        pieces = cut(raw, others, mates)
+    except InputError as error:
+        raise InputError(f"{source}: {error}") from error
+    _check_pieces(source, raw, pieces)
+    refused |= dict.fromkeys(pieces.filled, _FILLED)
+    body = Body(pieces.pieces, tuple(flats), tuple(rounds), solid_moments(raw, pieces))
+    body, shares = _held(_without(body, refused), _LEAST_SHARE if pieces.hulls else _NEARLY_ALL, refused)
+    count = len(body.flats) + len(body.rounds)
+    require(count <= MOST_FACES, f"{source}: the part has {count} faces; {MOST_FACES} are the most.")
+    stated: dict[str, Any] = {"color": raw.places[0].color} if raw.places[0].color else {}
+    stated |= {"density": density, "source": source, "title": title_of(raw.name) if raw.name != name else ""}
+    while True:
+        _check_touches(source, (*body.flats, *body.rounds))
+        path = write_part(name, body, folder, licence="as that file", **stated)
         try:
-            pieces = cut(raw, others, mates)
+            solid = load_part(path)
+            break
         except InputError as error:
-            raise InputError(f"{source}: {error}") from error
-        corners = sum(len(piece.corners) for piece in pieces.pieces)
-        if corners > MOST_CORNERS_IN_ALL:
-            raise InputError(
-                f"{source}: the convex pieces of the part have {corners:,} corners; {MOST_CORNERS_IN_ALL:,} are the "
-                "most, so leave out small holes and fillets."
-            )
-        _check_volume(source, raw, pieces)
-        refused |= dict.fromkeys(pieces.filled, _FILLED)
-        rounds = [wall for wall in rounds if wall.name not in refused]
-        if len(flats) + len(rounds) > MOST_FACES:
-            raise InputError(f"{source}: the part has {len(flats) + len(rounds)} faces; {MOST_FACES} are the most.")
-        body = Body(pieces.pieces, tuple(flats), tuple(rounds), solid_moments(raw, pieces))
-        solid = solid_of(name, body)
-        shares: dict[str, float] = {}
-        faces: list[Face | RoundFace] = [*flats, *rounds]
-        for i, face in enumerate(faces):
-            reason = _why_not(solid, face)
-            # A flat face is stated as far as pieces hold it: some stand for free shapes, and slivers are left out.
-            less = supported(face, solid.pieces) if reason and isinstance(face, Face) else None
-            if (
-                less is not None
-                and less[1] > (_LEAST_SHARE if pieces.hulls else _NEARLY_ALL)
-                and not _why_not(solid, less[0])
-            ):
-                flats[i], shares[face.name] = less
-            elif reason:
-                refused[face.name] = reason
-        body = _without(replace(body, flats=tuple(flats)), refused)
-        _check_touches(source, body.flats, body.rounds)
-        color: dict[str, Any] = {"color": raw.places[0].color} if raw.places[0].color else {}
-        title = title_of(raw.name) if raw.name != name else ""
-
-        def write(body: Body) -> Path:
-            return write_part(
-                name, body, folder, density=density, source=source, licence="as that file", title=title, **color
-            )
-
-        path, solid = _as_read(write, body, refused, source)
-        keep_drawn(raw.mesh, path)
-        free = {wall.name: 1e3 * _free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
-        return Imported(path, raw, solid, pieces, refused, shares, free)
+            body = _mended(body, path, error, refused, source)
+    free = {wall.name: 1e3 * _free_radius(solid, wall) for wall in solid.rounds.values() if wall.hole}
+    return Imported(path, raw, solid, pieces, refused, shares, free)
 
 
-def _check_volume(source: str, raw: RawSolid, pieces: Cut) -> None:
-    """Raise an `InputError` if pieces of a solid with flat faces only do not fill the volume that the file has."""
-    if any(region.kind != "plane" for region in raw.regions):
-        return
-    filled = moments_of_pieces(pieces.pieces).size * 1e9
-    if abs(filled - raw.mesh.volume) > _SLIVERS * raw.mesh.volume:
-        raise InputError(
-            f"{source}: the file has {raw.mesh.volume:.6g} mm^3, and the convex pieces of the part {filled:.6g} mm^3; "
-            "save the part again from where it was drawn, or as STEP."
-        )
+def _check_touches(source: str, faces: Container[Face | RoundFace]) -> None:
+    require(faces, f"{source}: no face of the part is flat or round, so it could touch nothing; draw one that is.")
 
 
-def _check_touches(source: str, flats: Sequence[Face], rounds: Sequence[RoundFace]) -> None:
-    if not (flats or rounds):
-        raise InputError(
-            f"{source}: no face of the part is flat or round, so it could touch nothing; draw one that is."
-        )
+def _check_pieces(source: str, raw: RawSolid, pieces: Cut) -> None:
+    """Raise an `InputError` if pieces are too many, or those of flat faces do not fill the volume that the file has."""
+    corners = sum(len(piece.corners) for piece in pieces.pieces)
+    most = f"{MOST_CORNERS_IN_ALL:,} are the most, so leave out small holes and fillets"
+    require(
+        corners <= MOST_CORNERS_IN_ALL, f"{source}: the convex pieces of the part have {corners:,} corners; {most}."
+    )
+    if all(region.kind == "plane" for region in raw.regions):
+        filled = 1e9 * moments_of_pieces(pieces.pieces).size
+        has = f"the file has {raw.mesh.volume:.6g} mm^3, and the convex pieces of the part {filled:.6g} mm^3"
+        is_filled = abs(filled - raw.mesh.volume) <= _SLIVERS * raw.mesh.volume
+        require(is_filled, f"{source}: {has}; its surface may cross itself, so mend it where it was drawn.")
 
 
 def _without(body: Body, names: Container[str]) -> Body:
@@ -200,33 +149,47 @@ def _without(body: Body, names: Container[str]) -> Body:
     )
 
 
-def _as_read(write: Callable[[Body], Path], body: Body, refused: dict[str, str], source: str) -> tuple[Path, Solid]:
-    """The part as its files are read, which are a little rounded; a face that they no longer have can make no contact.
+def _held(body: Body, least: float, refused: dict[str, str]) -> tuple[Body, dict[str, float]]:
+    """A body with those faces that its pieces hold; of flat ones as much as they hold, and how much that is.
+
+    Args:
+        least: So much of a flat face must be held.
+        refused: Is added to.
+    """
+    solid = solid_of("part", body)
+    flats = {face.name: face for face in body.flats}
+    shares: dict[str, float] = {}
+    faces: list[Face | RoundFace] = [*body.flats, *body.rounds]
+    for face in faces:
+        if not (reason := _why_not(solid, face)):
+            continue
+        less = supported(face, solid.pieces) if isinstance(face, Face) else None
+        if less is not None and less[1] > least and not _why_not(solid, less[0]):
+            flats[face.name], shares[face.name] = less
+        else:
+            refused[face.name] = reason
+    return _without(replace(body, flats=tuple(flats.values())), refused), shares
+
+
+def _mended(body: Body, path: Path, error: InputError, refused: dict[str, str], source: str) -> Body:
+    """What a body is without what its files are refused for: they are a little rounded.
 
     Args:
         refused: Is added to.
     """
-    while True:
-        path = write(body)
-        try:
-            return path, load_part(path)
-        except InputError as error:
-            why = str(error).replace(f"{path.parent}{os.sep}", "").removeprefix(f"{path.name}: ")
-            path.unlink()
-            path.with_suffix(".toml").unlink(missing_ok=True)
-            face = re.match(r"\S+, faces, (\w+): ([^;]*)", why)
-            left = [f.name for faces in (body.flats, body.rounds) for f in faces]
-            own = moments_of_pieces(body.pieces) if _MATTER.match(why) else body.moments
-            if 0.0 < abs(own.size - body.moments.size) < _SLIVERS * own.size:
-                body = replace(body, moments=own)
-                continue
-            if face is None or face[1] not in left or len(left) == 1:
-                raise InputError(
-                    f"{source}: the import fails, by no fault of the file: the pieces that it cuts the solid into "
-                    f"make no part ({why.split('; ')[0].rstrip('.')}); leave out fillets and free surfaces."
-                ) from error
-            refused[face[1]] = face[2]
-            body = _without(body, refused)
+    why = str(error).replace(f"{path.parent}{os.sep}", "").removeprefix(f"{path.name}: ")
+    path.unlink()
+    path.with_suffix(".toml").unlink(missing_ok=True)
+    if _MATTER.match(why):
+        own = moments_of_pieces(body.pieces)
+        if 0.0 < abs(own.size - body.moments.size) < _SLIVERS * own.size:
+            return replace(body, moments=own)
+    face = _FACE.match(why)
+    if face is None or face[1] in refused:
+        cause = why.split("; ")[0].rstrip(".")
+        raise InputError(f"{source}: its convex pieces make no part ({cause}); leave out fillets.") from error
+    refused[face[1]] = face[2]
+    return _without(body, refused)
 
 
 def _why_not(solid: Solid, face: Face | RoundFace) -> str:

@@ -44,8 +44,9 @@ def part_import(
     as_json: AsJson = False,
 ) -> None:
     """Make part files from a CAD file: find its faces, cut it into convex pieces, and say what was done."""
-    from apo_bench.cad.import_report import file_lines, named_places, report_form, write_places
     from apo_bench.cad.importing import raw_solids
+    from apo_bench.cad.part_report import file_lines, report_file
+    from apo_bench.cad.places import named_places, write_places
     from apo_bench.cad.solids.naming import renamed
 
     names = _pairs(name or [])
@@ -61,7 +62,7 @@ def part_import(
     raws = [renamed(raw, names) for raw in raws]
     with writing(f"--out {out}"):
         out.mkdir(parents=True, exist_ok=True)
-        say("\n".join(file_lines(file, source)), as_json)
+        say("\n".join(file_lines(source, file)), as_json)
         imported, left_out = _written(file, raws, out, density, as_json)
         left_out = [*source.left_out, *left_out]
         places = named_places({each.path.stem: each.raw.places for each in imported})
@@ -69,7 +70,7 @@ def part_import(
     if poses is not None:
         say(f"Wrote {poses}: {len(places)} places of {len(imported)} parts", as_json)
     if as_json:
-        print_json(report_form(source, file, imported, poses))
+        print_json(report_file(source, file, imported, poses))
     require(not left_out, f"{file}: {len(left_out)} of its solids became no parts: {' '.join(left_out)}")
 
 
@@ -77,9 +78,9 @@ def _written(
     file: Path, raws: Sequence[RawSolid], out: Path, density: float, as_json: bool
 ) -> tuple[list[Imported], list[str]]:
     """Parts with their pictures; and why others of the file became none."""
-    from apo_bench.cad.import_report import import_lines
     from apo_bench.cad.importing import import_part
     from apo_bench.cad.part_picture import draw_part
+    from apo_bench.cad.part_report import part_lines, report_part
     from apo_bench.cad.solids.naming import part_name, title_of
 
     imported: list[Imported] = []
@@ -89,7 +90,7 @@ def _written(
         called = part_name(raw.name, used | _of_others(out, title_of(raw.name)))
         used.add(called)
         picture = out / f"{called}.png"
-        for path in (picture, *(out / f"{called}{ending}" for ending in (".xml", ".toml", ".drawn.npz"))):
+        for path in (picture, *(out / f"{called}{ending}" for ending in (".xml", ".toml"))):
             check_target(path)
         try:
             each = import_part(raw, called, out, file.name, density)
@@ -100,8 +101,8 @@ def _written(
             say(f"{called}: NO PART", as_json)
             continue
         imported.append(each)
-        draw_part(raw, frozenset(each.refused), called, picture)
-        say("\n".join([*import_lines(each), f"Wrote {each.path} and {picture}"]), as_json)
+        draw_part(each.raw, each.refused, called, picture)
+        say("\n".join([*part_lines(report_part(each)), f"Wrote {each.path} and {picture}"]), as_json)
     return imported, left_out
 
 

@@ -86,9 +86,7 @@ def draft(
     base, why_fixed = (
         (tuple(fixed), "as asked") if fixed else (lowest(parts)[:1], "the largest of those that lie lowest")
     )
-    files = {each.name: each.file for each in parts}
-    given_mm = {each.name: max([0.0, *each.fit.values()]) for each in parts}
-    wrong = clashes(solids, poses, clearance_mm, files, given_mm)
+    wrong = clashes(solids, poses, clearance_mm)
     if wrong:
         raise RuntimeError("; ".join(wrong) + ".")
     poses, contacts, dropped = closed(solids, poses, found_contacts(solids, poses), (TABLE, *base))

@@ -8,9 +8,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from apo_bench.cad.assembled import coming_near, mates_of
-from apo_bench.cad.import_report import named_places, write_places
 from apo_bench.cad.importing import import_part, raw_solids
 from apo_bench.cad.meshes.mesh_file import CadFile
+from apo_bench.cad.places import named_places, write_places
 from apo_bench.cad.solids.naming import part_name, title_of
 from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, Region, SolidPlace
 from apo_bench.errors import InputError
@@ -129,8 +129,7 @@ def _foot(raw: RawSolid) -> Array:
 def _shifted(raw: RawSolid, by: Array) -> RawSolid:
     """The same solid elsewhere, [mm]."""
     mesh = Mesh(raw.mesh.corners + by, raw.mesh.triangles)
-    moments = None if raw.moments is None else raw.moments.moved(np.eye(3), by)
-    return replace(raw, mesh=mesh, regions=tuple(_moved(region, by) for region in raw.regions), moments=moments)
+    return replace(raw, mesh=mesh, regions=tuple(_moved(region, by) for region in raw.regions))
 
 
 def _moved(region: Region, by: Array) -> Region:

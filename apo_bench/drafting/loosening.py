@@ -6,7 +6,7 @@ faces recede to where they only touch, and by the clearance; where nothing would
 part do.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import combinations
@@ -122,23 +122,29 @@ def _deepest(part: PosedPart, others: Sequence[PosedPart]) -> float:
 
 def _gaps(own: PosedPart, other: PosedPart) -> dict[str, tuple[float, bool]]:
     """Flat faces of the first part near the second -> the gap, [mm], and whether another face is opposite as far."""
-    solids = {each.name: each.solid for each in (own, other)}
-    poses = {each.name: each.T for each in (own, other)}
-    found = {
-        Contact(PartFace(own.name, each.a), PartFace(other.name, each.b)): 1e3 * each.gap_m
-        for each in facing(own.solid, own.T, other.solid, other.T, gap_m=PLAY_M, angle_rad=NEAR_RAD, share=SHARE)
-        if each.a in own.solid.faces
-    }
+    found = {c: 1e3 * gap_m for c, gap_m in _near(own, other, PLAY_M).items() if c.manipulated.face in own.solid.faces}
     apart = [contact for contact, mm in found.items() if mm > 1e3 * NEAR_M]
     walled = {
         contact
-        for pair in walls_without_play(solids, poses, apart)
+        for pair in _opposite(own, other, apart)
         if abs(found[pair[0]] - found[pair[1]]) < _ALIKE_MM
         for contact in pair
     }
     # Of a face that is near to several the nearest comes last.
     order = sorted(found.items(), key=lambda each: -each[1])
     return {contact.manipulated.face: (mm, contact in walled) for contact, mm in order}
+
+
+def _near(own: PosedPart, other: PosedPart, gap_m: float) -> dict[Contact, float]:
+    """Faces of two parts that look at each other and are no farther apart -> the gap, [m]."""
+    found = facing(own.solid, own.T, other.solid, other.T, gap_m=gap_m, angle_rad=NEAR_RAD, share=SHARE)
+    return {Contact(PartFace(own.name, each.a), PartFace(other.name, each.b)): each.gap_m for each in found}
+
+
+def _opposite(own: PosedPart, other: PosedPart, contacts: Iterable[Contact]) -> tuple[tuple[Contact, Contact], ...]:
+    """Opposite flat walls between two parts, none of which recedes."""
+    both = (own, other)
+    return walls_without_play({each.name: each.solid for each in both}, {each.name: each.T for each in both}, contacts)
 
 
 def _said(own: str, other: str, tight: Mapping[str, float]) -> str:
@@ -152,16 +158,8 @@ def _said(own: str, other: str, tight: Mapping[str, float]) -> str:
 
 def _tight(own: PosedPart, other: PosedPart, most_mm: float) -> Mapping[str, float]:
     """Faces of the first part that need play, and how deep each of them is in the second one, [mm]."""
-    solids = {each.name: each.solid for each in (own, other)}
-    poses = {each.name: each.T for each in (own, other)}
-    found = {
-        Contact(PartFace(own.name, each.a), PartFace(other.name, each.b)): each.gap_m
-        for each in facing(
-            own.solid, own.T, other.solid, other.T, gap_m=1e-3 * most_mm, angle_rad=NEAR_RAD, share=SHARE
-        )
-        if each.gap_m < NEAR_M
-    }
-    held = {contact for pair in walls_without_play(solids, poses, found) for contact in pair}
+    found = {contact: gap_m for contact, gap_m in _near(own, other, 1e-3 * most_mm).items() if gap_m < NEAR_M}
+    held = {contact for pair in _opposite(own, other, found) for contact in pair}
     deep = [(c.manipulated.face, -1e3 * gap) for c, gap in found.items() if c in held or gap < -NEAR_M]
     deep += _shafts(own, other, found, most_mm)
     # Of a face that touches several the deepest comes last.

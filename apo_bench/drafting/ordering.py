@@ -5,9 +5,8 @@ would rest on what is left. Where no part can go alone, parts that hold together
 beside the assembly first, on the table.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from itertools import chain, combinations
 from typing import NamedTuple, final
 
@@ -17,7 +16,7 @@ from apo_bench.assembly import Assembly, Contact, Operation, Poses
 from apo_bench.drafting.posed import TABLE
 from apo_bench.drafting.touching import found_contacts
 from apo_bench.drafting.waiting import Stance, stance
-from apo_bench.geometry import TOUCH_M, Array, Solid, drop, extent, intrusion_depths, pose
+from apo_bench.geometry import Array, Solid, drop, extent, intrusion_depths, pose
 from apo_bench.insertion.arrival import CLEAR_M, Arrival, arrive
 from apo_bench.insertion.macros import UP
 from apo_bench.prediction.stability import BALANCED, imbalance
@@ -31,13 +30,7 @@ _MOST_LOOKS = 4000
 _LARGEST_GROUP = 4
 _TESTS = 4
 _STEP_M = 5e-4
-_DEEP_M = 5e-5
-"""Places on a way are so far apart where it is asked what is on it, and what is so deep is; less is a touch."""
-_NEAR_M = 5e-3
-"""A part that is farther away is not beside another one."""
-_BESIDE = {"above": UP, "below": -UP} | {
-    f"from it along {sign}{'xyz'[i]}": float(f"{sign}1") * np.eye(3)[i] for i in (0, 1) for sign in "+-"
-}
+"""Places on a way are so far apart where it is asked what is on it."""
 
 
 class Why(NamedTuple):
@@ -45,8 +38,11 @@ class Why(NamedTuple):
 
     passed: int
     """How many of the tests of `_leaves` it passed."""
-    said: Callable[[], str]
-    """In words; only asked where nothing can go."""
+    words: str
+    blocked: Arrival | None = None
+    """The way that is not free, if that is why."""
+    rest: tuple[str, ...] = ()
+    """What may be in it."""
 
 
 class Placing(NamedTuple):
@@ -121,13 +117,28 @@ class OrderSearch:
                 yield placing
             elif not _is_steady(stance(self.solids[group[0]], self.poses[group[0]][:3, :3])):
                 words = f"'{group[0]}' does not stand alone, so nothing can be put into it beside the assembly"
-                self.reasons[group[0]] = Why(_TESTS, partial(str, words))
+                self.reasons[group[0]] = Why(_TESTS, words)
         if not self.left or len(free) < len(self.left):
             self.left = frozenset(free)
 
     def stuck(self) -> list[str]:
         """Why each of the fewest parts that are left cannot go, one sentence each."""
-        return [self.reasons[part].said() for part in self.solids if part in self.left and part in self.reasons]
+        left = [part for part in self.solids if part in self.left and part in self.reasons]
+        return [self.reasons[part].words + self._blocker(part, self.reasons[part]) for part in left]
+
+    def _blocker(self, part: str, why: Why) -> str:
+        """What is in the way of a part along the best of the straight lines out of its contacts."""
+        if why.blocked is None or why.blocked.chain.locked:
+            return ""
+        T = self.poses[part]
+        pieces = self.solids[part].pieces
+        out = np.round(-(T[:3, :3] @ why.blocked.line.direction), 3) + 0.0
+        at = T[:3, 3] + np.outer(np.arange(_STEP_M, why.blocked.line.travel_m + CLEAR_M, _STEP_M), out)
+        deep = [
+            intrusion_depths(pieces, T[:3, :3], at, self.solids[other].pieces, self.poses[other], 0.0).max()
+            for other in why.rest
+        ]
+        return f" along ({', '.join(f'{x:.3g}' for x in out)}): '{why.rest[int(np.argmax(deep))]}' is in its way"
 
     def _late(self, placing: Placing) -> tuple[float, ...]:
         """What is put in last: from above before from the side, the highest first."""
@@ -153,75 +164,20 @@ class OrderSearch:
         # A part that is put back must rest: something is below it, and its weight is over what carries it. It must come
         # along a straight way, which the macros of its contacts give, with nothing in the way.
         if not closes:
-            return Why(0, partial(self._apart, main, rest))
+            return Why(0, f"'{main}' touches nothing that would be there before it")
         if min(drop(self.solids[m], poses[m], self.solids[r], poses[r]) for m in moves for r in rest) > _FALLS_M:
-            return Why(1, partial(self._carried, main, rest))
+            return Why(1, f"nothing is below '{main}' that would carry it")
         if imbalance(assembly, Operation(main, closes, tuple(moves[1:])), poses) > BALANCED:
-            words = f"'{main}' would not keep its balance on {others}, which would be there before it"
-            return Why(2, partial(str, words))
+            return Why(2, f"'{main}' would not keep its balance on {others}, which would be there before it")
         arrival = arrive(assembly, moves, closes, poses)
         if all(each.normal @ UP < _CARRIES for each in arrival.touched):
-            words = f"'{main}' would only touch upright walls of {others}, so nothing carries it without screws or glue"
-            return Why(2, partial(str, words))
+            return Why(2, f"'{main}' would only touch upright walls of {others}, so nothing carries it without glue")
         if not arrival.free:
-            return Why(_TESTS - 1, partial(self._blocked, arrival, moves, rest, others))
+            return Why(_TESTS - 1, f"'{main}' cannot leave {others}", arrival, tuple(rest))
         way = poses[main][:3, :3] @ arrival.line.direction
         along = f"along ({', '.join(f'{x:.3g}' for x in np.round(way, 3) + 0.0)})"
         words = "from above" if way[2] < -0.9 else "from below" if way[2] > 0.9 else along
         return Placing(tuple(moves), closes, poses[main], f"comes {words}, onto {others}")
-
-    def _apart(self, main: str, rest: Sequence[str]) -> str:
-        """That nothing touches a part, and what is nearest."""
-        ways = np.arange(0.0, _NEAR_M, _NEAR_M / 100)
-        near = [
-            (float(ways[max(0, int(met.argmax()) - 1)]), other, words)
-            for other in rest
-            for words, way in _BESIDE.items()
-            if (met := self._depths(main, np.outer(ways, way), other) > TOUCH_M).any()
-        ]
-        gap_m, other, words = min(near, default=(np.inf, "", ""))
-        nearest = (
-            f"no flat or round face of '{other}', {1e3 * gap_m:.2g} mm {words}, lies on one of its own"
-            if near
-            else f"all of {', '.join(rest)} is more than {1e3 * _NEAR_M:g} mm away"
-        )
-        return f"'{main}' touches nothing that would be there before it: {nearest}"
-
-    def _carried(self, main: str, rest: Sequence[str]) -> str:
-        """That nothing carries a part, and how far it would fall."""
-        falls = min((drop(self.solids[main], self.poses[main], self.solids[r], self.poses[r]), r) for r in rest)
-        return (
-            f"nothing is below '{main}' that would carry it: it would fall {1e3 * falls[0]:.3g} mm, onto '{falls[1]}'"
-        )
-
-    def _blocked(self, arrival: Arrival, moves: Sequence[str], rest: Sequence[str], others: str) -> str:
-        """What is in the way of parts along the best of the straight lines out of their contacts, or above its end."""
-        main = moves[0]
-        out = np.round(-(self.poses[main][:3, :3] @ arrival.line.direction), 3) + 0.0
-        if arrival.chain.locked:
-            return f"its contacts with {others} hold '{main}' in every direction"
-        along = np.outer(np.arange(_STEP_M, arrival.line.travel_m + _STEP_M, _STEP_M), out)
-        above = along[-1] + np.outer(np.arange(_STEP_M, CLEAR_M, _STEP_M), UP)
-        for ways, words in (
-            (along, f"along ({', '.join(f'{x:.3g}' for x in out)})"),
-            (above, f"up from {1e3 * np.linalg.norm(along[-1]):.3g} mm beside its place"),
-        ):
-            deep = np.array([np.max([self._depths(m, ways, r) for m in moves], axis=0) for r in rest])
-            if deep.max() > _DEEP_M:
-                first = int((deep.max(axis=0) > _DEEP_M).argmax())
-                by = int(deep[:, first].argmax())
-                return (
-                    f"'{main}' cannot leave {words}: from {1e3 * _STEP_M * (first + 1):.3g} mm on it would be inside "
-                    f"'{rest[by]}', {1e3 * deep[by].max():.2g} mm deep"
-                )
-        return f"no straight way leads '{main}' out of {others}"
-
-    def _depths(self, part: str, shifts: Array, other: str) -> Array:
-        """How deep a part is in another one after each of some shifts, (k, 3), (k,), [m]."""
-        T, other_T = self.poses[part], self.poses[other]
-        return intrusion_depths(
-            self.solids[part].pieces, T[:3, :3], T[:3, 3] + shifts, self.solids[other].pieces, other_T, 0.0
-        )
 
     def _beside(self, group: tuple[str, ...]) -> tuple[Placing, ...] | None:
         """How a group is put together beside the assembly, its main part on the table."""

@@ -3,14 +3,15 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import final
+from typing import Annotated, final
 
+import msgspec
 import numpy as np
 
 from apo_bench.cad.solids.naming import free_name
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, Solid, pose, world_bounds
-from apo_bench.io import JsonNode, read_toml
+from apo_bench.io import read_bytes
 from apo_bench.parts import load_part, part_path
 from apo_bench.parts.allowed import FACE_OR_PART_NAME
 
@@ -18,6 +19,7 @@ TABLE = "table"
 _TAKEN = (TABLE, "arm")
 """What a part of the scenario cannot be called: these are there already."""
 _MOST = 49
+_Share = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
 UPS = {"x": (0, 1), "y": (1, 1), "z": (2, 1), "-x": (0, -1), "-y": (1, -1), "-z": (2, -1)}
 
 
@@ -38,6 +40,23 @@ class PosedPart:
     """What the CAD file calls it, where that cannot be its name."""
 
 
+class _Pose(msgspec.Struct, forbid_unknown_fields=True):
+    """One table of a file of poses."""
+
+    part: str
+    at_mm: tuple[float, float, float]
+    name: Annotated[str, msgspec.Meta(pattern=f"^({FACE_OR_PART_NAME.pattern})?$")] = ""
+    title: str = ""
+    quaternion_wxyz: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    color: tuple[_Share, _Share, _Share] | None = None
+
+
+class _PoseFile(msgspec.Struct, forbid_unknown_fields=True):
+    """A file of poses."""
+
+    pose: list[_Pose]
+
+
 def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
     """Every copy of a part that a file of poses names.
 
@@ -47,43 +66,25 @@ def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
     Raises:
         InputError: A file cannot be read, a part is missing, or has no pose.
     """
-    nodes = read_toml(poses, "file of poses").fields(("pose",))["pose"].items("pose")
+    try:
+        stated = msgspec.toml.decode(read_bytes(poses, "file of poses"), type=_PoseFile).pose
+    except (msgspec.DecodeError, ValueError) as error:
+        raise InputError(f"{poses}: {' '.join(str(error).split())}.") from error
     paths = {part_path(file).stem: part_path(file) for file in files}
     solids: dict[Path, Solid] = {}
     parts: list[PosedPart] = []
-    for node in nodes:
-        parts.append(_posed(node, paths, poses.parent, solids, {each.name for each in parts}))
-    if not 2 <= len(parts) <= _MOST:
-        raise InputError(f"{poses}: {len(parts)} poses were given; 2 to {_MOST} parts make an assembly.")
+    used = {*_TAKEN}
+    for each in stated:
+        file = paths.get(each.part, poses.parent / f"{each.part}.xml")
+        solids[file] = solids[file] if file in solids else load_part(file)
+        name = free_name(each.name or each.part, used)
+        used.add(name)
+        T = pose.unpack(np.array([*np.multiply(1e-3, each.at_mm), *each.quaternion_wxyz]))
+        parts.append(PosedPart(name, file, solids[file], T, each.color, title=each.title))
+    require(2 <= len(parts) <= _MOST, f"{poses}: {len(parts)} poses were given; 2 to {_MOST} parts make an assembly.")
     left = [name for name, file in paths.items() if file not in solids]
-    if left:
-        raise InputError(f"{poses}: '{left[0]}' has no pose; add [[pose]] part = \"{left[0]}\", or leave the part out.")
+    require(not left, f"{poses}: {', '.join(left)} has no pose; add [[pose]] part = ..., or leave the part out.")
     return tuple(parts)
-
-
-def _posed(
-    node: JsonNode, paths: dict[str, Path], folder: Path, solids: dict[Path, Solid], used: set[str]
-) -> PosedPart:
-    """One table of the file.
-
-    Args:
-        solids: Those that were read before; is added to.
-        used: Names that other parts have.
-    """
-    keys = node.fields(("part", "at_mm"), ("name", "title", "quaternion_wxyz", "color"))
-    part = keys["part"].text()
-    file = paths.get(part, folder / f"{part}.xml")
-    if file not in solids:
-        solids[file] = load_part(file)
-    own_name = keys.get("name", keys["part"])
-    name = free_name(own_name.text(), {*used, *_TAKEN})
-    if not FACE_OR_PART_NAME.fullmatch(name):
-        own_name.fail("a letter, then letters, digits and underscores are needed")
-    turn = keys["quaternion_wxyz"].quaternion() if "quaternion_wxyz" in keys else (1.0, 0.0, 0.0, 0.0)
-    T = pose.unpack(np.concatenate([1e-3 * keys["at_mm"].numbers(3), turn]))
-    color = tuple(np.clip(keys["color"].numbers(3), 0.0, 1.0).tolist()) if "color" in keys else None
-    title = keys["title"].text() if "title" in keys else ""
-    return PosedPart(name, file, solids[file], T, color, title=title)
 
 
 def on_the_table(parts: Sequence[PosedPart], up: str = "z") -> tuple[PosedPart, ...]:

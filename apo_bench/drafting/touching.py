@@ -6,14 +6,11 @@ Poses are exact but for the digits of a file and of a fit, so a face touches whe
 
 from collections.abc import Iterable, Iterator, Mapping
 from itertools import combinations, product
-from pathlib import Path
-from types import MappingProxyType
 
 import numpy as np
 
 from apo_bench.assembly import Assembly, Contact, Facing, PartFace, Poses, contact_kind, geometric_play, play_mm
 from apo_bench.assembly.touching import facing
-from apo_bench.cad.solids.drawn import drawn_mesh, overlap
 from apo_bench.geometry import Array, Solid, intrusion, mate, pose
 from apo_bench.scenario.checks import DEEP_M
 
@@ -60,52 +57,15 @@ def closed(
         dropped.append(kept.pop(int(np.argmax(off))))
 
 
-def clashes(
-    solids: Mapping[str, Solid],
-    poses: Poses,
-    clearance_mm: float,
-    files: Mapping[str, Path] = MappingProxyType({}),
-    given_mm: Mapping[str, float] = MappingProxyType({}),
-) -> list[str]:
-    """Press fits, threads, and other parts that are inside each other, one sentence each.
-
-    Args:
-        files: Part files; overlaps are those of the solids as drawn where an import kept these beside them.
-        given_mm: By how much faces of a part lie inside of those of its file at most, since they were drawn too thick.
-    """
+def clashes(solids: Mapping[str, Solid], poses: Poses, clearance_mm: float) -> list[str]:
+    """Press fits, threads, and other parts that are inside each other, one sentence each."""
     sentences = list[str]()
     for a, b in combinations(solids, 2):
         deep = intrusion(solids[a], poses[a], solids[b], poses[b])
-        tight = next(_tight(solids, poses, a, b, clearance_mm, deep), "")
-        if tight or deep > DEEP_M:
-            sentences.append(
-                tight or _inside(poses, a, b, deep, files, max(given_mm.get(a, 0.0), given_mm.get(b, 0.0)))
-            )
+        inside = f"'{a}' and '{b}' are {1e3 * deep:.3g} mm inside each other: parts are rigid here, so give them room"
+        tight = next(_tight(solids, poses, a, b, clearance_mm, deep), inside if deep > DEEP_M else "")
+        sentences += [tight] * bool(tight)
     return sentences
-
-
-def _inside(poses: Poses, a: str, b: str, deep_m: float, files: Mapping[str, Path], given_mm: float) -> str:
-    """What is wrong with two parts whose pieces are so deep in each other."""
-    meshes = [drawn_mesh(files[part]) if part in files else None for part in (a, b)]
-    drawn = overlap(meshes[0], poses[a], meshes[1], poses[b]) if meshes[0] and meshes[1] else None
-    is_given = drawn is not None and drawn.depth_m <= DEEP_M + 1e-3 * given_mm
-    if drawn is not None and is_given and deep_m > drawn.depth_m + DEEP_M:
-        return (
-            f"'{a}' and '{b}' are {1e3 * drawn.depth_m:.3g} mm inside each other as drawn, but the convex pieces that "
-            f"stand for them are so by {1e3 * deep_m:.3g} mm: an error of the import, not of the file, whose pieces of "
-            "a free shape are coarser there than their play; draw it simpler, or with more play"
-        )
-    where = ""
-    if drawn is not None:
-        at = pose.apply(np.linalg.inv(poses[a]), drawn.at[None])[0]
-        where = f" as drawn, deepest at ({', '.join(f'{round(1e3 * x, 3) + 0.0:g}' for x in at)}) mm of '{a}'"
-        if deep_m > drawn.depth_m + DEEP_M:
-            where += f" (the convex pieces that stand for them {1e3 * deep_m:.3g} mm)"
-        deep_m = drawn.depth_m
-    return (
-        f"'{a}' and '{b}' are {1e3 * deep_m:.3g} mm inside each other{where}, and parts are rigid here: a press fit, a "
-        "thread, or a pose that is wrong; give them room in the CAD file"
-    )
 
 
 def walls_without_play(

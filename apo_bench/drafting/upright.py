@@ -42,22 +42,15 @@ def drafted(
     failed: dict[str, NoOrder | InputError] = {}
     for axis in (up,) if up else _FIRST:
         try:
-            tried[axis] = _on_a_base(on_the_table(parts, axis), fixed, clearance_mm, asked)
+            made = _on_a_base(on_the_table(parts, axis), fixed, clearance_mm, asked)
         except (NoOrder, InputError) as error:
             failed[axis] = error
-        else:
-            if not tried[axis].unfit:
-                break
+            continue
+        tried[axis] = replace(made, notes=(*said, *more, *made.notes))
+        if not made.unfit:
+            break
     if not tried:
-        first = next(iter(failed.values()))
-        # What is wrong with a file is wrong with any axis up.
-        is_of_file = isinstance(first, InputError) and len({str(error) for error in failed.values()}) == 1
-        raise (
-            first
-            if up or is_of_file
-            else type(first)(f"{str(first).rstrip('.')}; nor is there one with another axis up.")
-        )
-    tried = {axis: replace(made, notes=(*said, *more, *made.notes)) for axis, made in tried.items()}
+        raise next(iter(failed.values()))
     best = min(tried, key=lambda axis: len(tried[axis].unfit))
     if up or best == "z":
         return replace(tried[best], up=f"{best}, as asked" if up else best)

@@ -36,7 +36,7 @@ def test_an_assembly_is_counted_by_what_stopped_it() -> None:
     ends = {
         "failed": [FILE, {"failed": "stopped"}],
         "import": [FILE, {"file": "b.stl", "refused": "b.stl: the shell is open"}],
-        "draft": [FILE, {"draft": "'a' and 'b' are 1 mm inside each other"}],
+        "overlap": [FILE, {"draft": "'a' and 'b' are 1 mm inside each other"}],
         "turning": [
             FILE,
             drawn,

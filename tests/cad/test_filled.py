@@ -12,7 +12,6 @@ from manifold3d import Manifold, OpType
 from apo_bench import InputError
 from apo_bench.cad.importing import import_part, raw_solids
 from apo_bench.cad.pieces import cutting
-from apo_bench.cad.time_limit import limit_of
 from apo_bench.geometry import Hull
 from tests.cad.made import block, rod, write_stl
 
@@ -75,12 +74,6 @@ def test_crumbs_that_hang_on_nothing_are_left_out() -> None:
     # What is more is no crumb: it stays, and is refused with the part.
     assert cutting._without_crumbs([near, far], 2.0) == ([near, far], [], False)
     assert cutting._without_crumbs([near], 2.0) == ([near], [], True)
-
-
-def test_what_has_more_triangles_may_take_longer_up_to_a_limit() -> None:
-    assert limit_of(0) == 20.0
-    assert limit_of(30_000) == 50.0
-    assert limit_of(1e9) == 120.0
 
 
 def test_more_pieces_than_a_part_may_have_are_refused_where_holes_are_not_the_reason(

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-import time
 from typing import Any
 
 import numpy as np
 import pytest
 from manifold3d import Manifold
 
-from apo_bench import InputError
 from apo_bench.cad.assembled import mates_of
 from apo_bench.cad.pieces.cut_part import CutPart
 from apo_bench.cad.pieces.keeping_out import keeping_out
 from apo_bench.cad.solids.bodies import mesh_of
 from apo_bench.cad.solids.raw_solid import RawSolid, SolidPlace
-from apo_bench.cad.time_limit import time_limit
 from tests.cad.made import block
 
 CORE = block(20, 20, 30)
@@ -65,26 +62,3 @@ def test_mates_are_others_and_other_copies_near_a_place() -> None:
     # Of what lies beside it only what is around a solid is kept: a margin of 1.5 mm.
     assert of_base.volume() == pytest.approx(10 * 20 * 1.5)
     assert of_cube.volume() == pytest.approx(13 * 1.5 * 13 + 2 * 10 * 1.5 * 10, rel=0.1)
-
-
-def burn(seconds: float) -> None:
-    end = time.process_time() + seconds
-    while time.process_time() < end:
-        pass
-
-
-def test_one_limit_of_time_may_stand_within_another_one() -> None:
-    with time_limit("outer", "wait", 30.0):
-        with pytest.raises(InputError, match=r"inner takes more than 0\.05 s"), time_limit("inner", "wait", 0.05):
-            burn(5.0)
-        burn(0.1)
-
-
-def test_a_limit_within_one_that_ends_earlier_does_not_put_that_off() -> None:
-    def too_much() -> None:
-        with pytest.raises(InputError, match="inner"), time_limit("inner", "wait", 30.0):
-            burn(5.0)
-        burn(5.0)
-
-    with pytest.raises(InputError, match="outer"), time_limit("outer", "wait", 0.05):
-        too_much()

@@ -7,12 +7,12 @@ import pytest
 from manifold3d import CrossSection, Manifold
 from scipy.spatial import ConvexHull
 
-from apo_bench.cad.assembled import coming_near
+from apo_bench.cad.assembled import coming_near, surface_points
 from apo_bench.cad.faces.regions import regions_of
 from apo_bench.cad.pieces import refining
 from apo_bench.cad.pieces.cut_part import CutPart
 from apo_bench.cad.pieces.cutting import cut
-from apo_bench.cad.pieces.misfit import Misfit, misfit, surface_points
+from apo_bench.cad.pieces.refining import depths
 from apo_bench.cad.solids.bodies import mesh_of
 from apo_bench.cad.solids.naming import with_names
 from apo_bench.cad.solids.raw_solid import RawSolid, SolidPlace
@@ -22,8 +22,7 @@ from tests.cad.made import block, rod
 
 def raw_of(name: str, body: Manifold) -> RawSolid:
     mesh = mesh_of(body)
-    regions, facets = regions_of(mesh)
-    return RawSolid(name, mesh, (SolidPlace(name, np.eye(4)),), (), with_names(mesh, regions), facets)
+    return RawSolid(name, mesh, (SolidPlace(name, np.eye(4)),), (), with_names(mesh, regions_of(mesh)))
 
 
 def rounded(x: float, y: float, r: float) -> CrossSection:
@@ -40,31 +39,19 @@ PLUG = tapered(11, 6, 4, 15, 1.05, 5.5) + block(50, 40, 8, (0, 0, 20.4))
 BOWL = block(40, 40, 12) - Manifold.sphere(20, 48).translate((0, 0, 26))
 
 
-def cube(low: float, high: float) -> Hull:
-    return Hull("", 1e-3 * np.array([[x, y, z] for x in (low, high) for y in (low, high) for z in (low, high)]))
-
-
-@pytest.mark.parametrize(("off", "true"), [(0.0, (0.0, 0.0)), (0.2, (0.2, 0.0)), (-0.3, (0.0, 0.3))])
-def test_what_sticks_out_and_what_is_left_out_is_measured(off: float, true: tuple[float, float]) -> None:
-    points = surface_points(mesh_of(Manifold.cube((10, 10, 10))))
-    found = misfit(points, [cube(-off, 10 + off)])
-    # In the middle of a face the cube is off by as much as it grew; at a corner it is that far along each axis.
-    assert found == pytest.approx(Misfit(*true), abs=1e-9)
-
-
-def test_a_slot_that_a_piece_fills_counts_as_deep_as_it_is() -> None:
-    slotted = block(20, 10, 10) - block(4, 10, 3, (0, 0, 7))
-    hull = Hull("", 1e-3 * np.array([[x, y, z] for x in (-10, 10) for y in (-5, 5) for z in (0, 10)]))
-    assert misfit(surface_points(mesh_of(slotted)), [hull]).out == pytest.approx(3.0, abs=1e-6)
+def misfit(raw: RawSolid, pieces: tuple[Hull, ...]) -> tuple[float, float]:
+    """How deep the surface lies inside of a piece at most, and how far off every piece, [mm]."""
+    points = surface_points(raw.mesh, 0.5)
+    deepest = np.max([depths(points, piece.planes * [1.0, 1.0, 1.0, 1e3]) for piece in pieces], axis=0)
+    return float(deepest.max()), float(-deepest.min())
 
 
 @pytest.mark.parametrize("body", [SOCKET, BOWL], ids=["socket", "bowl"])
 def test_pieces_lie_inside_of_a_hollow_solid(body: Manifold) -> None:
     raw = raw_of("part", body)
-    pieces = cut(raw).pieces
-    found = misfit(surface_points(raw.mesh), pieces)
-    assert found.out < 0.025
-    assert found.left < 0.2
+    out, left = misfit(raw, cut(raw).pieces)
+    assert out < 0.025
+    assert left < 0.2
 
 
 def test_what_fits_as_drawn_fits_as_pieces() -> None:

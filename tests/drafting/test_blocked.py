@@ -1,4 +1,4 @@
-"""Why parts do not go together: the pair that blocks, its depth and direction; and which side of them goes up."""
+"""Why parts do not go together: the pair that blocks, and its direction; and which side of them goes up."""
 
 from __future__ import annotations
 
@@ -7,12 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from apo_bench import InputError
-from apo_bench.cad.solids.drawn import keep_drawn
-from apo_bench.cad.solids.raw_solid import Mesh
 from apo_bench.drafting.draft import NoOrder
 from apo_bench.drafting.posed import PosedPart
-from apo_bench.drafting.touching import clashes
 from apo_bench.drafting.upright import drafted
 from apo_bench.drafting.writing import scenario_text
 from apo_bench.geometry import pose
@@ -47,41 +43,14 @@ CORE = extrude(rectangle(20, 20), 0, 15, bottom="foot", top="head")
 
 def test_what_is_shut_in_is_said_with_what_is_in_its_way(tmp_path: Path) -> None:
     shut = join(FLOOR, box(10, 40), extrude(rectangle(50, 50), 40, 48))
-    with pytest.raises(NoOrder) as said:
+    with pytest.raises(NoOrder, match=r"'core' cannot leave shut along \(0, 0, 1\): 'shut' is in its way"):
         drafted(made(tmp_path, shut=(shut, (0, 0, 0)), core=(CORE, (0, 0, 10))), "z")
-    # 15 mm are free above it; the roof is 8 mm thick: from its middle the core is out after (15 + 8) / 2 mm.
-    assert "'core' cannot leave along (0, 0, 1): from 15.5 mm on it would be inside 'shut', 11 mm deep" in str(
-        said.value
-    )
 
 
-def test_what_touches_nothing_is_said_with_what_is_nearest(tmp_path: Path) -> None:
+def test_what_touches_nothing_has_no_order(tmp_path: Path) -> None:
     parts = made(tmp_path, plate=(FLOOR, (0, 0, 0)), core=(CORE, (0, 0, 10.4)))
-    with pytest.raises(NoOrder, match=r"'core' touches nothing .* 'plate', 0\.4 mm below"):
+    with pytest.raises(NoOrder, match=r"'core' touches nothing"):
         drafted(parts, "z")
-
-
-def test_overlaps_are_those_of_the_solids_as_drawn(tmp_path: Path) -> None:
-    a, b = made(tmp_path, a=(CORE, (0, 0, 0)), b=(CORE, (0, 0, 14)))
-    solids, poses = {"a": a.solid, "b": b.solid}, {"a": a.T, "b": b.T}
-    files = {"a": a.file, "b": b.file}
-    (plain,) = clashes(solids, poses, 0.25, files)
-    assert plain.startswith("'a' and 'b' are 1 mm inside each other, and parts are rigid")
-    corners = np.array([[x, y, z] for x in (-10, 10) for y in (-10, 10) for z in (0, 15)], float)
-    triangles = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
-    faces = np.array([[q[0], *q[i : i + 2]] for q in triangles for i in (1, 2)])
-    for low, said in ((0.3, "0.7 mm inside each other as drawn, deepest at ("), (1.0, "an error of the import")):
-        keep_drawn(Mesh(corners, faces), a.file)
-        keep_drawn(Mesh(np.maximum(corners, (-99, -99, low)), faces), b.file)
-        (sentence,) = clashes(solids, poses, 0.25, files)
-        assert said in sentence
-
-
-def test_a_kept_mesh_that_cannot_be_read_is_named_and_nothing_is_said_of_axes(tmp_path: Path) -> None:
-    parts = made(tmp_path, a=(CORE, (0, 0, 0)), b=(CORE, (0, 0, 14)))
-    (tmp_path / "a.drawn.npz").write_text("no archive")
-    with pytest.raises(InputError, match=r"a\.drawn\.npz: .* or import the part again\.$"):
-        drafted(parts)
 
 
 def test_another_side_goes_up_where_there_is_no_order_with_z(tmp_path: Path) -> None:
@@ -89,7 +58,7 @@ def test_another_side_goes_up_where_there_is_no_order_with_z(tmp_path: Path) -> 
     parts = made(tmp_path, cup=(cup, (0, 0, 0)), core=(CORE, (0, 0, 10)))
     assert drafted(parts).up == "z"
     over = turned(parts, 180, 0, 0)
-    with pytest.raises(NoOrder, match="'core' cannot leave along"):
+    with pytest.raises(NoOrder, match="'core' cannot leave cup"):
         drafted(over, "z", ("cup",))
     found = drafted(over, fixed=("cup",))
     assert found.up.startswith("-z, as with z up there is no order")

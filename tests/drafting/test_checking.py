@@ -104,4 +104,4 @@ def test_parts_inside_each_other_are_named_with_how_deep(folder: Path) -> None:
     beside = {"a": at(0, 0, 0), "b": at(30.2, 0, 0)}
     assert clashes({"a": cube, "b": cube}, beside, clearance_mm=0.25) == []
     (sentence,) = clashes({"a": cube, "b": cube}, beside | {"b": at(26, 3, 2)}, clearance_mm=0.25)
-    assert sentence.startswith("'a' and 'b' are 4 mm inside each other, and parts are rigid here")
+    assert sentence.startswith("'a' and 'b' are 4 mm inside each other: parts are rigid here")

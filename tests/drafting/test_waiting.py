@@ -121,7 +121,7 @@ def test_the_assembly_stands_on_the_table_whichever_axis_looks_up(tmp_path: Path
     ("text", "sentence"),
     [
         ('[[pose]]\npart = "block"\nat_mm = [0, 0, 0]\n', "1 poses were given; 2 to 49 parts make an assembly"),
-        (2 * '[[pose]]\npart = "block"\nname = "2 b"\nat_mm = [0, 0, 0]\n', "a letter, then letters"),
+        (2 * '[[pose]]\npart = "block"\nname = "2 b"\nat_mm = [0, 0, 0]\n', r"matching regex .*pose\[0\]\.name"),
         (2 * '[[pose]]\npart = "block"\nat_mm = [0, 0]\n', "at_mm"),
         (2 * '[[pose]]\npart = "none"\nat_mm = [0, 0, 0]\n', "none.xml"),
     ],
@@ -137,5 +137,5 @@ def test_a_part_without_a_pose_is_named(tmp_path: Path) -> None:
     path = tmp_path / "poses.toml"
     path.write_text(2 * '[[pose]]\npart = "block"\nat_mm = [0, 0, 0]\n')
     assert [each.name for each in read_posed(path, ["block"])] == ["block", "block_2"]
-    with pytest.raises(InputError, match="'stick' has no pose"):
+    with pytest.raises(InputError, match="stick has no pose"):
         read_posed(path, ["block", "stick"])

@@ -100,28 +100,10 @@ def refined(start: Round | None, points: Array, cone: bool) -> Round | None:
     def off(p: Array) -> Array:
         return np.asarray(moved(p).off(points) / size)
 
-    def slopes(p: Array) -> Array:
-        # d off / d p of off = (d - r - s h) / (w size): the axis moves by da across itself, which changes the height h
-        # by out . da and the distance d by -h u . da, with out = d u; w = hypot(1, s).
-        wall = moved(p)
-        w = np.hypot(1.0, wall.slope)
-        height, distance, u = wall.polar(points)
-        length = np.linalg.norm(start.axis + p[0] * x + p[1] * y)
-        turns = np.column_stack([e - (e @ wall.axis) * wall.axis for e in (x, y)]) / length
-        shifts = np.column_stack([x, y])
-        rows = [
-            -(height + wall.slope * distance)[:, None] / size * (u @ turns),
-            wall.slope * (wall.axis @ shifts) - u @ shifts,
-            np.full((len(points), 1), -1.0),
-        ]
-        if cone:
-            rows.append((-height / size - wall.slope / w * off(p))[:, None])
-        return np.asarray(np.hstack(rows) / w)
-
     first = [0.0, 0.0, 0.0, 0.0, radius / size, *([slope] if cone else [])]
     if len(points) < len(first) or not np.isfinite(off(np.array(first))).all():
         return None
-    solved = least_squares(off, first, slopes, method="lm", xtol=1e-10, ftol=1e-8, gtol=1e-14, max_nfev=50)
+    solved = least_squares(off, first, method="lm", xtol=1e-10, ftol=1e-8, gtol=1e-14, max_nfev=500)
     fitted = moved(solved.x)
     return fitted if np.isfinite(solved.x).all() and fitted.radius > 0.0 else None
 

@@ -39,8 +39,8 @@ class _End(NamedTuple):
         )
 
 
-def regions_of(mesh: Mesh, fewest: int = FEWEST_SIDES) -> tuple[tuple[Region, ...], Any]:
-    """The faces of a closed mesh in an order that its triangles give, and the flat piece of each triangle.
+def regions_of(mesh: Mesh, fewest: int = FEWEST_SIDES) -> tuple[Region, ...]:
+    """The faces of a closed mesh, in an order that its triangles give.
 
     Args:
         fewest: Of the sides that a round face has in a whole turn; what has fewer is so many flat faces.
@@ -59,7 +59,7 @@ def regions_of(mesh: Mesh, fewest: int = FEWEST_SIDES) -> tuple[tuple[Region, ..
     regions += [fitted_plane(mesh, np.flatnonzero(facets.of == f)) for f in np.flatnonzero(left & ~free)]
     groups = smooth_groups(facets, np.flatnonzero(free))
     regions += [Region("other", np.flatnonzero(np.isin(facets.of, group))) for group in groups]
-    return tuple(sorted(regions, key=lambda region: int(region.triangles[0]))), facets.of
+    return tuple(sorted(regions, key=lambda region: int(region.triangles[0])))
 
 
 def _wall_of_pieces(facets: Facets, walls: list[FoundWall]) -> Any:

@@ -4,40 +4,33 @@ Read here and not by trimesh 5.2, which cuts every polygon into a fan from its f
 another surface.
 """
 
-from array import array
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from apo_bench.cad.solids.raw_solid import Mesh, square_to
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
 
 _SAME_AREA = 1e-6
 """Triangles cover a polygon once if their areas add up to its area within this part."""
 
 
-def read_obj(path: Path, raw: bytes, most_triangles: int) -> Mesh:
+def read_obj(path: Path, raw: bytes) -> Mesh:
     """The mesh of all faces of a file.
 
     Raises:
-        InputError: It is no OBJ file, has too many triangles, or a polygon crosses itself.
+        InputError: It is no OBJ file, or a polygon crosses itself.
     """
     try:
         corners, polygons = _read_polygons(raw)
     except (ValueError, OverflowError) as error:
         raise InputError(f"{path}: this is no OBJ file that can be read; save the part again.") from error
-    count = sum(len(polygon) - 2 for polygon in polygons)
-    if count > most_triangles:
-        raise InputError(
-            f"{path}: the file has {count:,} triangles; {most_triangles:,} are the most, so save a coarser mesh."
-        )
     triangles = [np.zeros((0, 3), dtype=np.int64)]
     for number, polygon in enumerate(polygons, start=1):
-        cut = polygon[None] if len(polygon) == 3 else _triangulated(corners[polygon], polygon)
-        if cut is None:
-            raise InputError(f"{path}: face {number:,} crosses itself; save the part with triangles only.")
+        cut = polygon[None] if len(polygon) == 3 else _triangulate(corners[polygon], polygon)
+        require(cut is not None, f"{path}: face {number:,} crosses itself; save the part with triangles only.")
         triangles.append(cut)
     return Mesh(corners, np.concatenate(triangles))
 
@@ -48,29 +41,24 @@ def _read_polygons(raw: bytes) -> tuple[Array, list[Any]]:
     Raises:
         ValueError: A line is not as OBJ has it.
     """
-    numbers = array("d")
+    corners = []
     polygons = []
     for line in raw.replace(b"\\\r\n", b" ").replace(b"\\\n", b" ").splitlines():
         key, *words = line.split() or [b""]
         if key == b"v":
-            numbers.extend([float(word) for word in words[:3]])
-            if len(words) < 3 or len(numbers) % 3:
-                raise ValueError("a corner without three numbers")
+            x, y, z, *_ = map(float, words)
+            corners.append((x, y, z))
         elif key == b"f":
-            have = len(numbers) // 3
             # Corners count from 1, or backwards from the last one that was read.
             given = np.array([int(word.split(b"/")[0]) for word in words])
-            polygon = np.where(given > 0, given - 1, given + have)
-            if len(given) < 3 or (given == 0).any() or (polygon < 0).any():
-                raise ValueError("a face without three corners")
-            polygons.append(polygon)
-    corners = np.array(numbers).reshape(-1, 3)
-    if any(polygon.max() >= len(corners) for polygon in polygons) or not np.isfinite(corners).all():
+            polygons.append(np.where(given > 0, given - 1, np.where(given < 0, given + len(corners), -1)))
+    every = np.array(corners).reshape(-1, 3)
+    if not np.isfinite(every).all() or any(len(p) < 3 or p.min() < 0 or p.max() >= len(every) for p in polygons):
         raise ValueError("a face without its corners")
-    return corners, polygons
+    return every, polygons
 
 
-def _triangulated(points: Array, polygon: Any) -> Any:
+def _triangulate(points: Array, polygon: Any) -> Any:
     """Triangles, (n - 2, 3), of a polygon with these points, (n, 3); None if they cannot cover it once."""
     import manifold3d
 

@@ -1,6 +1,5 @@
 """Corners of convex pieces: each once, and not more of them than a piece may have, [mm]."""
 
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -12,9 +11,6 @@ _MOST_CORNERS = 600
 _MOST_SIDES = 300
 _MOST_DIRECTIONS = 190
 """Of a piece; of one that has more, the farthest corners are kept."""
-_FARTHEST = (60, 40, 24, 12, 0)
-_IN_PLANE = (16, 8, 4)
-"""In how many directions: in space; in each flat face."""
 _INSIDE_M = 5e-8
 """Corners so far inside of a piece are none of it."""
 _THIN_MM = 0.02
@@ -24,7 +20,8 @@ _DIGITS = 9
 """As they are written."""
 _NO_PLANES = np.zeros((0, 4))
 _MOST_TRIED = 500
-_FEW = 4
+_IN_PLANE = (16, 8, 4)
+"""In how many directions corners of a flat face are kept first."""
 _FEWEST = 12
 _AT_A_TIME = 3
 LEFT_MM = 0.02
@@ -37,13 +34,12 @@ def corners_of(body: Any) -> Array:
     return np.asarray(raw.vert_properties)[np.unique(np.asarray(raw.tri_verts)), :3].astype(np.float64)
 
 
-def extremes(points: Array, flats: Array, cuts: Array = _NO_PLANES, is_near: bool = False) -> Array:
+def extremes(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
     """The corners of the convex hull of points, each once; of too many the farthest ones, in flat faces and in space.
 
     Args:
         flats: Planes of flat faces, (k, 4).
         cuts: Those along which the piece was cut from its neighbours; it stays in touch with them if that is possible.
-        is_near: Whether others come by, so that as little as can be is left out.
     """
     from scipy.spatial import ConvexHull
 
@@ -59,13 +55,7 @@ def extremes(points: Array, flats: Array, cuts: Array = _NO_PLANES, is_near: boo
         hull = Hull("", 1e-3 * corners)
     if _is_simple(hull):
         return np.asarray(corners)
-    if is_near:
-        return reduced(corners, flats, cuts)
-    for planes, many, farthest in product((np.concatenate([flats, cuts]), flats, _NO_PLANES), _IN_PLANE, _FARTHEST):
-        kept = np.union1d(_on_flats(corners, planes, many), _farthest(corners, farthest))
-        if len(kept) >= 4 and is_thick(corners[kept]) and _is_simple(Hull("", 1e-3 * corners[kept])):
-            return np.asarray(corners[kept])
-    return np.asarray(corners[_farthest(corners, _FARTHEST[-2])])
+    return reduced(corners, flats, cuts)
 
 
 def reduced(corners: Array, flats: Array, cuts: Array) -> Array:
@@ -75,8 +65,11 @@ def reduced(corners: Array, flats: Array, cuts: Array) -> Array:
     corners = corners[np.sort(ConvexHull(corners).vertices)]
     if _is_simple(Hull("", 1e-3 * corners)):
         return np.asarray(corners)
-    kept = np.union1d(_on_flats(corners, np.concatenate([flats, cuts]), _FEW), _farthest(corners, _FEWEST))
-    best = corners[kept]
+    for many in _IN_PLANE:
+        kept = np.union1d(_on_flats(corners, np.concatenate([flats, cuts]), many), _farthest(corners, _FEWEST))
+        best = corners[kept]
+        if _is_simple(Hull("", 1e-3 * best)):
+            break
     while _is_simple(Hull("", 1e-3 * corners[kept])):
         best = corners[kept]
         planes = ConvexHull(best).equations

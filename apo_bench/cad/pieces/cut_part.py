@@ -32,3 +32,22 @@ def bodies_of(halves: tuple[CutPart, CutPart], least: float) -> list[CutPart]:
     """The bodies that halves consist of, less those of so little volume, [mm^3]."""
     every = (CutPart(body, half.planes) for half in halves for body in half.body.decompose())
     return [each for each in every if each.body.volume() > least]
+
+
+def cut_through(part: CutPart, point: Array, normals: Array, least: float, hair: float) -> list[CutPart]:
+    """The bodies of a part cut through a point along the plane that leaves the least hulls; the part if none does.
+
+    Args:
+        normals: Of the planes to try, (k, 3).
+        least: Bodies of less volume are rounding, and a half of less is none, [mm^3].
+    """
+    best = [part]
+    smallest = np.inf
+    for n in normals:
+        halves = part.halves(n, float(n @ point), hair)
+        bodies = bodies_of(halves, least)
+        filled = sum(each.body.hull().volume() for each in bodies)
+        if filled < smallest and min(half.body.volume() for half in halves) > least:
+            smallest = filled
+            best = bodies
+    return best

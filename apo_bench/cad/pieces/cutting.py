@@ -82,7 +82,7 @@ def _cut(raw: RawSolid, others: Array | None, mates: Any, trims: bool) -> tuple[
         if len(coarse) < 4 or not is_thick(coarse):
             continue
         fine = with_round_shafts(coarse, shafts)
-        corners = extremes(fine, flats, part.planes, others is not None)
+        corners = extremes(fine, flats, part.planes)
         # What a hull fills of a hollow part, and what is lost where corners are left out; round walls are no loss.
         true = part.body.volume()
         coarse_volume, fine_volume, kept_volume = (ConvexHull(each).volume for each in (coarse, fine, corners))

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.cad.pieces.corners import corners_of
-from apo_bench.cad.pieces.cut_part import SLIVER, CutPart
+from apo_bench.cad.pieces.cut_part import SLIVER, CutPart, cut_through
 from apo_bench.cad.pieces.refining import Beside, refined
 from apo_bench.cad.solids.bodies import mesh_of
 from apo_bench.cad.solids.raw_solid import Region
@@ -101,25 +101,11 @@ def _halved(part: CutPart, size: float, volume: float) -> list[CutPart]:
     while parts and len(parts) < _MOST_BISECTED and max(spare) > _ROUGH * volume / len(parts):
         # The part whose hull fills most beyond it; one that no cut makes better counts as done.
         k = int(np.argmax(spare))
-        halves = _best_halves(parts[k])
+        low, high = np.reshape(parts[k].body.bounding_box(), (2, 3))
+        halves = cut_through(parts[k], (low + high) / 2.0, np.eye(3), SLIVER * volume, HAIR * size)
         parts[k : k + 1] = halves
         spare[k : k + 1] = [_spare(each) for each in halves] if len(halves) > 1 else [0.0]
     return parts
-
-
-def _best_halves(part: CutPart) -> list[CutPart]:
-    """The bodies on both sides of the middle, along the axis of the frame that leaves the least hulls."""
-    low, high = np.array(part.body.bounding_box()).reshape(2, 3)
-    least = np.inf
-    best = [part]
-    for axis in np.argsort(low - high):
-        halves = part.halves(np.eye(3)[axis], float(low[axis] + high[axis]) / 2.0)
-        bodies = [CutPart(body, half.planes) for half in halves for body in half.body.decompose()]
-        hulls = float(sum(each.body.hull().volume() for each in bodies))
-        if len(bodies) > 1 and hulls < least * (1.0 - 1e-6):
-            least = hulls
-            best = bodies
-    return best
 
 
 def at_shoulders(parts: Iterator[CutPart], shafts: Sequence[Region], size: float) -> Iterator[CutPart]:

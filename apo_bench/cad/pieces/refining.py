@@ -14,8 +14,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from apo_bench.cad.pieces.corners import LEFT_MM, is_thick, reduced
-from apo_bench.cad.pieces.cut_part import SLIVER, CutPart, bodies_of
-from apo_bench.cad.pieces.misfit import depths
+from apo_bench.cad.pieces.cut_part import SLIVER, CutPart, cut_through
 from apo_bench.cad.solids.bodies import mesh_of
 from apo_bench.cad.solids.raw_solid import Mesh, square_to
 from apo_bench.geometry import Array
@@ -37,6 +36,8 @@ _MOST_SPARE = 4.0
 """Of a part so much may be taken away, or so many times what its hull fills beyond it."""
 _SAME = 1e-3
 """Planes are one if normals and offsets, [mm], differ by less."""
+_AT_ONCE = 2_000_000
+"""Distances that are computed together, which bounds the memory."""
 
 
 @final
@@ -167,18 +168,7 @@ def _best(part: CutPart, worst: _Worst, least: float, hair: float) -> list[CutPa
         x, y = square_to(mean / max(float(np.linalg.norm(mean)), 1e-12))
         _, first = np.unique(np.round(normals, 3), axis=0, return_index=True)
         normals = np.array([*normals[np.sort(first)][:3], *np.eye(3), x, y, (x + y) / 2**0.5, (x - y) / 2**0.5])
-    best = [part]
-    smallest = np.inf
-    for n in normals:
-        halves = part.halves(n, float(n @ worst.point), hair)
-        if min(half.body.volume() for half in halves) < least:
-            continue
-        bodies = bodies_of(halves, least)
-        filled = float(sum(each.body.hull().volume() for each in bodies))
-        if filled < smallest:
-            smallest = filled
-            best = bodies
-    return best
+    return cut_through(part, worst.point, normals, least, hair)
 
 
 def _within(part: CutPart, beside: Beside) -> CutPart:
@@ -208,3 +198,11 @@ def _within(part: CutPart, beside: Beside) -> CutPart:
             body = body.trim_by_plane(-np.array(n), -d)
     is_much = (part.body - body).volume() > max(_MOST_LOST * part.body.volume(), _MOST_SPARE * spare)
     return part if is_much else CutPart(body, part.planes)
+
+
+def depths(points: Array, planes: Array) -> Array:
+    """How deep points, (k, 3), are below the nearest of the planes n . x = d of a convex piece, (p, 4); negative above
+    one of them."""
+    many = max(1, _AT_ONCE // max(len(planes), 1))
+    chunks = [points[i : i + many] for i in range(0, len(points), many)]
+    return np.concatenate([np.zeros(0), *((planes[:, 3] - each @ planes[:, :3].T).min(axis=1) for each in chunks)])

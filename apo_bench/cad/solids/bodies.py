@@ -6,6 +6,9 @@ import numpy as np
 
 from apo_bench.cad.solids.raw_solid import Mesh
 
+_FLAT = 1e-6
+"""Corners this near to a flat piece, in parts of the size, are left out of it."""
+
 
 def body_of(mesh: Mesh) -> Any:
     """Of manifold3d."""
@@ -20,3 +23,8 @@ def mesh_of(body: Any) -> Mesh:
     """Of a body of manifold3d."""
     raw = body.to_mesh64()
     return Mesh(np.asarray(raw.vert_properties)[:, :3], np.asarray(raw.tri_verts).astype(np.int64))
+
+
+def simplify(mesh: Mesh) -> Mesh:
+    """A closed mesh without corners in its flat pieces."""
+    return mesh_of(body_of(mesh).simplify(_FLAT * mesh.extent))

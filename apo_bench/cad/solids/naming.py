@@ -1,5 +1,6 @@
 """Names of faces: from what they are and where, so that one file gives the same ones each time."""
 
+from collections import Counter
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import replace
 from itertools import chain, count
@@ -8,7 +9,7 @@ from unicodedata import combining, normalize
 import numpy as np
 
 from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, Region
-from apo_bench.errors import InputError, unknown
+from apo_bench.errors import require, require_known
 from apo_bench.io import clean
 from apo_bench.parts.allowed import FACE_OR_PART_NAME, LONGEST_FACE_NAME
 
@@ -46,18 +47,14 @@ def renamed(raw: RawSolid, names: Mapping[str, str]) -> RawSolid:
     signs = {"+": "p", "-": "n"}
     new_names = {signs.get(old[:1], old[:1]) + old[1:]: new for old, new in names.items()}
     have = list(raw.named())
+    rule = f"a letter, then letters, digits and underscores, {LONGEST_FACE_NAME} at most, not beginning with auto_"
     for old, new in new_names.items():
-        if old not in have:
-            raise InputError(unknown("face", old, have))
-        if not FACE_OR_PART_NAME.fullmatch(new) or len(new) > LONGEST_FACE_NAME or new.startswith("auto_"):
-            raise InputError(
-                f"--name {old}={new} was given; a letter, then letters, digits and underscores, {LONGEST_FACE_NAME} "
-                "in all at most, are allowed, and not auto_ at the beginning."
-            )
-    after = [new_names.get(name, name) for name in have]
-    twice = sorted({name for name in after if after.count(name) > 1})
-    if twice:
-        raise InputError(f"--name gives two faces the name {twice[0]}; give each its own.")
+        require_known("face", old, have)
+        is_name = FACE_OR_PART_NAME.fullmatch(new) and len(new) <= LONGEST_FACE_NAME and not new.startswith("auto_")
+        require(is_name, f"--name {old}={new} was given; the new name of a face is {rule}.")
+    after = Counter(new_names.get(name, name) for name in have)
+    twice = [name for name, count in after.items() if count > 1]
+    require(not twice, f"--name gives two faces the name {', '.join(twice)}; give each its own.")
     regions = (replace(region, name=new_names.get(region.name, region.name)) for region in raw.regions)
     return replace(raw, regions=tuple(regions))
 

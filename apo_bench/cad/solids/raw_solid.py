@@ -8,7 +8,6 @@ from typing import Any, Literal, NamedTuple, final
 import numpy as np
 
 from apo_bench.geometry import WHOLE_TURN, Array
-from apo_bench.parts.making.body import Moments
 
 RegionKind = Literal["plane", "cylinder", "cone", "other"]
 Rgb = tuple[float, float, float]
@@ -208,10 +207,6 @@ class RawSolid:
     """What was mended."""
     regions: tuple[Region, ...] = ()
     """Its faces, once they are found."""
-    facets: Any = None
-    """The flat piece that each triangle belongs to, (t,), once they are found."""
-    moments: Moments | None = None
-    """As the file has them, where it has more than triangles, [mm]."""
 
     def named(self) -> Mapping[str, Region]:
         return {region.name: region for region in self.regions if region.name}
@@ -234,16 +229,16 @@ def without_copies(solids: Iterable[RawSolid]) -> list[RawSolid]:
 
 def _moved_onto(a: Mesh, b: Mesh) -> Array | None:
     """How the first one is moved onto the second, which has the same triangles in the same order; else None."""
+    from scipy.spatial.transform import Rotation
+
     are_many = len(a.corners) == len(b.corners) and len(a.triangles) == len(b.triangles)
     if not are_many or abs(a.volume - b.volume) > 1e-4 * abs(a.volume):
         return None
     p = a.corners[a.triangles].reshape(-1, 3)
     q = b.corners[b.triangles].reshape(-1, 3)
-    # Kabsch: the rotation R of least squares from P to Q about their middles is V diag(1, 1, det) U^T of P^T Q.
     P = p - p.mean(axis=0)
     Q = q - q.mean(axis=0)
-    U, _, Vt = np.linalg.svd(P.T @ Q)
-    R = Vt.T @ np.diag([1.0, 1.0, np.linalg.det(Vt.T @ U.T)]) @ U.T
+    R = Rotation.align_vectors(Q, P)[0].as_matrix()
     if np.abs(P @ R.T - Q).max() > _SAME_SHAPE * max(a.extent, float(np.abs(q).max())):
         return None
     T = np.eye(4)
