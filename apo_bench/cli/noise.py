@@ -1,16 +1,15 @@
-"""The commands `apo-bench noise list | card | fit | learn | still`: noise models, cards, noise that is measured."""
+"""The commands `apo-bench noise list | card | fit | still`: noise models, cards, noise that is measured."""
 
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.printing import group, print_answer, say
+from apo_bench.cli.printing import group, print_answer
 from apo_bench.cli.setting_options import NO_RESULT, AsJson, check_outputs, writing
-from apo_bench.errors import require
 from apo_bench.records import check
 
-_HELP = "Noise models: list, cards, fits to measured poses, noise learned from observations."
+_HELP = "Noise models: list, cards, fits to measured poses and to parts at rest."
 _NAME = "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name."
 
 
@@ -125,37 +124,6 @@ def noise_still(
             typer.echo(f"Wrote {path}")
 
 
-@noise.command("learn")
-def noise_learn(
-    observations: Annotated[
-        list[Path], typer.Argument(help="Observations, .json of `replay --save-observation`, or folders of them.")
-    ],
-    out: Annotated[Path | None, typer.Option(help="Write the noise file for --noise and `correct`: .toml.")] = None,
-    constant: Annotated[
-        bool, typer.Option("--constant", help="The camera also has an error that is the same in all observations.")
-    ] = False,
-    source: _Source = None,
-    as_json: AsJson = False,
-) -> None:
-    """Learn the noise of a camera from observations alone: contacts tell it, without the truth."""
-    from apo_bench.files.json_reading import read_json_observation
-    from apo_bench.observation.models.camera import Camera
-    from apo_bench.observation.noise_file import noise_text
-    from apo_bench.show.learned_text import learned_form, learned_lines
-    from apo_bench.trial.learned_noise import learn
-
-    files = _observation_files(observations)
-    check_outputs([(out, "--out", (".toml",))])
-    named = _printable(source or f"{len(files)} observations of {', '.join(str(path) for path in observations)}")
-    learned = learn([read_json_observation(path) for path in files], Camera(), named, constant=constant)
-    print_answer(learned_form(learned), learned_lines(learned), as_json)
-    if out is None:
-        return
-    with writing(f"--out {out}"):
-        out.write_text(noise_text(learned.measured), encoding="utf-8")
-    say(f"Wrote {out}", as_json)
-
-
 def _write_fit(
     residuals: Any, measured: Any, files: tuple[Path | None, Path | None], notes: tuple[str, ...], *camera: Any
 ) -> None:
@@ -169,16 +137,6 @@ def _write_fit(
             out.write_text(noise_text(measured, notes, *camera), encoding="utf-8")
         if picture is not None:
             draw_fit(residuals, measured, picture)
-
-
-def _observation_files(paths: list[Path]) -> list[Path]:
-    """The files that were named, and those in the folders that were."""
-    files = list[Path]()
-    for path in paths:
-        inside = sorted(path.glob("*.json")) if path.is_dir() else [path]
-        require(inside, f"the folder {path} holds no .json file; name a folder of observations.")
-        files += inside
-    return files
 
 
 def _printable(text: str) -> str:

@@ -20,7 +20,7 @@ from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.empirical import Empirical, read_residuals, residuals_text
 from apo_bench.observation.models.failures import UNSEEN_DEVIATION
-from apo_bench.observation.models.fitted import Fitted
+from apo_bench.observation.models.fitted import LEVEL_UNITS, ConstantError, Fitted, ViewNoise, restated
 from apo_bench.observation.models.isotropic import COVARIANCE_FLOOR
 from apo_bench.observation.models.residuals import Residuals, match_residuals
 from apo_bench.observation.noise import Level, make_noise
@@ -37,6 +37,10 @@ LEVEL = Level(0.8, 0.6)
 DRAWS = 1200
 BOUND = 5.0
 """Observations behind a law, three operations each, and how many standard errors off a mean may be."""
+STAYS = ConstantError(
+    np.array([1.5, -1.0, 2.0, 1.0, -0.8, 0.5]) * LEVEL_UNITS, pose.at((0.1, 0.0, 0.03), (5.0, 0.0, 40.0))
+)
+CAMERA_NOISE = replace(read_noise(presets()["megapose-tless-inliers"])[0], view=ViewNoise(0.2, 0.1), constant=STAYS)
 WHOLE = Known()
 INLIERS = Known(missed=0.0, outliers=0.0)
 
@@ -249,6 +253,35 @@ def test_presets_are_models_by_name_and_fit_files_by_path(tmp_path: Path) -> Non
     assert noise.measured == measured
     assert_allclose(noise.camera.T_world_camera, pose.at((0, 0, 1.5), (180, 0, 0)))
     assert_allclose(camera.T_world_camera, Camera().T_world_camera)
+
+
+def test_an_error_of_the_view_and_one_that_stays_come_back_from_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "cam.toml"
+    path.write_text(noise_text(CAMERA_NOISE), encoding="utf-8")
+    measured, _ = read_noise(path)
+    assert measured.view == CAMERA_NOISE.view
+    assert measured.constant is not None
+    assert_allclose(measured.constant.twist, STAYS.twist, rtol=1e-6)
+    assert_allclose(measured.constant.frame, STAYS.frame, atol=1e-8)
+
+
+def test_an_error_that_stays_is_taken_out_and_the_noise_of_the_file_stated() -> None:
+    P = STAYS.frame
+    right = see("camera", 1)
+    displaced = replace(right, goals=P @ pose.exp(STAYS.twist) @ pose.inverse(P) @ right.goals)
+    clean = restated(displaced, CAMERA_NOISE, Camera())
+    assert_allclose(clean.goals, right.goals, atol=1e-12)
+    assert clean.tails is not None
+    assert len(clean.shared) == 1
+
+
+def test_correct_takes_the_noise_of_a_camera_out_of_its_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "cam.toml"
+    path.write_text(noise_text(CAMERA_NOISE), encoding="utf-8")
+    assert main(["correct", "stick_in_tower", "--observation", "docs/seen.csv", "--camera-noise", str(path)]) == 0
+    assert "assumed where the file states none" not in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("freedom", ["inf", "1e301", f"1{300 * '0'}", "1000"])
