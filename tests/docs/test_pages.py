@@ -184,7 +184,6 @@ def test_pages_and_notebooks_use_what_the_package_exports() -> None:
     }
     assert sum(map(len, code.values())) > 10
     assert inner == {
-        "apo_bench.correction.learned.class_mean",
         "apo_bench.correction.touches",
         "apo_bench.datasets",
         "apo_bench.envs",
