@@ -15,6 +15,7 @@ from apo_bench.errors import InputError, failed, require, unknown
 from apo_bench.geometry import Array
 from apo_bench.names import resolve
 from apo_bench.observation.models import Level, floored
+from apo_bench.observation.models.failures import make_failures
 from apo_bench.observation.noise_file import noise_path, presets
 from apo_bench.records import FAILURES
 
@@ -30,16 +31,12 @@ NOISES = MappingProxyType(
         "per-part": "apo_bench.observation.models.isotropic:PerPart",
         "camera": "apo_bench.observation.models.camera:Sighted",
         "heavy-tailed": "apo_bench.observation.models.isotropic:HeavyTailed",
-        "outliers": "apo_bench.observation.models.failures:Outliers",
+        "outliers": "apo_bench.observation.models.outliers:Outliers",
         "bias": "apo_bench.observation.models.shared:Bias",
         "bias-view": "apo_bench.observation.models.shared:BiasView",
         "correlated": "apo_bench.observation.models.shared:Correlated",
         "symmetric": "apo_bench.observation.models.symmetric:Symmetric",
-        "flips": "apo_bench.observation.models.failures:Flipped",
-        "stale": "apo_bench.observation.models.failures:Stale",
-        "swaps": "apo_bench.observation.models.failures:Swapped",
-        "rays": "apo_bench.observation.models.failures:AlongRay",
-        "displaced-view": "apo_bench.observation.models.failures:DisplacedView",
+        **dict.fromkeys(FAILURES, "apo_bench.observation.models.failures:make_failures"),
     }
 )
 _RATES = MappingProxyType({"p": "rate", "r": "repeat"})
@@ -100,8 +97,7 @@ def _failing(given: str, level: Level) -> Noise:
             f"the noise '{given}' was given; state how often the camera fails, '{name}:p=0.1', or also how often a "
             f"later look repeats a failure, '{name}:p=0.1/r=0.5'."
         ) from None
-    noise: Noise = resolve(name, NOISES, "noise model")(level, **rates)
-    return noise
+    return make_failures(name, level, **rates)
 
 
 def _noise(model: Any, name: str, level: Level) -> Noise:

@@ -13,8 +13,8 @@ from apo_bench import Demonstration, InputError, Observation, draw_layout, load_
 from apo_bench.geometry import Array, pose, symmetries
 from apo_bench.observation.models import shared
 from apo_bench.observation.models.camera import CAMERA_DISTANCE_M, WORKSPACE_MIDDLE_M, Camera, Sighted, line_of_sight
-from apo_bench.observation.models.failures import MISSES, OUTLIER_TIMES, OUTLIERS, UNSEEN_DEVIATION, Outliers, last_seen
 from apo_bench.observation.models.isotropic import FREEDOM, HeavyTailed, Isotropic
+from apo_bench.observation.models.outliers import MISSES, OUTLIER_TIMES, OUTLIERS, UNSEEN_DEVIATION, Outliers, last_seen
 from apo_bench.observation.models.shared import CORRELATION, Bias, BiasView, Correlated
 from apo_bench.observation.models.symmetric import WORSE, AnyTurn, Symmetric
 from apo_bench.observation.noise import NOISES, Level, Noise, make_noise

@@ -19,9 +19,9 @@ from apo_bench.files.bop import read_results, read_truth
 from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.empirical import Empirical, read_residuals, residuals_text
-from apo_bench.observation.models.failures import UNSEEN_DEVIATION
 from apo_bench.observation.models.fitted import LEVEL_UNITS, ConstantError, Fitted, ViewNoise, restated
 from apo_bench.observation.models.isotropic import COVARIANCE_FLOOR
+from apo_bench.observation.models.outliers import UNSEEN_DEVIATION
 from apo_bench.observation.models.residuals import Residuals, match_residuals
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.noise_file import noise_text, presets, read_noise

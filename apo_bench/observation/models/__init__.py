@@ -2,7 +2,7 @@
 
 from apo_bench.observation.models.camera import Anisotropic, Camera, Sighted
 from apo_bench.observation.models.empirical import Empirical, empirical_noise
-from apo_bench.observation.models.failures import UNSEEN_DEVIATION, AlongRay, Flipped, Outliers, Stale, last_seen
+from apo_bench.observation.models.failures import CameraFailures
 from apo_bench.observation.models.fitted import (
     LEAST_FREEDOM,
     LEVEL_UNITS,
@@ -14,6 +14,7 @@ from apo_bench.observation.models.fitted import (
     view_frame,
 )
 from apo_bench.observation.models.isotropic import Facts, HeavyTailed, Isotropic, Level, PerPart, floored, with_shared
+from apo_bench.observation.models.outliers import UNSEEN_DEVIATION, Outliers, last_seen
 from apo_bench.observation.models.residuals import INLIER_MM, TURNED_DEG, Residuals
 from apo_bench.observation.models.shared import Bias
 from apo_bench.observation.models.symmetric import AnyTurn, Symmetric
@@ -26,16 +27,15 @@ __all__ = (
     "SMALLEST_SCALE",
     "TURNED_DEG",
     "UNSEEN_DEVIATION",
-    "AlongRay",
     "Anisotropic",
     "AnyTurn",
     "Bias",
     "Camera",
+    "CameraFailures",
     "ConstantError",
     "Empirical",
     "Facts",
     "Fitted",
-    "Flipped",
     "HeavyTailed",
     "Isotropic",
     "Level",
@@ -45,7 +45,6 @@ __all__ = (
     "Residuals",
     "Sighted",
     "Split",
-    "Stale",
     "Symmetric",
     "Tail",
     "ViewNoise",

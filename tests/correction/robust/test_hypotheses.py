@@ -27,7 +27,7 @@ from apo_bench.correction.robust.views import views_of
 from apo_bench.geometry import pose
 from apo_bench.observation.looking import Looks, observe
 from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.failures import Flipped
+from apo_bench.observation.models.failures import make_failures
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.relations import make_relations, with_relations
 from apo_bench.trial.outcome_columns import goal_errors
@@ -170,7 +170,7 @@ def test_many_looks_solve_few_hypotheses(seed, monkeypatch):
     layout = draw_layout(scenario, np.random.default_rng([seed, 30, 0]), 0.0)
     n = len(layout.goals)
     first = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((n, 6, 6)))
-    noise = Flipped(Level(1.0, 1.0), repeat=0.8)
+    noise = make_failures("flips", Level(1.0, 1.0), repeat=0.8)
     seen = observe(first, noise, np.random.default_rng([seed, 30, 1]))
     looks = Looks(first, noise, np.random.default_rng([seed, 30, 2]), 4, first=np.random.default_rng([seed, 30, 1]))
     assert correct(seen, look=looks).ok
