@@ -6,7 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from apo_bench.cli.printing import group, print_answer
-from apo_bench.cli.setting_options import NO_RESULT, AsJson, check_outputs, writing
+from apo_bench.cli.setting_options import AsJson, check_outputs, writing
 from apo_bench.records import check
 
 _HELP = "Noise models: list, cards, fits to measured poses and to parts at rest."
@@ -15,9 +15,9 @@ _NAME = "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or
 
 def noise_list() -> None:
     """List the noise models that have a name."""
-    from apo_bench.show.noise_card import listed_models
+    from apo_bench.show.noise_card import list_models
 
-    models = listed_models()
+    models = list_models()
     width = max(map(len, models))
     for name, title in models.items():
         typer.echo(f"{name:{width}}  {title}")
@@ -35,26 +35,16 @@ _Source = Annotated[str | None, typer.Option(help="What the noise file says it i
 def print_noise_card(
     name: Annotated[str, typer.Argument(help=_NAME)],
     level: Annotated[
-        float, typer.Option(help="Of the histogram: mm and degrees, standard deviation; of measured noise, a factor.")
+        float, typer.Option(help="Of the table: mm and degrees, standard deviation; of measured noise, a factor.")
     ] = 1.0,
-    out: Annotated[Path | None, typer.Option(help="Draw the histogram into this file: .png.")] = None,
 ) -> None:
-    """Print the card of a noise model: formula, frame, parameters, and a histogram of its errors."""
+    """Print the card of a noise model: formula, frame, parameters, and a table of its errors."""
     from apo_bench.observation.noise import Level
-    from apo_bench.show.noise_card import draw_errors, draw_histogram, noise_card
+    from apo_bench.show.noise_card import draw_errors, write_card
 
     check("level_mm", level, called="level")
-    check_outputs([(out, "--out", (".png",))])
-    drawn = draw_errors(name, Level(level, level))
-    typer.echo(noise_card(name, Level(level, level), drawn), nl=False)
-    if out is None:
-        return
-    if not len(drawn.errors):
-        typer.echo(f"apo-bench: nothing was seen, so {out} was not written.", err=True)
-        raise typer.Exit(NO_RESULT)
-    with writing(f"--out {out}"):
-        draw_histogram(drawn, out)
-    typer.echo(f"\nWrote {out}")
+    both = Level(level, level)
+    typer.echo(write_card(name, both, draw_errors(name, both)), nl=False)
 
 
 @noise.command("fit")

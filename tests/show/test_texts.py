@@ -15,13 +15,11 @@ from apo_bench import Correction, Observation
 from apo_bench.assembly import Consistency, Contact, PartFace, relation_graph
 from apo_bench.geometry import pose
 from apo_bench.observation.fitting.fit import fit_noise, goodness_of_fit
-from apo_bench.observation.noise import Level
 from apo_bench.recognition.thresholds import Evidence, PairThresholds, Recognised, Rival
 from apo_bench.show.arm_text import list_line
 from apo_bench.show.correct_text import correction_form, correction_lines, pose_table
 from apo_bench.show.fit_text import fit_form, fit_lines
 from apo_bench.show.graph.text import graph_form, graph_lines
-from apo_bench.show.noise_card import Drawn, noise_card
 from apo_bench.show.recognised_text import confidence_line, difference_lines, evidence_table, recognition_form
 from apo_bench.simulation.arms.finding import find_arm
 from tests import bop_made, scenes
@@ -144,25 +142,6 @@ def test_infinite_numbers_of_a_correction_are_null() -> None:
     assert form["test"]["chi_square"] is None
     json.dumps(form, allow_nan=False)
     assert dict(correction_lines(observation, failed, None))["test"].endswith("the contacts contradict each other")
-
-
-def test_a_camera_that_sees_nothing_has_a_card_without_a_histogram() -> None:
-    nothing = Drawn(np.zeros((0, 4)), np.zeros(4), 1.0)
-    text = noise_card("isotropic", Level(1.0, 1.0), nothing)
-    assert text.endswith("Nothing was seen: every operation of stick_in_tower was missed.\n")
-    assert "stated" not in text.splitlines()[-1]
-
-
-def test_the_histogram_of_a_card_counts_what_was_drawn() -> None:
-    """Two errors of one stated deviation to each side, and one beyond all bins, in the first of four columns."""
-    errors = np.zeros((5, 4))
-    errors[:, 0] = [2.0, 2.0, -2.0, -2.0, 100.0]
-    text = noise_card("isotropic", Level(1.0, 1.0), Drawn(errors, np.array([2.0, 1.0, 1.0, 1.0]), 0.0))
-    bars = {line.split()[0]: line.split()[1:] for line in text.splitlines() if line.startswith("     ")}
-    assert bars["1.0"] == bars["-1.0"] == ["######"]
-    assert bars[">"] == ["3.75", "###"]
-    assert bars["0.0"] == ["#" * 14] * 3
-    assert bars["stated"][:2] == ["2", "mm"]
 
 
 def test_estimates_left_over_are_counted_per_image(tmp_path: Path) -> None:
