@@ -74,10 +74,10 @@ def noise_fit(
     seen = read_results(estimates)
     matched = match_residuals(seen, read_truth(truth, seen, scene_id))
     measured = fit.fit_noise(matched, _printable(source or f"{estimates.name} against {truth.name}"))
-    goodness = fit.goodness_of_fit(matched, measured)
-    print_answer(fit_form(matched, measured, goodness), fit_lines(matched, measured, goodness), as_json)
+    form = fit_form(matched, measured, fit.goodness_of_fit(matched, measured))
+    print_answer(form, fit_lines(form), as_json)
     command = f"apo-bench noise fit --estimates {estimates.name} --truth {truth.name}"
-    _write_fit(matched, measured, (out, picture), (_printable(command), *fit_notes(matched, measured, goodness)))
+    _write_fit(matched, measured, (out, picture), (_printable(command), *fit_notes(form)))
     if residuals is not None:
         with writing():
             residuals.write_text(residuals_text(matched), encoding="utf-8")
@@ -99,13 +99,14 @@ def noise_still(
     from apo_bench.recording.formats import read_log
     from apo_bench.recording.rests import still_residuals
     from apo_bench.recording.setup_files import read_camera
-    from apo_bench.show.fit_text import fit_lines
+    from apo_bench.show.fit_text import fit_form, fit_lines
 
     check_outputs([(out, "--out", (".toml",)), (picture, "--picture", (".png",))], (camera,))
     stated = read_camera(camera)
     scatter = still_residuals(read_log(log, form, stated.conventions))
     measured = fit.fit_noise(scatter, _printable(f"parts at rest in {log.name}"))
-    typer.echo("\n".join(fit_lines(scatter, measured, fit.goodness_of_fit(scatter, measured))))
+    form = fit_form(scatter, measured, fit.goodness_of_fit(scatter, measured))
+    typer.echo("\n".join(fit_lines(form)))
     typer.echo("\nAn error that stays while a part rests is not in these numbers: no log of still parts can show it.")
     notes = (_printable(f"apo-bench noise still {log.name} --format {form}"), "without errors that stay")
     _write_fit(scatter, measured, (out, picture), notes, stated.T_world_camera)
@@ -119,7 +120,7 @@ def _write_fit(
 ) -> None:
     """Write the noise file and the picture of a fit, where they are asked for."""
     from apo_bench.observation.noise_file import noise_text
-    from apo_bench.show.fit_text import draw_fit
+    from apo_bench.show.fit_picture import draw_fit
 
     out, picture = files
     with writing():
