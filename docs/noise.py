@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.correction.correctors import correct
-from apo_bench.observation.looking import observe
 from apo_bench.observation.noise import Level, make_noise
+from apo_bench.observation.observing import observe
 from apo_bench.show.noise_card import SCENARIO, draw_errors, list_models, nominal_demonstration, write_card
 
 HERE = Path(__file__).parent

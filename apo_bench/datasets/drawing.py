@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 from apo_bench.assembly import Assembly, Demonstration, Layout, Observation, Operation
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
-from apo_bench.observation.looking import observe
 from apo_bench.observation.models import (
     Anisotropic,
     AnyTurn,
@@ -33,6 +32,7 @@ from apo_bench.observation.models import (
     Symmetric,
 )
 from apo_bench.observation.noise import Level, Noise, make_noise
+from apo_bench.observation.observing import observe
 from apo_bench.records import USUAL, TrialSettings, check, level_pair
 from apo_bench.scenario import Scenario, careless_covariance, load_scenario, spread_error
 from apo_bench.scenario.layout import Layouts, draw_layouts

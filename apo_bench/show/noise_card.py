@@ -9,10 +9,10 @@ import numpy as np
 from apo_bench.assembly import Demonstration, placements
 from apo_bench.geometry import Array, pose
 from apo_bench.names import resolve
-from apo_bench.observation.looking import observe
 from apo_bench.observation.models import Camera, Facts
 from apo_bench.observation.noise import FAILURES, NOISES, Level, make_noise
 from apo_bench.observation.noise_file import noise_path, presets, read_noise
+from apo_bench.observation.observing import observe
 from apo_bench.scenario.file import load_scenario
 
 SCENARIO = "stick_in_tower"

@@ -8,9 +8,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from apo_bench import Demonstration, InputError, draw_layout, load_scenario
 from apo_bench.geometry import approximate_symmetries, pose
-from apo_bench.observation.looking import Looks, observe
+from apo_bench.observation.looking import Looks
 from apo_bench.observation.models.failures import PRESETS, CameraFailures, make_failures
 from apo_bench.observation.noise import FAILURES, Level, make_noise
+from apo_bench.observation.observing import observe
 
 LEVEL = Level(1.0, 1.0)
 

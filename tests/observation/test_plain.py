@@ -12,9 +12,10 @@ from numpy.testing import assert_allclose, assert_array_equal
 from apo_bench import InputError, observe
 from apo_bench.cli.app import main
 from apo_bench.geometry import Array, pose
-from apo_bench.observation.models.isotropic import COVARIANCE_FLOOR
-from apo_bench.observation.noise import NOISES, Level, Plain, make_noise
+from apo_bench.observation.models.displaced import COVARIANCE_FLOOR
+from apo_bench.observation.noise import NOISES, Level, make_noise
 from apo_bench.observation.noise_file import presets
+from apo_bench.observation.plain import Plain
 from apo_bench.show.noise_card import Drawn, describe_model, draw_errors, find_facts, list_models, write_card
 from tests import scenes
 

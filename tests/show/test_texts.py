@@ -15,7 +15,8 @@ from apo_bench import Correction, Observation
 from apo_bench.assembly import Consistency, Contact, PartFace, relation_graph
 from apo_bench.geometry import pose
 from apo_bench.observation.fitting.fit import fit_noise, goodness_of_fit
-from apo_bench.recognition.thresholds import Evidence, PairThresholds, Recognised, Rival
+from apo_bench.recognition.evidence import Evidence, Recognised, Rival
+from apo_bench.recognition.thresholds import PairThresholds
 from apo_bench.show.arm_text import list_line
 from apo_bench.show.correct_text import correction_form, correction_lines, pose_table
 from apo_bench.show.fit_text import fit_form, fit_lines

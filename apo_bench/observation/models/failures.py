@@ -15,7 +15,8 @@ from apo_bench.assembly import Assembly, Demonstration, Observation, measured_ra
 from apo_bench.errors import require
 from apo_bench.geometry import Array, approximate_symmetries, pose
 from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.isotropic import Facts, Level, observe_displaced
+from apo_bench.observation.models.displaced import observe_displaced
+from apo_bench.observation.models.facts import Facts, Level
 
 RATE = 0.3
 """Share of operations that are seen falsely."""

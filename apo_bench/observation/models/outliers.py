@@ -1,16 +1,15 @@
 """Gross outliers and misses: some operations are seen quite wrongly, some not at all."""
 
 from dataclasses import dataclass, replace
-from math import inf
 from typing import ClassVar, final
 
 import numpy as np
 from numpy.typing import NDArray
 
 from apo_bench.assembly import Assembly, Demonstration, Observation, Poses, measured_rates
-from apo_bench.errors import require
 from apo_bench.geometry import Array, frozen
-from apo_bench.observation.models.isotropic import Facts, Level, observe_displaced
+from apo_bench.observation.models.displaced import observe_displaced
+from apo_bench.observation.models.facts import Facts, Level
 
 OUTLIERS = 0.1
 MISSES = 0.02
@@ -55,13 +54,6 @@ class Outliers:
             "At level 0 nothing is missed",
         ),
     )
-
-    def __post_init__(self) -> None:
-        for name, share in (("outliers", self.outliers), ("misses", self.misses)):
-            require(0.0 <= share <= 1.0, f"a share of {name} of {share:g} was given; give a number from 0 to 1.")
-        require(
-            1.0 <= self.times < inf, f"outliers {self.times:g} times as large were given; give a finite number from 1."
-        )
 
     @property
     def inflation(self) -> float:
