@@ -54,7 +54,7 @@ _EXPORTS = MappingProxyType(
         "fitting_plan": "apo_bench.trial.fitting",
         "judge": "apo_bench.judging.verdict",
         "load_scenario": "apo_bench.scenario.file",
-        "observe": "apo_bench.observation.looking",
+        "observe": "apo_bench.observation.observing",
         "picture": "apo_bench.simulation.scene.render",
         "read_arm": "apo_bench.simulation.arms.building",
         "read_observation": "apo_bench.files.observation",

@@ -16,7 +16,7 @@ from apo_bench.errors import InputError as InputError
 from apo_bench.files.observation import read_observation as read_observation
 from apo_bench.judging.verdict import Verdict as Verdict
 from apo_bench.judging.verdict import judge as judge
-from apo_bench.observation.looking import observe as observe
+from apo_bench.observation.observing import observe as observe
 from apo_bench.recognition.contacts import recognise as recognise
 from apo_bench.records.settings import TrialSettings as TrialSettings
 from apo_bench.records.thresholds import Criteria as Criteria

@@ -18,11 +18,11 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.assembly import placements
-from apo_bench.depth_camera.distance import join_shapes, shape_of, strike_distances
 from apo_bench.depth_camera.follow import Event
-from apo_bench.geometry import physical_pieces, pose
+from apo_bench.geometry import pose
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.scene.scene import Scene, build_scene
+from apo_bench.simulation.sensor.rays import ModelRays
 from apo_bench.trial.stages import OBSERVATION, SimulatedDemonstration, range_sensor, simulate_demonstration, stream
 
 
@@ -70,15 +70,14 @@ def noticed(scene: Scene, shown: SimulatedDemonstration, event: Event) -> int:
     demonstration = shown.demonstration
     stages = (demonstration.start, *placements(demonstration.assembly, demonstration.start, demonstration.goals))
     solids = scene.scenario.assembly.solids
-    play = 1e-3 * scene.clearance_mm
+    models = ModelRays(solids, 1e-3 * scene.clearance_mm)
+    owner = np.array([*solids, "nothing"])
     count = 0
     for view, region in zip(shown.images.finder.views, event.regions, strict=True):
         for mask, poses in ((region.appeared, demonstration.final), (region.vanished, stages[-2])):
-            shapes = [shape_of(physical_pieces(solids[part], play), poses[part]) for part in solids]
-            owner = np.concatenate([[part] * len(shape.center) for part, shape in zip(solids, shapes, strict=True)])
             pixels = np.flatnonzero(mask)
-            _, box = strike_distances(join_shapes(shapes), view.origin, view.rays[pixels])
-            count += int(np.isin(owner[box[box >= 0]], list(parts)).sum())
+            _, number = models({part: poses[part] for part in solids}, view.origin, view.rays[pixels])
+            count += int(np.isin(owner[number], list(parts)).sum())
     return count
 
 

@@ -24,58 +24,48 @@ from typing import Any, final
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench import Assembly, Demonstration, Observation, draw_layout, load_scenario
+from apo_bench import Demonstration, Observation, draw_layout, load_scenario
 from apo_bench.assembly import Plan, measured_rates, placements
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.contacts import face_overlap
-from apo_bench.observation.looking import Looks, observe
-from apo_bench.observation.models.failures import RATE, AlongRay, CameraFailures, DisplacedView, Flipped, Stale, Swapped
+from apo_bench.observation.looking import Looks
+from apo_bench.observation.models import Camera
+from apo_bench.observation.models.failures import PRESETS, RATE, CameraFailures, Failure, draw_failing
 from apo_bench.observation.noise import Level
+from apo_bench.observation.observing import observe
 from apo_bench.prediction.failure import predict
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.outcome_columns import goal_errors
 from benchmarks.failures_page import write
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Nearby(CameraFailures):
+def see_nearby(goals: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
     """Parts are seen 5 to 15 mm off, in any direction."""
-
-    def _seeming(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Array:
-        goals = demonstration.goals.copy()
-        for k in self._drawn(len(goals), rng):
-            way = rng.standard_normal(3)
-            goals[k, :3, 3] += way / np.linalg.norm(way) * rng.uniform(0.005, 0.015)
-        return goals
+    for k in draw_failing(len(goals), rate, rng):
+        way = rng.standard_normal(3)
+        goals[k, :3, 3] += way / np.linalg.norm(way) * rng.uniform(0.005, 0.015)
 
 
-@final
-@dataclass(frozen=True, eq=False)
-class Unnamed(CameraFailures):
+def see_elsewhere(goals: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
     """What no hypothesis of the corrector names: parts are seen on another spot of the table, turned about a slant."""
-
-    def _seeming(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Array:
-        goals = demonstration.goals.copy()
-        for k in self._drawn(len(goals), rng):
-            axis = rng.standard_normal(3)
-            turn = axis / np.linalg.norm(axis) * rng.uniform(np.radians(20.0), np.radians(70.0))
-            goals[k, :2, 3] += rng.uniform(-0.1, 0.1, 2)
-            goals[k] = goals[k] @ pose.exp(np.append(np.zeros(3), turn))
-        return goals
+    for k in draw_failing(len(goals), rate, rng):
+        axis = rng.standard_normal(3)
+        turn = axis / np.linalg.norm(axis) * rng.uniform(np.radians(20.0), np.radians(70.0))
+        goals[k, :2, 3] += rng.uniform(-0.1, 0.1, 2)
+        goals[k] = goals[k] @ pose.exp(np.append(np.zeros(3), turn))
 
 
 SCENES = ("vanished_fixture", "stick_in_tower", "nested_bushings", "peg_in_hole", "gearbox")
-KINDS: dict[str, tuple[type[CameraFailures], float]] = {
-    "flips": (Flipped, 0.0),
-    "flips-repeated": (Flipped, 0.8),
-    "rays": (AlongRay, 0.0),
-    "displaced-view": (DisplacedView, 0.0),
-    "stale": (Stale, 0.0),
-    "swaps": (Swapped, 0.0),
-    "nearby": (Nearby, 0.0),
-    "unnamed": (Unnamed, 0.0),
+KINDS: dict[str, tuple[Failure, float]] = {
+    "flips": (PRESETS["flips"], 0.0),
+    "flips-repeated": (PRESETS["flips"], 0.8),
+    "rays": (PRESETS["rays"], 0.0),
+    "displaced-view": (PRESETS["displaced-view"], 0.0),
+    "stale": (PRESETS["stale"], 0.0),
+    "swaps": (PRESETS["swaps"], 0.0),
+    "nearby": (Failure(see_nearby, "parts are seen 5 to 15 mm off", "S = T shifted"), 0.0),
+    "unnamed": (Failure(see_elsewhere, "parts are seen elsewhere", "S anywhere"), 0.0),
 }
 LEVEL = Level(1.0, 1.0)
 CLEARANCE_MM = 0.25
@@ -122,15 +112,15 @@ class Draw:
 def drawn(draw: Draw) -> tuple[Demonstration, CameraFailures, Observation, NDArray[np.bool_]]:
     """The truth, the camera, what it sees and is said of it, and which operations are false, (n,)."""
     scenario = load_scenario(draw.scene)
-    model, repeat = KINDS[draw.kind]
+    failure, repeat = KINDS[draw.kind]
     rate, stated = STATED[draw.stated]
-    noise = model(LEVEL, rate=rate, repeat=repeat)
+    noise = CameraFailures(LEVEL, (failure._replace(rate=rate),), repeat)
     layout = draw_layout(scenario, np.random.default_rng([draw.seed, 30, 0]), 0.0)
     n = len(layout.goals)
     shown = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((n, 6, 6)))
     seen = observe(shown, noise, np.random.default_rng([draw.seed, 30, 1]))
     assert seen.outliers is not None
-    false = noise.failures(scenario.assembly, shown, np.random.default_rng([draw.seed, 30, 1])).false
+    false = noise.draw_false(shown, np.random.default_rng([draw.seed, 30, 1])).false
     return shown, noise, replace(seen, outliers=replace(seen.outliers, gross=stated)), false
 
 

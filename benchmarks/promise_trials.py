@@ -41,7 +41,6 @@ SLOW = ("gearbox",)
 """Scenarios of every `EACH`th seed, since each of their trials takes as long as a dozen others."""
 EACH = 3
 COLUMNS = ("set", "scenario", "seed", "method", "noise", "level", "robot_error", "success", "code", "score")
-_FAILURES = "apo_bench.observation.models.failures:"
 
 
 class Condition(NamedTuple):
@@ -55,12 +54,9 @@ class Condition(NamedTuple):
 
 CONDITIONS = (
     *(Condition("contact-robust", noise) for noise in ("megapose-tless", "benchmarks/gross.toml")),
-    *(
-        Condition("contact-robust", _FAILURES + kind)
-        for kind in ("Flipped", "Stale", "Swapped", "AlongRay", "DisplacedView")
-    ),
+    *(Condition("contact-robust", kind) for kind in ("flips", "stale", "swaps", "rays", "displaced-view")),
     *(Condition("contact-robust", "isotropic", level) for level in (8.0, 2.0)),
-    *(Condition("contact", noise) for noise in ("megapose-tless", _FAILURES + "Stale", _FAILURES + "Flipped")),
+    *(Condition("contact", noise) for noise in ("megapose-tless", "stale", "flips")),
     *(Condition("snap", "isotropic", level) for level in (0.1, 0.25)),
     Condition("none", "isotropic", 0.1),
     *(

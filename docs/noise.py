@@ -1,4 +1,4 @@
-"""Write the cards of all noise models and draw their histograms: `python docs/noise.py` (a minute)."""
+"""Write the cards of all noise models: `python docs/noise.py` (a minute)."""
 
 from __future__ import annotations
 
@@ -7,21 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.correction.correctors import correct
-from apo_bench.observation.looking import observe
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.show.noise_card import (
-    SCENARIO,
-    draw_errors,
-    draw_histogram,
-    drawn_sentence,
-    listed_models,
-    model_description,
-    nominal_demonstration,
-)
+from apo_bench.observation.observing import observe
+from apo_bench.show.noise_card import SCENARIO, draw_errors, list_models, nominal_demonstration, write_card
 
 HERE = Path(__file__).parent
 PAGE = HERE / "reference" / "noise-models.md"
-PICTURE = "../pictures/noise_{}.png"
 LEVEL = Level(1.0, 1.0)
 INTRODUCTION = """
 `--noise` takes the names below. [Your own noise](../guide/noise.md) says how to write another one.
@@ -38,9 +29,9 @@ degrees.
 to the same laws: over seeds, errors have zero mean and the covariance that is declared; nothing depends on the choice
 of the world frame; what was not seen says so; what was seen reaches the robot bit for bit.
 
-Pictures show the errors of 1000 observations at level 1, in the frame of the ray from the default camera to each part.
-The line is the Gaussian with the stated covariance. Densities are logarithmic, and the outermost bins hold all that is
-beyond. `apo-bench noise card NAME` prints a card with its histogram in text, `--level` and `--out` draw others.
+Tables show the errors of 1000 observations at level 1, in the frame of the ray from the default camera to each part:
+their standard deviation, the one that observations state, and percentiles of their size. `apo-bench noise card NAME`
+prints a card, with `--level` at another level.
 """
 
 TRIALS = 200
@@ -90,16 +81,12 @@ def table(names: list[str]) -> list[str]:
 
 
 def main() -> None:
-    models = listed_models()
+    models = list_models()
     lines = ["<!-- Written by `python docs/noise.py`; change the models, not this page. -->", "", "# Noise models"]
     lines += [INTRODUCTION, *(f"- [{name}](#{name}): {title}" for name, title in models.items())]
     lines += table(list(models))
     for name in models:
-        picture = PICTURE.format(name.replace("-", "_"))
-        drawn = draw_errors(name, LEVEL)
-        draw_histogram(drawn, PAGE.parent / picture)
-        lines += ["", f'<a id="{name}"></a>', "", model_description(name, 2)]
-        lines += [f"![Errors of {name}]({picture})", "", f"*{drawn_sentence(name, drawn, LEVEL)}.*"]
+        lines += ["", f'<a id="{name}"></a>', "", write_card(name, LEVEL, draw_errors(name, LEVEL), 2).rstrip()]
     PAGE.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

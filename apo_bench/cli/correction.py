@@ -95,7 +95,7 @@ def correct_command(
     deviation_deg: _DeviationDeg = 1.0,
     camera_noise: Annotated[
         Path | None,
-        typer.Option(help="Take the noise of this file, of `noise learn` or `noise fit`, for what the camera states."),
+        typer.Option(help="Take the noise of this file, of `noise fit` or `noise still`, for what the camera states."),
     ] = None,
     out: Annotated[
         Path | None,

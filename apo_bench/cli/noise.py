@@ -1,25 +1,24 @@
-"""The commands `apo-bench noise list | card | fit | learn | still`: noise models, cards, noise that is measured."""
+"""The commands `apo-bench noise list | card | fit | still`: noise models, cards, noise that is measured."""
 
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.printing import group, print_answer, say
-from apo_bench.cli.setting_options import NO_RESULT, AsJson, check_outputs
-from apo_bench.errors import require
+from apo_bench.cli.printing import group, print_answer
+from apo_bench.cli.setting_options import AsJson, check_outputs
 from apo_bench.io import write_file
 from apo_bench.records import check
 
-_HELP = "Noise models: list, cards, fits to measured poses, noise learned from observations."
+_HELP = "Noise models: list, cards, fits to measured poses and to parts at rest."
 _NAME = "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or package.module:name."
 
 
 def noise_list() -> None:
     """List the noise models that have a name."""
-    from apo_bench.show.noise_card import listed_models
+    from apo_bench.show.noise_card import list_models
 
-    models = listed_models()
+    models = list_models()
     width = max(map(len, models))
     for name, title in models.items():
         typer.echo(f"{name:{width}}  {title}")
@@ -37,27 +36,16 @@ _Source = Annotated[str | None, typer.Option(help="What the noise file says it i
 def print_noise_card(
     name: Annotated[str, typer.Argument(help=_NAME)],
     level: Annotated[
-        float, typer.Option(help="Of the histogram: mm and degrees, standard deviation; of measured noise, a factor.")
+        float, typer.Option(help="Of the table: mm and degrees, standard deviation; of measured noise, a factor.")
     ] = 1.0,
-    out: Annotated[Path | None, typer.Option(help="Draw the histogram into this file: .png.")] = None,
 ) -> None:
-    """Print the card of a noise model: formula, frame, parameters, and a histogram of its errors."""
+    """Print the card of a noise model: formula, frame, parameters, and a table of its errors."""
     from apo_bench.observation.noise import Level
-    from apo_bench.show.noise_card import draw_errors, draw_histogram, noise_card
+    from apo_bench.show.noise_card import draw_errors, write_card
 
     check("level_mm", level, called="level")
-    check_outputs([(out, "--out", (".png",))])
-    drawn = draw_errors(name, Level(level, level))
-    seen = len(drawn.errors) > 0
-    if out is not None and seen:
-        draw_histogram(drawn, out)
-    typer.echo(noise_card(name, Level(level, level), drawn), nl=False)
-    if out is None:
-        return
-    if not seen:
-        typer.echo(f"apo-bench: nothing was seen, so {out} was not written.", err=True)
-        raise typer.Exit(NO_RESULT)
-    typer.echo(f"\nWrote {out}")
+    both = Level(level, level)
+    typer.echo(write_card(name, both, draw_errors(name, both)), nl=False)
 
 
 @noise.command("fit")
@@ -87,12 +75,12 @@ def noise_fit(
     seen = read_results(estimates)
     matched = match_residuals(seen, read_truth(truth, seen, scene_id))
     measured = fit.fit_noise(matched, _printable(source or f"{estimates.name} against {truth.name}"))
-    goodness = fit.goodness_of_fit(matched, measured)
+    found = fit_form(matched, measured, fit.goodness_of_fit(matched, measured))
     command = f"apo-bench noise fit --estimates {estimates.name} --truth {truth.name}"
-    _write_fit(matched, measured, (out, picture), (_printable(command), *fit_notes(matched, measured, goodness)))
+    _write_fit(matched, measured, (out, picture), (_printable(command), *fit_notes(found)))
     if residuals is not None:
         write_file(residuals, residuals_text(matched))
-    print_answer(fit_form(matched, measured, goodness), fit_lines(matched, measured, goodness), as_json)
+    print_answer(found, fit_lines(found), as_json)
     for path in (out, residuals, picture):
         if path is not None and not as_json:
             typer.echo(f"Wrote {path}")
@@ -111,49 +99,20 @@ def noise_still(
     from apo_bench.recording.formats import read_log
     from apo_bench.recording.rests import still_residuals
     from apo_bench.recording.setup_files import read_camera
-    from apo_bench.show.fit_text import fit_lines
+    from apo_bench.show.fit_text import fit_form, fit_lines
 
     check_outputs([(out, "--out", (".toml",)), (picture, "--picture", (".png",))], (camera,))
     stated = read_camera(camera)
     scatter = still_residuals(read_log(log, form, stated.conventions))
     measured = fit.fit_noise(scatter, _printable(f"parts at rest in {log.name}"))
+    found = fit_form(scatter, measured, fit.goodness_of_fit(scatter, measured))
     notes = (_printable(f"apo-bench noise still {log.name} --format {form}"), "without errors that stay")
     _write_fit(scatter, measured, (out, picture), notes, stated.T_world_camera)
-    typer.echo("\n".join(fit_lines(scatter, measured, fit.goodness_of_fit(scatter, measured))))
+    typer.echo("\n".join(fit_lines(found)))
     typer.echo("\nAn error that stays while a part rests is not in these numbers: no log of still parts can show it.")
     for path in (out, picture):
         if path is not None:
             typer.echo(f"Wrote {path}")
-
-
-@noise.command("learn")
-def noise_learn(
-    observations: Annotated[
-        list[Path], typer.Argument(help="Observations, .json of `replay --save-observation`, or folders of them.")
-    ],
-    out: Annotated[Path | None, typer.Option(help="Write the noise file for --noise and `correct`: .toml.")] = None,
-    constant: Annotated[
-        bool, typer.Option("--constant", help="The camera also has an error that is the same in all observations.")
-    ] = False,
-    source: _Source = None,
-    as_json: AsJson = False,
-) -> None:
-    """Learn the noise of a camera from observations alone: contacts tell it, without the truth."""
-    from apo_bench.files.json_reading import read_json_observation
-    from apo_bench.observation.models.camera import Camera
-    from apo_bench.observation.noise_file import noise_text
-    from apo_bench.show.learned_text import learned_form, learned_lines
-    from apo_bench.trial.learned_noise import learn
-
-    files = _observation_files(observations)
-    check_outputs([(out, "--out", (".toml",))])
-    named = _printable(source or f"{len(files)} observations of {', '.join(str(path) for path in observations)}")
-    learned = learn([read_json_observation(path) for path in files], Camera(), named, constant=constant)
-    if out is not None:
-        write_file(out, noise_text(learned.measured))
-    print_answer(learned_form(learned), learned_lines(learned), as_json)
-    if out is not None:
-        say(f"Wrote {out}", as_json)
 
 
 def _write_fit(
@@ -161,23 +120,13 @@ def _write_fit(
 ) -> None:
     """Write the noise file and the picture of a fit, where they are asked for."""
     from apo_bench.observation.noise_file import noise_text
-    from apo_bench.show.fit_text import draw_fit
+    from apo_bench.show.fit_picture import draw_fit
 
     out, picture = files
     if out is not None:
         write_file(out, noise_text(measured, notes, *camera))
     if picture is not None:
         draw_fit(residuals, measured, picture)
-
-
-def _observation_files(paths: list[Path]) -> list[Path]:
-    """The files that were named, and those in the folders that were."""
-    files = list[Path]()
-    for path in paths:
-        inside = sorted(path.glob("*.json")) if path.is_dir() else [path]
-        require(inside, f"the folder {path} holds no .json file; name a folder of observations.")
-        files += inside
-    return files
 
 
 def _printable(text: str) -> str:

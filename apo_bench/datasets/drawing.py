@@ -18,24 +18,22 @@ from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Demonstration, Layout, Observation, Operation
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
-from apo_bench.observation.looking import observe
 from apo_bench.observation.models import (
-    AlongRay,
     Anisotropic,
     AnyTurn,
     Bias,
+    CameraFailures,
     Empirical,
     Fitted,
-    Flipped,
     HeavyTailed,
     Isotropic,
     Outliers,
     PerPart,
     Sighted,
-    Stale,
     Symmetric,
 )
 from apo_bench.observation.noise import Level, Noise, make_noise
+from apo_bench.observation.observing import observe
 from apo_bench.records import USUAL, TrialSettings, check, level_pair
 from apo_bench.scenario import Scenario, careless_covariance, load_scenario, spread_error
 from apo_bench.scenario.layout import Layouts, draw_layouts
@@ -43,7 +41,7 @@ from apo_bench.scenario.layout import Layouts, draw_layouts
 _BY_PART = frozenset(
     (
         *(Isotropic, Anisotropic, PerPart, Sighted, HeavyTailed, Outliers, Bias, Symmetric, AnyTurn),
-        *(Flipped, Stale, AlongRay, Empirical, Fitted),
+        *(Empirical, Fitted),
     )
 )
 """Models whose errors of operations on different parts are independent, whatever else is seen."""
@@ -64,7 +62,8 @@ class Seen(NamedTuple):
 def by_part(noise: Noise) -> bool:
     """Whether a noise model draws many demonstrations at once; others draw one after the other."""
     shares_view = isinstance(noise, Fitted) and noise.measured.view is not None
-    return type(noise) in _BY_PART and not shares_view
+    fails_by_part = isinstance(noise, CameraFailures) and noise.by_part
+    return fails_by_part or (type(noise) in _BY_PART and not shares_view)
 
 
 def observe_many(assembly: Assembly, shown: Layouts, careless: Array, noise: Noise, rng: np.random.Generator) -> Seen:

@@ -7,9 +7,13 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.depth_camera.distance import Shape, signed_distance
-from apo_bench.depth_camera.fit import Points, ShapeFits, covariance, refine, starts
-from apo_bench.depth_camera.range_finder import Mask, PinholeView, median_filtered, share_explained
+from apo_bench.depth_camera.explained import measure_share
+from apo_bench.depth_camera.fit import Fits, Points, covariance, refine
+from apo_bench.depth_camera.range_finder import PinholeView
+from apo_bench.depth_camera.rays import RayCaster
+from apo_bench.depth_camera.regions import Mask, filter_median
+from apo_bench.depth_camera.starts import guess_poses
+from apo_bench.depth_camera.surface import Surface
 from apo_bench.geometry import Array, frozen
 
 _COARSE = 150
@@ -35,12 +39,20 @@ ALIKE = 0.03
 class Model:
     """A part, or several that move as one, as the range finder looks for them."""
 
-    shape: Shape
+    parts: Mapping[str, Array]
+    """The main part and others, with their poses (4, 4) in its frame."""
+    surface: Surface
     """In the frame of its main part."""
     same: Array
     """(m, 4, 4), displacements after which it looks the same; the identity first."""
-    main: int | None = None
-    """How many of the boxes, the first ones, are those of the main part, if it carries others."""
+    main: Surface | None = None
+    """That of the main part alone, if it carries others."""
+    carried: Surface | None = None
+    """That of the others."""
+
+    def put(self, T: Array) -> Mapping[str, Array]:
+        """Where the parts are, if the model is at T, (4, 4), world."""
+        return {part: T @ offset for part, offset in self.parts.items()}
 
 
 @final
@@ -55,6 +67,7 @@ class Appearance:
     """Per view, where something is nearer than before."""
     noise_m: float
     bias_m: float
+    cast: RayCaster
 
     def points(self) -> Points:
         """The measured points; the outermost pixels of the regions are left out."""
@@ -70,7 +83,7 @@ class Appearance:
     @cached_property
     def smooth(self) -> Array:
         """The images with less noise, edges kept; NaN around what is missing."""
-        return np.array([median_filtered(image) for image in self.images])
+        return np.array([filter_median(image) for image in self.images])
 
     @property
     def width_m(self) -> float:
@@ -99,43 +112,44 @@ def locate(model: Model, appearance: Appearance, points: Points) -> LocatedModel
     if len(points) < 6:
         return None
     best, _ = _best(model, appearance, points)
-    T, C = _fine(model.shape, appearance, points.thinned(_FINE), best)
+    T, C = _fine(model.surface, appearance, points.thinned(_FINE), best)
     share = _share(model, appearance, T)
     if share < _LEAST_EXPLAINED:
         return None
-    if model.main is not None:
-        main, rest = map(model.shape.only, np.split(np.arange(len(model.shape.center)), [model.main]))
+    if model.main is not None and model.carried is not None:
         local = (points.at - T[:3, 3]) @ T[:3, :3]
-        d = np.abs(signed_distance(main, local)[0])
-        own = points.only((d < 2.0 * appearance.width_m) & (d < np.abs(signed_distance(rest, local)[0])))
+        _, far = model.main.find_nearest(local)
+        _, others = model.carried.find_nearest(local)
+        own = points.only((far < 2.0 * appearance.width_m) & (far < others))
         if len(own) >= 6:
-            alone = _fine(main, appearance, own.thinned(_FINE), T)
+            alone = _fine(model.main, appearance, own.thinned(_FINE), T)
             if (np.sqrt(np.diag(alone[1])) < _WELL_SEEN).all():
                 T, C = alone
     return LocatedModel(T, C, share)
 
 
-def model_shares(models: Mapping[str, Model], appearance: Appearance, points: Points) -> Mapping[str, float]:
+def compare_models(models: Mapping[str, Model], appearance: Appearance, points: Points) -> Mapping[str, float]:
     """How much of what appeared each model explains where it fits best, 0 to 1."""
     if len(points) < 6:
         return dict.fromkeys(models, 0.0)
     return {name: _best(model, appearance, points)[1] for name, model in models.items()}
 
 
-def _fine(shape: Shape, appearance: Appearance, points: Points, T: Array) -> tuple[Array, Array]:
+def _fine(surface: Surface, appearance: Appearance, points: Points, T: Array) -> tuple[Array, Array]:
     """The last fit, from a good start, and its covariance."""
-    T = refine(shape, points, T[None], appearance.width_m, 20).T[0]
-    return T, covariance(shape, points, T, appearance.width_m, appearance.noise_m, appearance.bias_m)
+    T = refine(surface, points, T[None], appearance.width_m, 20).T[0]
+    return T, covariance(surface, points, T, appearance.width_m, appearance.noise_m, appearance.bias_m)
 
 
-def _coarse(model: Model, appearance: Appearance, points: Points) -> ShapeFits:
+def _coarse(model: Model, appearance: Appearance, points: Points) -> Fits:
     """The best few of the fits from all starts."""
-    begun = starts(model.shape, points.at, model.same)
-    first = refine(model.shape, points.thinned(_COARSE), begun, max(_WIDE_M, 3.0 * appearance.width_m), 10)
+    surface = model.surface
+    wide = max(_WIDE_M, 3.0 * appearance.width_m)
+    first = refine(surface, points.thinned(_COARSE), guess_poses(surface.corners, points.at, model.same), wide, 10)
     best = first.T[np.argsort(first.cost, kind="stable")[:_BEST]]
     middle = points.thinned(_MIDDLE)
-    nearer = refine(model.shape, middle, best, np.sqrt(appearance.width_m * max(_WIDE_M, 3.0 * appearance.width_m)), 8)
-    return refine(model.shape, middle, nearer.T, appearance.width_m, 8)
+    nearer = refine(surface, middle, best, np.sqrt(appearance.width_m * wide), 8)
+    return refine(surface, middle, nearer.T, appearance.width_m, 8)
 
 
 def _best(model: Model, appearance: Appearance, points: Points) -> tuple[Array, float]:
@@ -147,4 +161,5 @@ def _best(model: Model, appearance: Appearance, points: Points) -> tuple[Array, 
 
 
 def _share(model: Model, appearance: Appearance, T: Array) -> float:
-    return share_explained(model.shape, T, appearance.views, appearance.smooth, appearance.masks, appearance.noise_m)
+    seen = appearance
+    return measure_share(model.put(T), seen.cast, seen.views, seen.smooth, seen.masks, seen.noise_m)

@@ -1,4 +1,4 @@
-"""Poses, faces, solids and the overlap of facing faces: numpy and shapely only."""
+"""Poses, faces, solids and the overlap of facing faces: numpy, shapely, and manifold3d for meshes."""
 
 from apo_bench.geometry.arrays import Array, Ints, NotReal, copyable, freeze, frozen, real, remembered
 from apo_bench.geometry.clearance import physical_pieces, receded_pieces
@@ -8,6 +8,7 @@ from apo_bench.geometry.exact_turns import depth_inside
 from apo_bench.geometry.flips import Flips, approximate_symmetries
 from apo_bench.geometry.hull import SAGITTA_M, Cylinder, Hull, cylinder_hull, first_of_each, sides_of
 from apo_bench.geometry.mating import Mate, angle_between, mate
+from apo_bench.geometry.meshes import union_mesh
 from apo_bench.geometry.pads import FINGER_ROOM_M, PAD_M, PadPlace, held_span, held_width, holds, holds_whole, is_held
 from apo_bench.geometry.penetration import (
     TOUCH_M,
@@ -116,6 +117,7 @@ __all__ = (
     "symmetries",
     "turn_about",
     "turned_alike",
+    "union_mesh",
     "upright_bounds",
     "ways_out",
     "world_bounds",

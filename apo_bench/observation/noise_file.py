@@ -1,7 +1,4 @@
-"""Noise files: what was measured of a pose estimator, as TOML.
-
-The files behind the names of noise models.
-"""
+"""Noise files, by path or by the name under which they come with the package: a measured estimator as TOML."""
 
 import math
 from collections.abc import Mapping

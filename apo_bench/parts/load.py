@@ -5,12 +5,11 @@ A second opinion on a solid: the mesh that manifold3d makes of its pieces, measu
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from apo_bench.errors import InputError, require, require_known
-from apo_bench.geometry import Box, Face, Piece, Solid, face_area, separating_axes, shadow
+from apo_bench.geometry import Box, Face, Piece, Solid, face_area, separating_axes, shadow, union_mesh
 from apo_bench.parts.agreement import check_faces, check_receding
 from apo_bench.parts.allowed import HEAVIEST_KG, LIGHTEST_KG, MOST_FACES
 from apo_bench.parts.faces import SIDES, Surface, unite
@@ -33,7 +32,7 @@ def check_solid(solid: Solid, file: str) -> None:
 
     Both packages are slow to import and are so only here.
     """
-    mesh = _mesh(solid)
+    mesh = union_mesh(solid.pieces)
     require(
         mesh.is_watertight,
         f"{file}: the boxes make no closed solid; move apart, or into each other, what nearly touches.",
@@ -62,7 +61,7 @@ def check_matter(solid: Solid, file: str, rounded: float) -> None:
         rounded: By how much round walls that are cut into flat ones may change the volume, [m^3].
     """
     assert solid.inertia is not None
-    mesh = _mesh(solid)
+    mesh = union_mesh(solid.pieces)
     room = _SHARE * solid.volume + rounded
     reach = float(np.linalg.norm(np.diff(solid.bounds, axis=0)))
     require(
@@ -78,21 +77,6 @@ def check_matter(solid: Solid, file: str, rounded: float) -> None:
     if np.abs(J - solid.inertia).max() > room * reach**2 / 3.0:
         six = ", ".join(f"{1e15 * J[i, k]:.5g}" for i, k in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)))
         raise InputError(f"{file}, inertia_mm5: that of the pieces about their centroid is [{six}]; state that.")
-
-
-def _mesh(solid: Solid) -> Any:
-    """The union of the pieces as a mesh; vertices stay apart where the surface touches itself."""
-    import manifold3d
-    import trimesh
-
-    pieces = [
-        manifold3d.Manifold.cube(2.0 * piece.half, center=True).translate(piece.center)
-        if isinstance(piece, Box)
-        else manifold3d.Manifold.hull_points(piece.corners)
-        for piece in solid.pieces
-    ]
-    mesh = manifold3d.Manifold.batch_boolean(pieces, manifold3d.OpType.Add).to_mesh64()
-    return trimesh.Trimesh(mesh.vert_properties[:, :3], mesh.tri_verts, process=False)
 
 
 def check_one_piece(pieces: Sequence[Piece], path: Path) -> None:

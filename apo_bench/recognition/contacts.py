@@ -18,16 +18,10 @@ from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Contact, Facing, Observation, placements
 from apo_bench.assembly.touching import facing
 from apo_bench.geometry import Array
-from apo_bench.recognition.situation import Belief, Candidate, PartBeliefs, initial_belief, judged
-from apo_bench.recognition.thresholds import (
-    RULES_BY_NOISE,
-    Evidence,
-    Recognised,
-    Rules,
-    evidence_of,
-    with_contacts,
-    without_contacts,
-)
+from apo_bench.recognition.belief import Belief, PartBeliefs, initial_belief
+from apo_bench.recognition.candidate import Candidate, judged
+from apo_bench.recognition.evidence import Evidence, Recognised, evidence_of, with_contacts, without_contacts
+from apo_bench.recognition.thresholds import RULES_BY_NOISE, Rules
 
 _BEGINNINGS = 12
 """Candidates that are tried as the first of an operation, at most."""

@@ -18,10 +18,12 @@ import numpy as np
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Contact, Observation, placements
 from apo_bench.geometry import Array
+from apo_bench.recognition.candidate import Candidate
 from apo_bench.recognition.estimate import estimate
+from apo_bench.recognition.evidence import Recognised, Rival, evidence_of, with_contacts, without_contacts
 from apo_bench.recognition.physics import IMPOSSIBLE, inside, physical_surprise, refusal
-from apo_bench.recognition.situation import Candidate, Situation
-from apo_bench.recognition.thresholds import Recognised, Rival, Rules, evidence_of, with_contacts, without_contacts
+from apo_bench.recognition.situation import Situation
+from apo_bench.recognition.thresholds import Rules
 
 GENEROUS_RULES = Rules(gap_m=50e-3, angle_rad=radians(45.0))
 """What is looked at; what is a contact the score says."""

@@ -12,7 +12,8 @@ import numpy as np
 from scipy.special import log_ndtr, ndtr
 
 from apo_bench.geometry import Array, Overlap, face_area, overlap, pose, ways_out
-from apo_bench.recognition.situation import Candidate, Situation
+from apo_bench.recognition.candidate import Candidate
+from apo_bench.recognition.situation import Situation
 from apo_bench.recognition.thresholds import Rules
 
 IMPOSSIBLE = 40.0

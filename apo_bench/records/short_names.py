@@ -26,7 +26,6 @@ CORRECTORS = MappingProxyType(
         "contact-refuse": "apo_bench.correction.contact.contact:contact_refuse",
         "contact-drop": "apo_bench.correction.contact.contact:contact_drop",
         "contact-robust": "apo_bench.correction.robust.robust:contact_robust",
-        "learned-set": "apo_bench.correction.learned.network:learned_set",
         "paper": "apo_bench.correction.baselines.paper:paper",
         "paper-track": "apo_bench.correction.baselines.track:paper_track",
         "snap": "apo_bench.correction.baselines.snap:snap",

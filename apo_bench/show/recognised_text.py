@@ -4,7 +4,7 @@ from math import degrees
 from typing import Any
 
 from apo_bench.assembly import Assembly, Contact, Observation
-from apo_bench.recognition.thresholds import Recognised
+from apo_bench.recognition.evidence import Recognised
 from apo_bench.trial.recognised_contacts import count_contacts
 
 _SCHEMA = "apo-bench/recognised/2"

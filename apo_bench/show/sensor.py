@@ -1,7 +1,6 @@
 """One demonstration through the range finder, and all that it made of that: as a record, a form, lines, and a picture
 with a row for each operation: what a camera sees, range, difference, regions, fitted model."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, final
@@ -9,15 +8,15 @@ from typing import Any, final
 import numpy as np
 
 from apo_bench.assembly import Assembly
-from apo_bench.depth_camera.distance import strike_distances
 from apo_bench.depth_camera.follow import Event
-from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder
+from apo_bench.depth_camera.range_finder import RangeFinder
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
 from apo_bench.io import default_looks, save_figure
 from apo_bench.records import RANGE, check
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene import build_scene
+from apo_bench.simulation.sensor.rays import ModelRays
 from apo_bench.simulation.sensor.watch import DemonstrationImages
 from apo_bench.trial.stages import (
     OBSERVATION,
@@ -51,6 +50,8 @@ class SensorRun:
     images: tuple[Array, ...]
     """Measured range images, (views, height, width) each, [m]."""
     events: tuple[Event, ...]
+    models: ModelRays
+    """The parts as the range finder knows them."""
 
 
 def run_sensor(scenario: str, level_mm: float, seed: int, careless: float) -> SensorRun:
@@ -70,9 +71,9 @@ def run_sensor(scenario: str, level_mm: float, seed: int, careless: float) -> Se
     assert simulated.images is not None
     sensor = range_sensor(scene, simulated, level_mm)
     images = tuple(sensor.sensed(stream(seed, OBSERVATION)))
-    return SensorRun(
-        scene.scenario.name, simulated, simulated.images, images, sensor.events(simulated.demonstration, images)
-    )
+    events = sensor.events(simulated.demonstration, images)
+    models = ModelRays(simulated.demonstration.assembly.solids, sensor.play_m)
+    return SensorRun(scene.scenario.name, simulated, simulated.images, images, events, models)
 
 
 def checked_view(view: int) -> int:
@@ -156,7 +157,7 @@ def draw_sensor(run: SensorRun, out: Path, view: int = 0) -> None:
         axes.set(xticks=[], yticks=[])
     for row, event in zip(rows, events, strict=False):
         row[0].set_ylabel(_label(run.simulated.demonstration.assembly, event), fontsize=9)
-        _draw_row(row, run.watched, run.images, event, view)
+        _draw_row(row, run, event, view)
     # only where anything ever changed is shown
     changed = [event.regions[view].appeared | event.regions[view].vanished for event in events]
     v, u = np.nonzero(np.any(changed, axis=0)) if changed else (np.zeros(0), np.zeros(0))
@@ -173,21 +174,23 @@ def _label(assembly: Assembly, event: Event) -> str:
     return f"{event.operation + 1}: {moved}, {ended}"
 
 
-def _draw_row(row: Any, watched: DemonstrationImages, images: Sequence[Array], event: Event, view: int) -> None:
+def _draw_row(row: Any, run: SensorRun, event: Event, view: int) -> None:
     from matplotlib.colors import ListedColormap
 
-    before = images[event.first][view]
-    after = images[event.last][view]
+    before = run.images[event.first][view]
+    after = run.images[event.last][view]
     regions = event.regions[view]
-    row[0].imshow(watched.pictures[event.last], cmap="gray", vmin=0.0, vmax=1.0)
+    row[0].imshow(run.watched.pictures[event.last], cmap="gray", vmin=0.0, vmax=1.0)
     row[1].imshow(after, cmap="viridis_r", vmin=np.nanmin(after), vmax=np.nanquantile(after, 0.95))
     row[2].imshow(1e3 * (after - before), cmap="RdBu", vmin=-_LARGEST_MM, vmax=_LARGEST_MM)
     row[3].imshow(after, cmap="gray_r", vmin=np.nanmin(after), vmax=2.0 * np.nanmax(after))
     for mask, color in ((regions.appeared, _APPEARED), (regions.vanished, _VANISHED)):
         row[3].imshow(np.where(mask, 1.0, np.nan), cmap=ListedColormap([color]), vmin=0.0, vmax=1.0, alpha=0.8)
     row[4].imshow(after, cmap="gray_r", vmin=np.nanmin(after), vmax=2.0 * np.nanmax(after))
-    if event.found is not None and event.shape is not None:
-        expected = _expected(watched.finder.views[view], event.found.T, event.shape)
+    if event.found is not None and event.model is not None:
+        camera = run.watched.finder.views[view]
+        distance, _ = run.models(event.model.put(event.found.T), camera.origin, camera.rays)
+        expected = distance.reshape(after.shape)
         drawn = row[4].imshow(
             np.where(regions.appeared & (np.abs(after - expected) < 0.02), 1e3 * (after - expected), np.nan),
             cmap="coolwarm",
@@ -198,10 +201,3 @@ def _draw_row(row: Any, watched: DemonstrationImages, images: Sequence[Array], e
         bar = row[4].figure.colorbar(drawn, ax=row[4], shrink=0.85)
         bar.ax.tick_params(labelsize=7)
         bar.set_label("measured - model [mm]", fontsize=7)
-
-
-def _expected(view: PinholeView, T: Array, shape: Any) -> Array:
-    """The range image of the fitted model alone, (height, width), [m]."""
-    # rays in the frame of the model, where its faces are known
-    distance, _ = strike_distances(shape, pose.apply(pose.inverse(T), view.origin[None])[0], view.rays @ T[:3, :3])
-    return distance.reshape(view.height, view.width)

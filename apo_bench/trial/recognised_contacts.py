@@ -10,8 +10,8 @@ from dataclasses import replace
 
 from apo_bench.assembly import Assembly, Contact, Observation
 from apo_bench.recognition.contacts import recognise
+from apo_bench.recognition.evidence import Recognised
 from apo_bench.recognition.jointly import recognise_jointly
-from apo_bench.recognition.thresholds import Recognised
 
 
 def recognise_by(observation: Observation, kind: str = "recognised") -> Recognised:

@@ -15,8 +15,9 @@ import numpy as np
 from apo_bench.assembly import Assembly, Demonstration, Layout, Observation, Outcome, Plan, ReplayResult
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import Verdict, judge
-from apo_bench.observation.looking import Looks, observe
+from apo_bench.observation.looking import Looks
 from apo_bench.observation.noise import Noise
+from apo_bench.observation.observing import observe
 from apo_bench.prediction.failure import ARM_CODES, predict
 from apo_bench.records import NO_ROBOT_ERROR, RANGE, SETTINGS, Predicted, Salt, TrialSettings, robot_sigmas, sentence
 from apo_bench.scenario import Scenario, draw_layout, load_scenario
@@ -28,7 +29,7 @@ from apo_bench.simulation.robot import RobotError
 from apo_bench.simulation.scene import Scene, build_scene
 
 if TYPE_CHECKING:
-    from apo_bench.depth_camera.follow import RangeSensor
+    from apo_bench.depth_camera.sensor import RangeSensor
     from apo_bench.simulation.sensor.watch import DemonstrationImages
 
 LAYOUT, DEMONSTRATION, OBSERVATION, ARM, RELATIONS, TV, LOOKS, HAND_EYE, JOINTS, TOOL, IN_HAND, WRENCH = range(12)
@@ -74,8 +75,10 @@ def simulate_demonstration(
     rng = stream(seed, DEMONSTRATION, salt)
     if eye != RANGE:
         return SimulatedDemonstration(layout, demonstrate(scene, layout, careless, rng))
+    from apo_bench.depth_camera.surface import load_small_gicp
     from apo_bench.simulation.sensor.watch import DemonstrationCamera
 
+    load_small_gicp()
     watcher = DemonstrationCamera(scene.shown, stream(seed, TV, salt))
     return SimulatedDemonstration(layout, demonstrate(scene, layout, careless, rng, watcher), watcher.watched())
 
@@ -89,13 +92,14 @@ def watch_again(
 
 def range_sensor(scene: Scene, simulated: SimulatedDemonstration, level_mm: float) -> RangeSensor:
     """The range finder that watched a demonstration, as a noise model; `level_mm` is the noise of a ray."""
-    from apo_bench.depth_camera.follow import RangeSensor
+    from apo_bench.depth_camera.sensor import RangeSensor
+    from apo_bench.simulation.sensor.rays import ModelRays
 
     assert simulated.images is not None, "simulate the demonstration with eye='range'"
     yaw = float(np.degrees(np.mean(scene.scenario.site.yaw_rad)))
     turns = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, yaw))[:3, :3] @ scene.scenario.goals[:, :3, :3]
     camera = simulated.images
-    return RangeSensor(camera.finder, camera.images, 1e-3 * level_mm, turns, 1e-3 * scene.clearance_mm)
+    return RangeSensor(camera.finder, camera.images, 1e-3 * level_mm, turns, 1e-3 * scene.clearance_mm, ModelRays)
 
 
 def observe_demonstration(

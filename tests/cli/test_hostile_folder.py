@@ -30,7 +30,7 @@ COMMANDS = """
 graph block_on_block --out graph.png
 show block_on_block --level 1 --out show.png
 explain block_on_block
-noise card isotropic --out card.png
+noise card isotropic
 recognise block_on_block
 plan block_on_block
 scene block_on_block --out scene.xml

@@ -13,7 +13,6 @@ from apo_bench import Assembly, ContactCorrector, InputError, Observation, corre
 from apo_bench.assembly import Gap, PartFace, SharedError, largest_gap, lowered
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.contact.contact import contact
-from apo_bench.correction.learning.likelihood import readings
 from apo_bench.correction.own_code.forms import observation_message, parse_observation
 from apo_bench.correction.region import contains_truth
 from apo_bench.correction.solvers.play import fit_covariance
@@ -306,12 +305,6 @@ def test_a_shaft_that_stands_anywhere_in_its_play_is_no_alarm(mm):
     assert np.mean([not one.test.passes for one in made]) <= 0.03
     told_nothing = correct_many([replace(one, play_m=0.0) for one in many], contact)
     assert mm > 0.1 or np.mean([not one.test.passes for one in told_nothing]) > 0.5
-
-
-def test_learning_reads_what_round_contacts_fix():
-    observation, _ = case("shaft in hole")
-    both, first = readings(observation, correct(observation).goals, [(), (1,)])
-    assert (len(both.known), len(first.known)) == (7, 3)
 
 
 def test_parts_of_any_pieces_settle():

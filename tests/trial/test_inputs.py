@@ -165,14 +165,13 @@ OWN = {
     *("own_peg.xml", "own_peg.toml", "look.stl", "arm.xml", "rest.xml", "meshes/hat.stl", "meshes/skin.png"),
     *("own/__init__.py", "own/arms.py", "own/noise.py", "own/shifts.py", "own/relations.py"),
 }
-SHIPPED = {"scenario.toml", "assets/room.xml", "assets/parts/bored_plate.toml", "assets/learned/set.npz"}
+SHIPPED = {"scenario.toml", "assets/room.xml", "assets/parts/bored_plate.toml"}
 GIVEN = (
     ({"arm": "own.arms:arm", "noise": "own.noise:blurred", "relations": "own.relations:given"}, OWN | SHIPPED),
     ({"noise": "camera.toml"}, {"camera.toml", "assets/arms/six_axis.xml", "assets/arms/six_axis.toml"} | SHIPPED),
 )
 NOT_SHOWN = (
     "assets/arms/",
-    "assets/learned/",
     "own/",
     "meshes/",
     "arm.xml",
@@ -189,7 +188,7 @@ def test_every_file_that_a_trial_opens_is_in_its_identity(
 ) -> None:
     home = tmp_path.resolve()
     write_home(home)
-    settings = json.dumps({"seed": 5, "method": "learned-set", "abstain": 1.0, **given})
+    settings = json.dumps({"seed": 5, "method": "contact-robust", "abstain": 1.0, **given})
     command = [sys.executable, "-c", AUDITED, str(home), str(PACKAGE), settings]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr

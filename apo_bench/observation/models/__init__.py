@@ -1,41 +1,41 @@
 """Noise models, one a file: what a camera makes of the true poses."""
 
-from apo_bench.observation.models.camera import Anisotropic, Camera, Sighted
+from apo_bench.observation.models.camera import Camera
+from apo_bench.observation.models.displaced import floored, with_shared
 from apo_bench.observation.models.empirical import Empirical, empirical_noise
-from apo_bench.observation.models.failures import UNSEEN_DEVIATION, AlongRay, Flipped, Outliers, Stale, last_seen
+from apo_bench.observation.models.facts import Facts, Level
+from apo_bench.observation.models.failures import CameraFailures
 from apo_bench.observation.models.fitted import (
     LEAST_FREEDOM,
-    LEVEL_UNITS,
     SMALLEST_SCALE,
     ConstantError,
     Fitted,
     MeasuredNoise,
     ViewNoise,
-    view_frame,
 )
-from apo_bench.observation.models.isotropic import Facts, HeavyTailed, Isotropic, Level, PerPart, floored, with_shared
+from apo_bench.observation.models.isotropic import HeavyTailed, Isotropic, PerPart
+from apo_bench.observation.models.outliers import UNSEEN_DEVIATION, Outliers, last_seen
 from apo_bench.observation.models.residuals import INLIER_MM, TURNED_DEG, Residuals
 from apo_bench.observation.models.shared import Bias
+from apo_bench.observation.models.sighted import Anisotropic, Sighted
 from apo_bench.observation.models.symmetric import AnyTurn, Symmetric
 from apo_bench.observation.models.tails import Split, Tail, log_density_across, log_density_along, of_numbers
 
 __all__ = (
     "INLIER_MM",
     "LEAST_FREEDOM",
-    "LEVEL_UNITS",
     "SMALLEST_SCALE",
     "TURNED_DEG",
     "UNSEEN_DEVIATION",
-    "AlongRay",
     "Anisotropic",
     "AnyTurn",
     "Bias",
     "Camera",
+    "CameraFailures",
     "ConstantError",
     "Empirical",
     "Facts",
     "Fitted",
-    "Flipped",
     "HeavyTailed",
     "Isotropic",
     "Level",
@@ -45,7 +45,6 @@ __all__ = (
     "Residuals",
     "Sighted",
     "Split",
-    "Stale",
     "Symmetric",
     "Tail",
     "ViewNoise",
@@ -55,6 +54,5 @@ __all__ = (
     "log_density_across",
     "log_density_along",
     "of_numbers",
-    "view_frame",
     "with_shared",
 )

@@ -12,8 +12,8 @@ from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, frozen, pose
 from apo_bench.io import CsvRow, read_csv
 from apo_bench.observation.models.camera import Camera
+from apo_bench.observation.models.facts import Facts, Level
 from apo_bench.observation.models.fitted import LEVEL_UNITS, check_measured_level, observe_in_ray_frames
-from apo_bench.observation.models.isotropic import Facts, Level
 from apo_bench.observation.models.residuals import Residuals
 
 _INLIER = "inlier"

@@ -14,8 +14,9 @@ from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.failures import UNSEEN_DEVIATION, last_seen
-from apo_bench.observation.models.isotropic import Facts, Level, displaced, floored, observe_displaced, with_shared
+from apo_bench.observation.models.displaced import displaced, floored, observe_displaced, with_shared
+from apo_bench.observation.models.facts import Facts, Level
+from apo_bench.observation.models.outliers import UNSEEN_DEVIATION, last_seen
 from apo_bench.observation.models.tails import Split
 
 SMALLEST_SCALE = 1e-4

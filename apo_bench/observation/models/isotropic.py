@@ -1,54 +1,15 @@
-"""Noise that is right on SE(3): the same in every direction, in the frame of the part that was seen.
+"""Noise that is the same in every direction: Gaussian, with a factor of its own for each part, or with heavy tails."""
 
-Gaussian, with a factor of its own for each part, or with heavy tails; and how displaced goals become an observation.
-
-What every noise model has: its level, and facts for its card.
-"""
-
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
-from math import inf
-from typing import ClassVar, NamedTuple, final
+from typing import ClassVar, final
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError, Tails
-from apo_bench.errors import require
-from apo_bench.geometry import Array, frozen, pose
+from apo_bench.assembly import Assembly, Demonstration, Observation, Tails
+from apo_bench.observation.models.displaced import observe_displaced
+from apo_bench.observation.models.facts import Facts, Level
 
-
-class Level(NamedTuple):
-    """How much noise: standard deviation per axis."""
-
-    mm: float
-    deg: float
-
-    def sigma(self) -> Array:
-        """The standard deviation of each coordinate of a body twist, (6,), [m, rad]."""
-        return np.repeat([self.mm * 1e-3, np.radians(self.deg)], 3)
-
-
-class Facts(NamedTuple):
-    """The attribute `FACTS` of a noise model: what its card prints. Models that bring none have their docstring."""
-
-    title: str
-    formula: tuple[str, ...]
-    """One line each; L is the level, e are independent standard normal numbers, xi is the body twist."""
-    frame: str
-    parameters: tuple[str, ...]
-    """`name = value unit: meaning`, one each; numbers are read from the constants that the model uses."""
-    states: str
-    """Which covariance an observation states, and how that compares with the errors."""
-    notes: tuple[str, ...] = ()
-    measured: bool = False
-    """Whether a level multiplies what was measured, instead of being the deviation in mm and degrees."""
-
-
-COVARIANCE_FLOOR = frozen(np.repeat([0.05e-3, np.radians(0.05)], 3), 6)
-"""Smallest standard deviation that is ever stated, [m, rad]: no camera is perfect, and a covariance has an inverse."""
-OWN = 1.0 / 20.0
-"""What operations that share an error err by themselves, as part of the level."""
-OWN_FACT = f"o = {OWN:g}: part of the level by which each operation errs alone"
 LEAST_FACTOR = 0.3
 MOST_FACTOR = 4.0
 """Range of the factor of a part on the level."""
@@ -124,6 +85,7 @@ class HeavyTailed:
 
     level: Level
     freedom: float = FREEDOM
+    """Above 2, below which there is no covariance."""
 
     FACTS: ClassVar[Facts] = Facts(
         title="Student t of one scale per operation: few errors are far too large",
@@ -132,13 +94,6 @@ class HeavyTailed:
         parameters=(f"nu = {FREEDOM:g}: degrees of freedom, above 2",),
         states="L^2 in every direction, the true covariance, and the tails",
     )
-
-    def __post_init__(self) -> None:
-        require(
-            2.0 < self.freedom < inf,
-            f"a Student t with {self.freedom:g} degrees of freedom was given; give a finite number above 2, below "
-            "which it has no covariance.",
-        )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         sigma = self.level.sigma()
@@ -165,62 +120,4 @@ def part_factors(parts: Iterable[str], rng: np.random.Generator) -> Mapping[str,
     names = sorted(parts)
     return dict(
         zip(names, np.exp(rng.uniform(np.log(LEAST_FACTOR), np.log(MOST_FACTOR), len(names))).tolist(), strict=True)
-    )
-
-
-def observe_displaced(assembly: Assembly, demonstration: Demonstration, xi: Array, covariance: Array) -> Observation:
-    """Every goal seen at `T exp(xi)`; it states the covariance of xi, what carelessness adds, and at least the floor.
-
-    Args:
-        xi: (n, 6), body twists; where one is zero the goal is the one that was shown, bit for bit.
-        covariance: (6, 6) or (n, 6, 6), of xi, [m, rad].
-    """
-    goals = displaced(demonstration.goals, xi)
-    stated = floored(covariance + demonstration.careless)
-    return Observation(assembly, demonstration.start, goals, stated, np.ones(len(assembly), dtype=np.bool_))
-
-
-def displaced(goals: Array, xi: Array) -> Array:
-    """`T exp(xi)` of goals (n, 4, 4); where a twist is zero the goal as it is, bit for bit."""
-    return np.where(np.any(xi, axis=1, keepdims=True)[..., None], goals @ pose.exp(xi), goals)
-
-
-def observe_shared(
-    assembly: Assembly,
-    demonstration: Demonstration,
-    xi: Array,
-    own: Array,
-    shared: Callable[[Array], Sequence[SharedError]],
-) -> Observation:
-    """Every goal seen at `T exp(xi)`, by errors of which operations share most.
-
-    Args:
-        xi: (n, 6), body twists; where one is zero the goal is the one that was shown, bit for bit.
-        own: (6,), standard deviation of what of xi operations do not share, [m, rad]. Without any, operations would be
-            told to agree without an error, which no camera does.
-        shared: The goals that are seen, (n, 4, 4) -> what operations share.
-    """
-    seen = observe_displaced(assembly, demonstration, xi, np.diag(own**2))
-    return with_shared(seen, *shared(seen.goals)) if own.any() else seen
-
-
-def with_shared(observation: Observation, *shared: SharedError) -> Observation:
-    """An observation that states, beside what it states already, errors that operations share."""
-    stated = np.array(observation.covariance)
-    for error in shared:
-        stated[list(error.operations)] += error.added(observation.goals)
-    return replace(observation, covariance=stated, shared=(*observation.shared, *shared))
-
-
-def floored(covariance: Array) -> Array:
-    """The least covariance (n, 6, 6) above the given one that says at least `COVARIANCE_FLOOR` in every direction.
-
-    In units of the floor, eigenvalues below 1 are raised to 1, so the result is symmetric and positive definite.
-    """
-    # C / unit = V diag(w) V^t; directions with w < 1 are surer than the floor, and get w = 1.
-    unit = np.outer(COVARIANCE_FLOOR, COVARIANCE_FLOOR)
-    w, V = np.linalg.eigh(covariance / unit)
-    raised = unit * ((V * np.maximum(w, 1.0)[:, None]) @ np.swapaxes(V, -1, -2))
-    return np.where(
-        np.all(w >= 1.0, axis=1, keepdims=True)[..., None], covariance, (raised + np.swapaxes(raised, -1, -2)) / 2
     )

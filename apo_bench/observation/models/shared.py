@@ -6,12 +6,15 @@ from typing import ClassVar, final
 import numpy as np
 
 from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError, first_order
-from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.camera import Camera
+from apo_bench.observation.models.displaced import observe_displaced, observe_shared
+from apo_bench.observation.models.facts import Facts, Level
 from apo_bench.observation.models.fitted import view_error, view_frame
-from apo_bench.observation.models.isotropic import OWN, OWN_FACT, Facts, Level, observe_displaced, observe_shared
 
+OWN = 1.0 / 20.0
+"""What operations that share an error err by themselves, as part of the level."""
+OWN_FACT = f"o = {OWN:g}: part of the level by which each operation errs alone"
 CORRELATION = 0.9
 """Between the errors of an operation and the next."""
 
@@ -108,12 +111,6 @@ class Correlated:
         parameters=(f"rho = {CORRELATION:g}: correlation of the errors of an operation and the next", OWN_FACT),
         states="(1 + o^2) L^2 in every direction for each operation, and how operations are correlated; both are exact",
     )
-
-    def __post_init__(self) -> None:
-        require(
-            0.0 <= self.correlation <= 1.0,
-            f"a correlation of {self.correlation:g} was given; give a number from 0 to 1.",
-        )
 
     def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
         sigma = self.level.sigma()

@@ -17,7 +17,8 @@ from apo_bench.geometry import (
     symmetries,
     turn_about,
 )
-from apo_bench.observation.models.isotropic import Facts, Level, observe_displaced
+from apo_bench.observation.models.displaced import observe_displaced
+from apo_bench.observation.models.facts import Facts, Level
 
 WORSE = 3.0
 _MANY = 3.0

@@ -25,10 +25,11 @@ from apo_bench.correction.robust.noise_scale import likeliest_scale
 from apo_bench.correction.robust.search import Search
 from apo_bench.correction.robust.views import views_of
 from apo_bench.geometry import pose
-from apo_bench.observation.looking import Looks, observe
+from apo_bench.observation.looking import Looks
 from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.failures import Flipped
+from apo_bench.observation.models.failures import make_failures
 from apo_bench.observation.noise import Level, make_noise
+from apo_bench.observation.observing import observe
 from apo_bench.observation.relations import make_relations, with_relations
 from apo_bench.trial.outcome_columns import goal_errors
 from tests.correction.robust.test_looks import Again, at_the_same_place
@@ -170,7 +171,7 @@ def test_many_looks_solve_few_hypotheses(seed, monkeypatch):
     layout = draw_layout(scenario, np.random.default_rng([seed, 30, 0]), 0.0)
     n = len(layout.goals)
     first = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((n, 6, 6)))
-    noise = Flipped(Level(1.0, 1.0), repeat=0.8)
+    noise = make_failures("flips", Level(1.0, 1.0), repeat=0.8)
     seen = observe(first, noise, np.random.default_rng([seed, 30, 1]))
     looks = Looks(first, noise, np.random.default_rng([seed, 30, 2]), 4, first=np.random.default_rng([seed, 30, 1]))
     assert correct(seen, look=looks).ok

@@ -1,1 +1,0 @@
-"""What contacts tell of the noise of a camera, without the truth."""
