@@ -30,7 +30,7 @@ def one_line(text: str, longest: int) -> str:
     return text if text.isprintable() else ascii(text)[1:-1]
 
 
-def failed(what: str, error: Exception) -> InputError:
+def failed(what: str, error: BaseException) -> InputError:
     """`the noise model 'mine' failed: it raised RuntimeError('oops'); mend it, or use another.`, to raise from it."""
     try:
         text = " ".join(str(error).split()) if type(error) is ValueError else ""

@@ -112,7 +112,7 @@ def resolve(given: Any, known: Mapping[str, str], kind: str) -> Any:
             f"the {kind} '{given}' cannot be imported ({error}); start in the folder of its module, "
             "or put that on PYTHONPATH."
         ) from error
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         raise InputError(f"the {kind} '{given}' cannot be imported: its module raised {error!r}.") from error
     try:
         value: Any = module

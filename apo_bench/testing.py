@@ -16,7 +16,6 @@ from typing import Any, final
 import numpy as np
 
 from apo_bench.assembly import Correction, Observation
-from apo_bench.correction.own_code.own import OwnCorrectors
 from apo_bench.errors import require, unknown
 from apo_bench.records import CORRECTOR, TrialSettings
 from apo_bench.scoring.track import read_track
@@ -113,10 +112,9 @@ def assert_success_rate(
     require(isinstance(method, str) or callable(method), f"{method!r} was given as method; give a name or a corrector.")
     name = method if isinstance(method, str) else CORRECTOR
     cells = _cells(trials, name)
-    with OwnCorrectors() as own:
-        corrector = own.find(method) if ":" in name or not isinstance(method, str) else None
-        said: list[str] = []
-        decision = sequential_test(_outcomes(cells, seed, corrector, said), at_least, margin, error, most)
+    said: list[str] = []
+    corrector = None if isinstance(method, str) else method
+    decision = sequential_test(_outcomes(cells, seed, corrector, said), at_least, margin, error, most)
     if not decision.passed:
         called = name if isinstance(method, str) else getattr(method, "__name__", type(method).__name__)
         raise AssertionError(f"{called}, {decision.sentence}{''.join(f'; the last failure: {x}' for x in said[-1:])}.")
@@ -153,8 +151,7 @@ def _outcomes(cells: list[TrialSettings], seed: int, method: Any, said: list[str
             scenes[key] = scene, content_hash(scene.scenario, settings.scenario, scene.arm.files)
         scene, content = scenes[key]
         shown = simulate_demonstration(scene, settings.careless, settings.seed, settings.eye, settings.salt)
-        more = {} if method is None else {"method": method}
-        row = trial_row(settings, scene, shown, content, **more)
+        row = trial_row(settings, scene, shown, content, method=method)
         if row["success"] is not None:
             said += [str(row["sentence"])] * (not row["success"])
             yield row["success"]

@@ -55,7 +55,6 @@ BREACHES = {
         ("apo_bench.correction.baselines.paper", "apo_bench.correction.contact.problem"),
         ("apo_bench.correction.contact.starts", "apo_bench.correction.robust.views"),
         ("apo_bench.correction.robust.views", "apo_bench.correction.directions"),
-        ("apo_bench.correction.correctors", "apo_bench.correction.own_code.forms"),
     ],
     "contact": [
         ("apo_bench.correction.contact.problem", "apo_bench.correction.contact.solved"),

@@ -72,7 +72,6 @@ OPTIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "What is seen": ("--level", "--levels", "--level-mm", "--level-deg", "--noise", "--eye", "--observation"),
         "What a method makes of it": (
             *("--method", "--methods", "--relations", "--looks", "--abstain"),
-            "--corrector-limit",
         ),
         "Which trials": ("--trials", "--seed", "--salt-file"),
         "How they are simulated": ("--fidelity", "--timestep-ms", "--trial-limit"),

@@ -19,7 +19,6 @@ import typer
 from apo_bench.cli.printing import group
 from apo_bench.cli.setting_options import (
     CacheFolder,
-    CorrectorLimit,
     ScenarioArgument,
     axis_flag,
     axis_option,
@@ -33,7 +32,7 @@ from apo_bench.cli.setting_options import (
     writing,
 )
 from apo_bench.errors import InputError, require
-from apo_bench.records import CORRECTOR_LIMIT_S, FIRST_TRAINING_TRIAL, in_python
+from apo_bench.records import FIRST_TRAINING_TRIAL, in_python
 from apo_bench.scenario.file import load_scenario
 
 if TYPE_CHECKING:
@@ -90,7 +89,6 @@ def sweep_command(
     trial_limit: Annotated[
         float, typer.Option(metavar="SECONDS", help="A trial that takes longer has failed.")
     ] = 600.0,
-    corrector_limit: CorrectorLimit = CORRECTOR_LIMIT_S,
     cache: CacheFolder = None,
     backend: Annotated[str, typer.Option(help="local, or ray for a cluster.")] = "local",
     address: Annotated[str | None, typer.Option(help="Of the Ray cluster, host:port.")] = None,
@@ -111,7 +109,6 @@ def sweep_command(
             out,
             workers=used,
             limit_s=trial_limit,
-            corrector_limit_s=corrector_limit,
             backend=backend,
             address=address,
             command=command,

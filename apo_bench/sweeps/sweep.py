@@ -24,7 +24,6 @@ from apo_bench.errors import InputError, require, require_known
 from apo_bench.io import JsonNode, grouped, read_toml
 from apo_bench.records import (
     CORRECTOR,
-    CORRECTOR_LIMIT_S,
     LEVEL,
     SETTINGS,
     Limits,
@@ -60,7 +59,6 @@ def run_sweep(
     *,
     workers: int | None = None,
     limit_s: float = 600.0,
-    corrector_limit_s: float = CORRECTOR_LIMIT_S,
     backend: str = "local",
     address: str | None = None,
     command: str = "",
@@ -75,10 +73,9 @@ def run_sweep(
         grids: One, or several whose trials are united.
         out: The folder of the rows; made if it is not there, continued if it holds rows of the same sweep.
         workers: Processes; they are spawned, so a script that calls this needs the usual
-            `if __name__ == "__main__":`. None stands for this process with `local`: then no trial has a limit, but
-            its corrector has. With `ray`, None stands for all that the cluster has.
+            `if __name__ == "__main__":`. None stands for this process with `local`: then no trial has a limit. With
+            `ray`, None stands for all that the cluster has.
         limit_s: Wall time that a trial may take in a worker; what takes longer is a failed row.
-        corrector_limit_s: Of that, what a corrector named as `module:name` may take.
         backend: `local`, or `ray` for a cluster.
         address: Of a cluster that runs already.
         command: What to note in `run.json` as the command line.
@@ -102,15 +99,15 @@ def run_sweep(
     names = names_of(grids)
     # everything that has a name is found before a folder is made or a process started
     loaded = load_all(grids)
-    names.check(corrector_limit_s)
+    names.check()
     physics(grids[0].timestep_s)
     arm = find_arm(names.arm)
     # the whole path of the folder of demonstrations, as every worker finds it
     cache = None if cache is None else str(KeptDemonstrations(cache).folder.resolve())
-    lock = replace(environment_lock(names, loaded, arm.files, corrector_limit_s), cache=cache)
+    lock = replace(environment_lock(names, loaded, arm.files), cache=cache)
     files = {loaded[source].name: source for source in loaded if not is_named(source)}
     salt = None if salt_file is None else salt_of_sweep(salt_file, out)
-    limits = Limits(None if here else limit_s, corrector_limit_s)
+    limits = Limits(None if here else limit_s)
     run = run_record(
         described(grids, loaded), _content(lock, loaded, arm), code_files(), lock.versions, files, command, salt, limits
     )

@@ -9,18 +9,15 @@ from pathlib import Path
 from typing import Any, final
 
 from apo_bench.assembly import Observation
-from apo_bench.correction.own_code.own import OwnCorrectors
 from apo_bench.errors import InputError, require
 from apo_bench.io import read_text
 from apo_bench.records import (
-    CORRECTOR_LIMIT_S,
     LEVEL,
     RANGE,
     RECOGNISED,
     Row,
     TrialSettings,
     in_python,
-    parsed,
     read_salt,
 )
 from apo_bench.scenario import Scenario, in_the_air, load_scenario
@@ -64,8 +61,6 @@ class Request:
     observation: Path | None = None
     save_observation: Path | None = None
     video: Path | None = None
-    corrector_limit_s: float = CORRECTOR_LIMIT_S
-    """Wall time that a corrector named as `module:name` may take."""
     cache: Path | None = None
     """A folder where demonstrations are kept; the row is the same with and without it."""
 
@@ -198,11 +193,6 @@ def work_on(request: Request, spec: TrialSettings, say: Say, show: Show | None =
         say: Told "began" when the time of the trial begins to count, and "row" with the row when it ends.
         show: Called with what is to be seen of the trial, if anything was replayed.
     """
-    with OwnCorrectors(request.corrector_limit_s) as own:
-        _run_by(own.find(parsed(spec.method).plan), request, spec, say, show)
-
-
-def _run_by(method: Any, request: Request, spec: TrialSettings, say: Say, show: Show | None) -> None:
     scene = scene_of(spec)
     simulated = None
     track = FilmTrack() if request.video or show else None
@@ -219,10 +209,10 @@ def _run_by(method: Any, request: Request, spec: TrialSettings, say: Say, show: 
         aloft = in_the_air(seen.assembly, seen.start, _MEASURED_AIR_M)
         if aloft is not None:
             raise InputError(f"{path}, start, {aloft[0]}: {aloft[1]}; give the pose at which it stands.")
-        row = run_measured(spec, scene, seen, read_text(path, "observation file"), method=method, watch=watch)
+        row = run_measured(spec, scene, seen, read_text(path, "observation file"), watch=watch)
     else:
         simulated = demonstration_of(spec, scene, KeptDemonstrations(request.cache) if request.cache else None)
-        row = _drawn(request, spec, scene, simulated, method, watch)
+        row = _drawn(request, spec, scene, simulated, watch)
         if track is not None and row["sim_seconds"] is not None:
             seen = look(spec, scene, simulated)
     say("row", row)
@@ -250,7 +240,7 @@ def lost_request(request: Request, spec: TrialSettings, scenario: Scenario, code
 
 
 def _drawn(
-    request: Request, spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration, method: Any, watch: Any
+    request: Request, spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration, watch: Any
 ) -> Row:
     if request.save_observation:
         from apo_bench.files.json_forms import observation_form, write_form
@@ -258,4 +248,4 @@ def _drawn(
         name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
         write_form(observation_form(look(spec, scene, simulated), name), request.save_observation)
     content = content_hash(scene.scenario, spec.scenario, scene.arm.files)
-    return trial_row(spec, scene, simulated, content, method=method, watch=watch)
+    return trial_row(spec, scene, simulated, content, watch=watch)

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Sequence
-from contextlib import closing
 from itertools import chain
 from multiprocessing import connection
 from typing import Any, final
@@ -66,12 +65,12 @@ def run_locally(
 
 
 def _run_here(work: Sequence[Unit], lock: EnvironmentLock, emit: Emit, check: Check) -> None:
-    with closing(Worker(0, lock)) as worker:
-        for kind, *content in chain.from_iterable(map(worker.run, work)):
-            if kind == "row":
-                emit(*content)
-            else:
-                check()
+    worker = Worker(0, lock)
+    for kind, *content in chain.from_iterable(map(worker.run, work)):
+        if kind == "row":
+            emit(*content)
+        else:
+            check()
     check()
 
 
@@ -152,11 +151,11 @@ def _end_cleanly(members: Sequence[Member], dispatch: Dispatch) -> None:
 
 def _work(number: int, lock: EnvironmentLock, say: Any, pipe: Any) -> None:
     """The life of a worker process: unit after unit."""
-    with closing(Worker(number, lock)) as worker:
-        while (unit := pipe.recv()) is not None:
-            for message in worker.run(unit, stopped=pipe.poll):
-                say(*message)
-            say("done")
+    worker = Worker(number, lock)
+    while (unit := pipe.recv()) is not None:
+        for message in worker.run(unit, stopped=pipe.poll):
+            say(*message)
+        say("done")
 
 
 def run_request_alone(request: Request, limit_s: float) -> Row:

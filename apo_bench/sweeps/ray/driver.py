@@ -153,7 +153,6 @@ def runtime_files(names: Names) -> dict[str, Path]:
     Scenario files and the files of their parts, noise files, arms, the modules of what is given as `module:name`, and
     every Python module that importing these brought in.
     """
-    brought = names.check()
     arm = find_arm(names.arm)
     files = (
         *(Path(name) for name in names.scenarios if not is_named(name)),
@@ -162,7 +161,6 @@ def runtime_files(names: Names) -> dict[str, Path]:
         *arm.files,
         *(file for name in (*names.noises, *names.relations, *names.methods, names.arm) for file in own_files(name)),
         *(Path(path) for module in list(sys.modules.values()) if (path := getattr(module, "__file__", None))),
-        *(path for name in brought if (path := Path(name)).is_file()),
     )
     here = Path.cwd()
     own = [Path(path) for path in _installed()]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Protocol, final
 
 from apo_bench.errors import require
-from apo_bench.records import TrialSettings, is_own
+from apo_bench.records import TrialSettings
 from apo_bench.sweeps.work.environment_lock import Check, EnvironmentLock, Message, Unit, checked
 from apo_bench.sweeps.work.worker import Emit, timing
 from apo_bench.trial.outcome_columns import lost
@@ -171,6 +171,6 @@ class Dispatch:
         job.false_starts += 1
         if job.false_starts < self._false_starts:
             return False
-        if self._has_begun and is_own(job.trials[0].method):
+        if self._has_begun and ":" in job.trials[0].method:
             return True
         raise RuntimeError(why)

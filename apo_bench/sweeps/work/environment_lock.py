@@ -24,11 +24,11 @@ from pathlib import Path
 from types import FrameType
 from typing import Any, final
 
-from apo_bench.correction.own_code.own import check_correctors
+from apo_bench.correction.correctors import checked_corrector
 from apo_bench.errors import InputError, require
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.relations import make_relations
-from apo_bench.records import CORRECTOR_LIMIT_S, RECOGNISED, TrialSettings, parsed, with_simulated
+from apo_bench.records import RECOGNISED, UNCORRECTED, TrialSettings, parsed, with_simulated
 from apo_bench.scenario import Scenario, load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.trial.fingerprint import content_hash
@@ -56,18 +56,16 @@ class Names:
     noises: Mapping[str, float]
     """Noise model -> the highest level that it has [mm, degrees]."""
 
-    def check(self, corrector_limit_s: float = CORRECTOR_LIMIT_S) -> set[str]:
-        """Raise an `InputError` unless methods, relations and noise models can be had here.
-
-        Returns:
-            The files of the modules that correctors of one's own bring in.
-        """
+    def check(self) -> None:
+        """Raise an `InputError` unless methods, relations and noise models can be had here."""
         for noise, highest in self.noises.items():
             make_noise(noise, Level(highest, highest))
         for relations in self.relations:
             if relations not in RECOGNISED:
                 make_relations(relations)
-        return check_correctors((with_simulated(parsed(method).plan) for method in self.methods), corrector_limit_s)
+        for plan in {parsed(method).plan: None for method in self.methods}:
+            if plan not in UNCORRECTED:
+                checked_corrector(with_simulated(plan))
 
     def hashes(self) -> dict[str, str]:
         """Of noise files and of the modules of `module:name`, as they are here: what it is -> its hash."""
@@ -88,8 +86,6 @@ class EnvironmentLock:
     """What was given for a scenario -> its `content_hash`."""
     versions: Mapping[str, str]
     """Package -> version, of the packages that a result depends on."""
-    corrector_limit_s: float = CORRECTOR_LIMIT_S
-    """Wall time that a corrector in a process of its own may take."""
     names: Names | None = None
     """None where everything is on one machine."""
     hashes: Mapping[str, str] = field(default_factory=dict)
@@ -102,7 +98,7 @@ class EnvironmentLock:
         self.check_versions()
         if self.names is None:
             return
-        self.names.check(self.corrector_limit_s)
+        self.names.check()
         here = self.names.hashes()
         for name, content in self.hashes.items():
             require(
@@ -135,7 +131,6 @@ def environment_lock(
     names: Names,
     loaded: Mapping[str, Scenario],
     arm_files: Path | tuple[Path, ...],
-    corrector_limit_s: float = CORRECTOR_LIMIT_S,
 ) -> EnvironmentLock:
     """The lock of a sweep that is started here.
 
@@ -143,7 +138,7 @@ def environment_lock(
         loaded: Every scenario by what was given for it.
     """
     content = {source: content_hash(scenario, source, arm_files) for source, scenario in loaded.items()}
-    return EnvironmentLock(content, versions(), corrector_limit_s, names, names.hashes())
+    return EnvironmentLock(content, versions(), names, names.hashes())
 
 
 def versions() -> dict[str, str]:

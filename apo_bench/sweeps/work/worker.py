@@ -3,14 +3,10 @@
 import platform
 import time
 from collections.abc import Callable, Iterator, Mapping
-from functools import partial
 from typing import Any, final
 
-from apo_bench.assembly import Observation, Outcome
-from apo_bench.correction.correctors import CorrectorMisbehaved
-from apo_bench.correction.own_code.own import OwnCorrectors
-from apo_bench.errors import InputError
-from apo_bench.records import KEY, Row, TrialSettings, parsed, row_key, sentence
+from apo_bench.assembly import Outcome
+from apo_bench.records import KEY, Row, TrialSettings, row_key, sentence
 from apo_bench.simulation.execution import ReplayCache
 from apo_bench.simulation.scene import Scene
 from apo_bench.sweeps.work.environment_lock import EnvironmentLock, Message, Unit
@@ -28,7 +24,7 @@ Emit = Callable[[Row, Timing], None]
 
 @final
 class Worker:
-    """Runs units of work; compiles each scene once, and imports each corrector of one's own once."""
+    """Runs units of work; compiles each scene once."""
 
     def __init__(self, number: int, lock: EnvironmentLock) -> None:
         """Args:
@@ -42,7 +38,6 @@ class Worker:
         self._number = number
         self._lock = lock
         self._scenes: dict[tuple[Any, ...], tuple[Scene, str]] = {}
-        self._own = OwnCorrectors(lock.corrector_limit_s)
         self._kept = None if lock.cache is None else KeptDemonstrations(lock.cache)
 
     def run(self, unit: Unit, stopped: Callable[[], bool] = lambda: False) -> Iterator[Message]:
@@ -63,7 +58,6 @@ class Worker:
                 return
             start = time.perf_counter()
             scene, content = self._scene(spec)
-            method = self._method(parsed(spec.method).plan)
             compile_s = time.perf_counter() - start
             yield ("began",)
             start = time.perf_counter()
@@ -72,23 +66,12 @@ class Worker:
                 demonstrations[key] = demonstration_of(spec, scene, self._kept)
             demonstrate_s = time.perf_counter() - start
             start = time.perf_counter()
-            row = trial_row(spec, scene, demonstrations[key], content, method=method, cache=cache)
+            row = trial_row(spec, scene, demonstrations[key], content, cache=cache)
             yield (
                 "row",
                 row,
                 timing(row, compile_s, demonstrate_s, time.perf_counter() - start, {"worker": self._number}),
             )
-
-    def close(self) -> None:
-        """End the processes of correctors."""
-        self._own.close()
-
-    def _method(self, name: str) -> Any:
-        """The corrector; if it could be imported when the sweep began and cannot now, that is its own failure."""
-        try:
-            return self._own.find(name)
-        except InputError as error:
-            return partial(_raise, CorrectorMisbehaved(str(error)))
 
     def _scene(self, spec: TrialSettings) -> tuple[Scene, str]:
         key = scene_key(spec)
@@ -128,7 +111,3 @@ def timing(
         "host": platform.node(),
         **worker,
     }
-
-
-def _raise(error: Exception, observation: Observation) -> None:
-    raise error
