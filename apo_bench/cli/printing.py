@@ -70,9 +70,7 @@ OPTIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "Task and robot": ("--careless", "--clearance", "--arm", "--grasp", "--robot-error"),
         "A robot that feels": ("--wrench", "--stated-error"),
         "What is seen": ("--level", "--levels", "--level-mm", "--level-deg", "--noise", "--eye", "--observation"),
-        "What a method makes of it": (
-            *("--method", "--methods", "--relations", "--looks", "--abstain"),
-        ),
+        "What a method makes of it": (*("--method", "--methods", "--relations", "--looks", "--abstain"),),
         "Which trials": ("--trials", "--seed", "--salt-file"),
         "How they are simulated": ("--fidelity", "--timestep-ms", "--trial-limit"),
         "Where they run": ("--workers", "--backend", "--address"),

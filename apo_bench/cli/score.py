@@ -113,7 +113,7 @@ def score_command(
             typer.echo(f"{track.name}: {track.title}", err=True)
 
     try:
-        with entrant(method, command, answers, rows, tracks, **how) as (found, how):
+        with entrant(method, command, answers, rows, tracks, **how) as found:
             entry = score(
                 found,
                 tracks,

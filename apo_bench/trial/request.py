@@ -239,9 +239,7 @@ def lost_request(request: Request, spec: TrialSettings, scenario: Scenario, code
     return row | {"spec_hash": spec_hash(spec, content, text), **MEASURED}
 
 
-def _drawn(
-    request: Request, spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration, watch: Any
-) -> Row:
+def _drawn(request: Request, spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration, watch: Any) -> Row:
     if request.save_observation:
         from apo_bench.files.json_forms import observation_form, write_form
 
