@@ -22,7 +22,7 @@ from apo_bench.scoring.track import read_track
 from apo_bench.simulation.scene import Scene
 from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.trial.fingerprint import content_hash
-from apo_bench.trial.stages import scene_key, scene_of, simulate_demonstration
+from apo_bench.trial.stages import demonstration_of, scene_key, scene_of
 from apo_bench.trial.trial import trial_row
 
 _MOST = 100_000
@@ -150,8 +150,7 @@ def _outcomes(cells: list[TrialSettings], seed: int, method: Any, said: list[str
             scene = scene_of(settings)
             scenes[key] = scene, content_hash(scene.scenario, settings.scenario, scene.arm.files)
         scene, content = scenes[key]
-        shown = simulate_demonstration(scene, settings.careless, settings.seed, settings.eye, settings.salt)
-        row = trial_row(settings, scene, shown, content, method=method)
+        row = trial_row(settings, scene, demonstration_of(settings, scene), content, method=method)
         if row["success"] is not None:
             said += [str(row["sentence"])] * (not row["success"])
             yield row["success"]

@@ -74,7 +74,7 @@ OPTIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "Which trials": ("--trials", "--seed", "--salt-file"),
         "How they are simulated": ("--fidelity", "--timestep-ms", "--trial-limit"),
         "Where they run": ("--workers", "--backend", "--address"),
-        "Files": ("--out", "--save-observation", "--video", "--cache"),
+        "Files": ("--out", "--save-observation", "--video"),
         "What is shown": ("--view", "--port", "--json"),
     }
 )

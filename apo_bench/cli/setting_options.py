@@ -151,14 +151,6 @@ ScenarioArgument = Annotated[
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")]
 StatedMm = Annotated[float | None, typer.Option(help="Its standard deviation where it states none, mm.")]
 StatedDeg = Annotated[float | None, typer.Option(help="The same in degrees.")]
-CacheFolder = Annotated[
-    Path | None,
-    typer.Option(
-        parser=path_given,
-        metavar="<path>",
-        help="Keep demonstrations in this folder, for the next time; results are the same.",
-    ),
-]
 
 
 def takes(options: Iterable[Parameter]) -> Callable[[Command], Command]:

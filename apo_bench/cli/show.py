@@ -15,7 +15,6 @@ from apo_bench.assembly import Observation
 from apo_bench.cli.printing import print_json
 from apo_bench.cli.setting_options import (
     NO_RESULT,
-    CacheFolder,
     ScenarioArgument,
     StatedDeg,
     StatedMm,
@@ -159,7 +158,6 @@ def run_replay(
         float | None,
         typer.Option(metavar="SECONDS", help="End a trial that takes longer; it runs in a process of its own."),
     ] = None,
-    cache: CacheFolder = None,
     view: Annotated[bool, typer.Option("--view", help="Then look at it and step through it, as `view` does.")] = False,
     port: Port = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the row, one JSON object, and nothing else.")] = False,
@@ -183,7 +181,6 @@ def run_replay(
         observation=observation,
         save_observation=save_observation,
         video=video,
-        cache=cache,
     )
     stories: list[Story] = []
     try:

@@ -18,7 +18,6 @@ import typer
 
 from apo_bench.cli.printing import group
 from apo_bench.cli.setting_options import (
-    CacheFolder,
     ScenarioArgument,
     axis_flag,
     axis_option,
@@ -89,7 +88,6 @@ def sweep_command(
     trial_limit: Annotated[
         float, typer.Option(metavar="SECONDS", help="A trial that takes longer has failed.")
     ] = 600.0,
-    cache: CacheFolder = None,
     backend: Annotated[str, typer.Option(help="local, or ray for a cluster.")] = "local",
     address: Annotated[str | None, typer.Option(help="Of the Ray cluster, host:port.")] = None,
     **options: Any,
@@ -113,7 +111,6 @@ def sweep_command(
             address=address,
             command=command,
             salt_file=salt_file,
-            cache=cache,
         )
     except KeyboardInterrupt as error:
         raise interrupted(error, "; what had ended is kept, and the same command continues") from error

@@ -47,7 +47,6 @@ from apo_bench.sweeps.work.environment_lock import Check, EnvironmentLock, Names
 from apo_bench.sweeps.work.worker import Timing, row_within_limit
 from apo_bench.trial.fingerprint import code_files, spec_hash
 from apo_bench.trial.inputs import content_pieces
-from apo_bench.trial.kept_demonstrations import KeptDemonstrations
 
 _LARGEST_WORKERS = 256
 _BACKENDS = ("local", "ray")
@@ -63,7 +62,6 @@ def run_sweep(
     address: str | None = None,
     command: str = "",
     salt_file: str | Path | None = None,
-    cache: str | Path | None = None,
 ) -> list[Row]:
     """Run every trial of a sweep that has no row yet.
 
@@ -81,8 +79,6 @@ def run_sweep(
         command: What to note in `run.json` as the command line.
         salt_file: Holds the salt of the trials, and is made if it is not there; None for trials that everybody can
             draw.
-        cache: A folder where demonstrations are kept for other sweeps, made if it is not there. The rows are the same
-            with and without it.
 
     Returns:
         All rows of the folder, in the order in which they ended.
@@ -102,9 +98,7 @@ def run_sweep(
     names.check()
     physics(grids[0].timestep_s)
     arm = find_arm(names.arm)
-    # the whole path of the folder of demonstrations, as every worker finds it
-    cache = None if cache is None else str(KeptDemonstrations(cache).folder.resolve())
-    lock = replace(environment_lock(names, loaded, arm.files), cache=cache)
+    lock = environment_lock(names, loaded, arm.files)
     files = {loaded[source].name: source for source in loaded if not is_named(source)}
     salt = None if salt_file is None else salt_of_sweep(salt_file, out)
     limits = Limits(None if here else limit_s)

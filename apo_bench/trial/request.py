@@ -27,11 +27,11 @@ from apo_bench.simulation.film.still import FilmTrack
 from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.scene import Scene, check_film
 from apo_bench.trial.fingerprint import content_hash, spec_hash
-from apo_bench.trial.kept_demonstrations import KeptDemonstrations, demonstration_of
 from apo_bench.trial.outcome_columns import lost
 from apo_bench.trial.stages import (
     SimulatedDemonstration,
     demonstration_failure,
+    demonstration_of,
     observe_demonstration,
     scene_of,
 )
@@ -61,8 +61,6 @@ class Request:
     observation: Path | None = None
     save_observation: Path | None = None
     video: Path | None = None
-    cache: Path | None = None
-    """A folder where demonstrations are kept; the row is the same with and without it."""
 
 
 def requested_settings(request: Request, clearance_mm: float) -> TrialSettings:
@@ -144,8 +142,8 @@ def look(spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration) -
 def _refuse_contradictions(request: Request, options: Mapping[str, Any]) -> None:
     may_be = options.get("relations") in ("given", *RECOGNISED)
     drawn = [name for name in _DRAWN if name in options and not (name == "relations" and may_be)]
-    files = [name for name in ("save_observation", "cache") if getattr(request, name) is not None]
-    for name in (*drawn, *files):
+    saved = ["save_observation"] if request.save_observation is not None else []
+    for name in (*drawn, *saved):
         raise InputError(
             f"{_option(name)} was given together with --observation, which draws nothing; leave one of them out."
         )
@@ -174,13 +172,10 @@ def checked_request(request: Request) -> tuple[Scenario, TrialSettings]:
     """The scenario and the settings of a request.
 
     Raises:
-        InputError: A setting that is not allowed, two that contradict each other, no place for demonstrations, or a
-            film that cannot be written.
+        InputError: A setting that is not allowed, two that contradict each other, or a film that cannot be written.
     """
     scenario = load_scenario(request.scenario)
     settings = requested_settings(request, scenario.clearance_mm)
-    if request.cache is not None:
-        KeptDemonstrations(request.cache)
     if request.video is not None:
         check_film(request.video)
     return scenario, settings
@@ -211,7 +206,7 @@ def work_on(request: Request, spec: TrialSettings, say: Say, show: Show | None =
             raise InputError(f"{path}, start, {aloft[0]}: {aloft[1]}; give the pose at which it stands.")
         row = run_measured(spec, scene, seen, read_text(path, "observation file"), watch=watch)
     else:
-        simulated = demonstration_of(spec, scene, KeptDemonstrations(request.cache) if request.cache else None)
+        simulated = demonstration_of(spec, scene)
         row = _drawn(request, spec, scene, simulated, watch)
         if track is not None and row["sim_seconds"] is not None:
             seen = look(spec, scene, simulated)

@@ -48,6 +48,7 @@ from apo_bench.trial.stages import (
     WRENCH,
     SimulatedDemonstration,
     demonstration_failure,
+    demonstration_of,
     draw_robot_error,
     looks_at,
     observe_demonstration,
@@ -55,7 +56,6 @@ from apo_bench.trial.stages import (
     range_sensor,
     replay_and_judge,
     scene_of,
-    simulate_demonstration,
     stream,
     stream_key,
     trial_outcome,
@@ -115,9 +115,7 @@ def run_trial(
         InputError: The noise model, the relations or the corrector are unknown or returned what they must not.
     """
     scene = scene or scene_of(settings)
-    simulated = simulated or simulate_demonstration(
-        scene, settings.careless, settings.seed, settings.eye, settings.salt
-    )
+    simulated = simulated or demonstration_of(settings, scene)
     content = content or content_hash(scene.scenario, settings.scenario, scene.arm.files)
     first = head(settings, scene.scenario, spec_hash(settings, content))
     first |= {"demonstration": simulated.demonstration.code}

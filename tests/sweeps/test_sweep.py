@@ -29,8 +29,8 @@ from apo_bench.sweeps import sweep as runner
 from apo_bench.sweeps.grid import load_all, units
 from apo_bench.sweeps.work import worker
 from apo_bench.sweeps.work.environment_lock import Unit
-from apo_bench.trial import kept_demonstrations, trial
 from apo_bench.trial import outcome_columns as row_module
+from apo_bench.trial import stages, trial
 from apo_bench.trial.fingerprint import spec_hash
 from apo_bench.trial.outcome_columns import result
 
@@ -53,9 +53,8 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
         did["demonstration"] += 1
         return f"{scene.scenario.name} {careless} {seed} {eye}"
 
-    def run_trial(spec: Any, scene: Any, *, simulated: str, content: str, method: Any, cache: Any) -> dict[str, Any]:
+    def run_trial(spec: Any, scene: Any, *, simulated: str, content: str, cache: Any) -> dict[str, Any]:
         did["trial"] += 1
-        assert method == spec.method
         assert simulated == f"{scene.scenario.name} {spec.careless} {spec.seed} {spec.eye}"
         hashed = spec_hash(spec, content)
         success = spec.seed % 2 == 0
@@ -74,7 +73,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
     monkeypatch.setattr("apo_bench.sweeps.grid.load_scenario", LOAD)
     monkeypatch.setattr(row_module, "load_scenario", LOAD)
     monkeypatch.setattr(worker, "scene_of", compiled)
-    monkeypatch.setattr(kept_demonstrations, "simulate_demonstration", record)
+    monkeypatch.setattr(stages, "simulate_demonstration", record)
     monkeypatch.setattr(trial, "run_trial", run_trial)
     return did
 

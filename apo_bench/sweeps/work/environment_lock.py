@@ -90,8 +90,6 @@ class EnvironmentLock:
     """None where everything is on one machine."""
     hashes: Mapping[str, str] = field(default_factory=dict)
     """Of `names`."""
-    cache: str | None = None
-    """The folder where workers keep demonstrations; it changes nothing but the time that trials take."""
 
     def check_here(self) -> None:
         """Raise an `InputError` unless trials run on this machine as where the sweep was started."""

@@ -11,9 +11,8 @@ from apo_bench.simulation.execution import ReplayCache
 from apo_bench.simulation.scene import Scene
 from apo_bench.sweeps.work.environment_lock import EnvironmentLock, Message, Unit
 from apo_bench.trial.fingerprint import content_hash
-from apo_bench.trial.kept_demonstrations import KeptDemonstrations, demonstration_of
 from apo_bench.trial.outcome_columns import result
-from apo_bench.trial.stages import SimulatedDemonstration, scene_key, scene_of
+from apo_bench.trial.stages import SimulatedDemonstration, demonstration_of, scene_key, scene_of
 from apo_bench.trial.trial import trial_row
 
 Timing = dict[str, Any]
@@ -31,14 +30,12 @@ class Worker:
         number: Tells workers apart in `timing.jsonl`.
 
         Raises:
-            InputError: Packages of other versions are installed here, or demonstrations cannot be kept where they
-                should be.
+            InputError: Packages of other versions are installed here.
         """
         lock.check_versions()
         self._number = number
         self._lock = lock
         self._scenes: dict[tuple[Any, ...], tuple[Scene, str]] = {}
-        self._kept = None if lock.cache is None else KeptDemonstrations(lock.cache)
 
     def run(self, unit: Unit, stopped: Callable[[], bool] = lambda: False) -> Iterator[Message]:
         """Run the trials of a unit in their order: `began` and `row` for each, as in `messages`.
@@ -63,7 +60,7 @@ class Worker:
             start = time.perf_counter()
             key = (spec.careless, spec.eye)
             if key not in demonstrations:
-                demonstrations[key] = demonstration_of(spec, scene, self._kept)
+                demonstrations[key] = demonstration_of(spec, scene)
             demonstrate_s = time.perf_counter() - start
             start = time.perf_counter()
             row = trial_row(spec, scene, demonstrations[key], content, cache=cache)
