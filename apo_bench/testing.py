@@ -137,7 +137,7 @@ def _cells(trials: Any, method: str) -> list[TrialSettings]:
     )
     track = read_track(trials)
     grids: list[SweepSettings] = [replace(grid, trials=1) for arm in track.arms for grid in track.of(method, arm)]
-    return [trial for grid in grids for unit in units([grid], load_all([grid])) for trial in unit.trials]
+    return [trial for grid in grids for unit in units([grid], load_all([grid])) for trial in unit]
 
 
 def _outcomes(cells: list[TrialSettings], seed: int, method: Any, said: list[str]) -> Iterator[bool]:

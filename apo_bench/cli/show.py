@@ -188,7 +188,7 @@ def run_replay(
             if trial_limit is None:
                 row = run_request(request, stories.append if view else None)
             else:
-                from apo_bench.sweeps.local.pool import run_request_alone
+                from apo_bench.sweeps.pool import run_request_alone
 
                 row = run_request_alone(request, trial_limit)
     except KeyboardInterrupt as error:

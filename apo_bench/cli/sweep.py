@@ -124,7 +124,7 @@ def sweep_command(
 def _grids(scenarios: list[str], options: Mapping[str, Any]) -> tuple[SweepSettings, ...]:
     """The grid of the options, or those of a sweep file with some settings replaced."""
     from apo_bench.sweeps.grid import AXES, SweepSettings
-    from apo_bench.sweeps.sweep import is_sweep_file, read_sweep
+    from apo_bench.sweeps.sweep_file import is_sweep_file, read_sweep
 
     axes = {axis_option(info): info for info in AXES}
     texts = {axes[option]: text for option, text in options.items() if option in axes}

@@ -20,7 +20,7 @@ from apo_bench.records import KEY, LEVEL, REQUIRED, ROW_FIELDS, SETTINGS, look_u
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.report.comparison.compare import compare
 from apo_bench.statistics import tally
-from apo_bench.sweeps.sweep import SWEEP_KEYS
+from apo_bench.sweeps.sweep_file import SWEEP_KEYS
 
 ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "tests" / "kept" / "row7"
