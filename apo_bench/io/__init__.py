@@ -27,7 +27,8 @@ from apo_bench.io.ordinary_files import (
     to_write,
     write_whole,
 )
-from apo_bench.io.processes import SAFE_PATH, descendants, end_descendants, environment, flush, redirect_output
+from apo_bench.io.processes import SAFE_PATH, environment
+from apo_bench.io.streams import redirect_output
 from apo_bench.io.strict_csv import Columns, CsvRow, check_separator, has_parquet, read_csv, write_columns, write_csv
 from apo_bench.io.words import (
     CONTROL,
@@ -60,12 +61,9 @@ __all__ = (
     "columns",
     "decoded",
     "default_looks",
-    "descendants",
     "direction",
     "each_line",
-    "end_descendants",
     "environment",
-    "flush",
     "grouped",
     "half_letter",
     "has_parquet",

@@ -1,19 +1,11 @@
-"""Processes below a process, how they are ended with all that they started, and what one has not written yet; standard
-streams that may be closed, full or redirected, and a current folder that may be gone.
-"""
+"""What processes that are started find in their environment."""
 
-import ctypes
 import os
-import signal
-import sys
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager, redirect_stdout, suppress
-from pathlib import Path
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 
 SAFE_PATH = "PYTHONSAFEPATH"
 """Without it, `python -c` looks for Python's own modules in the current folder, and so do processes of a pool."""
-_ROUNDS = 100
-"""What goes on starting others while it is being ended is looked for so many times."""
 
 
 @contextmanager
@@ -27,131 +19,3 @@ def environment(variables: Mapping[str, str]) -> Iterator[None]:
         for name in variables:
             os.environ.pop(name, None)
         os.environ.update(before)
-
-
-def descendants(pid: int) -> list[int]:
-    """Children, their children and so on, those that have ended and are not waited for too; empty without /proc."""
-    known = [pid]
-    for process in known:  # which grows meanwhile
-        known += _children(process)
-    return known[1:]
-
-
-def end_descendants(pid: int, spared: Collection[int] = ()) -> None:
-    """Kill them all, but for the spared; whoever lost its parent and was not taken in by `pid` is not found."""
-    ended = {*spared}
-    for _ in range(_ROUNDS):
-        alive = [process for process in descendants(pid) if process not in ended]
-        if not alive:
-            return
-        for process in alive:
-            with suppress(OSError):
-                os.kill(process, signal.SIGKILL)
-        ended.update(alive)
-
-
-def flush() -> None:
-    """Write to standard output what Python and the C library still hold back."""
-    for stream in (sys.stdout, sys.__stdout__):
-        if stream is not None:
-            with suppress(OSError, ValueError):
-                stream.flush()
-    with suppress(AttributeError, OSError, TypeError):
-        ctypes.CDLL(None).fflush(None)
-
-
-def _children(pid: int) -> list[int]:
-    """The processes that a process has started, from what Linux lists for each of its threads."""
-    children: list[int] = []
-    with suppress(OSError):
-        for thread in Path(f"/proc/{pid}/task").iterdir():
-            children += map(int, (thread / "children").read_text().split())
-    return children
-
-
-class Unusable(Exception):
-    """Nothing can be printed, or no path be found: one sentence."""
-
-
-def prepare() -> str:
-    """The current folder; standard input and error, if they are closed, lead nowhere.
-
-    Nothing may be opened before: it would take the number of a closed stream, and be printed into.
-
-    Raises:
-        Unusable: Standard output is closed, or the current folder was deleted.
-    """
-    if sys.stderr is None:
-        _lead_nowhere(2)
-        sys.stderr = os.fdopen(2, "w", errors="backslashreplace", closefd=False)
-    if sys.stdin is None:
-        _lead_nowhere(0)
-        sys.stdin = os.fdopen(0, closefd=False)
-    if sys.stdout is None:
-        raise Unusable("standard output is closed; send it to a file, or to /dev/null.")
-    if hasattr(sys.stdout, "reconfigure"):
-        sys.stdout.reconfigure(errors="backslashreplace")
-    try:
-        return str(Path.cwd())
-    except OSError as error:
-        raise Unusable(
-            f"the current folder cannot be found ({error.strerror}); change into one that exists."
-        ) from error
-
-
-def finish() -> None:
-    """Print what is held back.
-
-    Raises:
-        OSError: Standard output is full, or nobody reads it any more.
-    """
-    if sys.stdout is not None:
-        sys.stdout.flush()
-
-
-def give_up(error: OSError) -> str:
-    """What is to be said when something could not be written; what standard output holds back is thrown away."""
-    if error.filename is not None:
-        return f"{error.filename}: {error.strerror}."
-    with suppress(OSError, ValueError, AttributeError):
-        if not isinstance(error, BrokenPipeError):
-            sys.stdout.flush()
-            return f"a file could not be read or written ({error.strerror or error}); is there room on the disk?"
-    with suppress(OSError, ValueError):
-        _lead_nowhere(1)
-    sys.stdout = sys.__stdout__
-    return f"standard output could not be written ({error.strerror or error}); what was not printed is lost."
-
-
-@contextmanager
-def redirect_output(wanted: bool) -> Iterator[None]:
-    """If wanted, what is printed meanwhile, by whatever code and below Python too, goes to standard error.
-
-    Standard output is then left to one JSON object.
-    """
-    if not wanted:
-        yield
-        return
-    flush()
-    try:
-        ours = os.dup(1)
-    except OSError:
-        ours = None
-    try:
-        if ours is not None:
-            with suppress(OSError):
-                os.dup2(2, 1)
-        with redirect_stdout(sys.stderr):
-            yield
-    finally:
-        flush()
-        if ours is not None:
-            os.dup2(ours, 1)
-            os.close(ours)
-
-
-def _lead_nowhere(number: int) -> None:
-    nowhere = os.open(os.devnull, os.O_RDWR)
-    if nowhere != number:
-        os.dup2(nowhere, number)
-        os.close(nowhere)

@@ -38,7 +38,6 @@ from apo_bench.trial.stages import (
 from apo_bench.trial.story import Story, trial_story
 from apo_bench.trial.trial import MEASURED, noise_of, run_measured, trial_row
 
-Say = Callable[..., None]
 Show = Callable[[Story], None]
 _DRAWN = (
     *(LEVEL.name, "level_mm", "level_deg", "careless", "noise", "relations"),
@@ -162,39 +161,13 @@ def run_request(request: Request, show: Show | None = None) -> Row:
     Raises:
         InputError: A setting that is not allowed, or two that contradict each other.
     """
-    _, settings = checked_request(request)
-    rows: list[Row] = []
-    work_on(request, settings, lambda kind, *news: rows.extend(news), show)
-    return rows[0]
-
-
-def checked_request(request: Request) -> tuple[Scenario, TrialSettings]:
-    """The scenario and the settings of a request.
-
-    Raises:
-        InputError: A setting that is not allowed, two that contradict each other, or a film that cannot be written.
-    """
-    scenario = load_scenario(request.scenario)
-    settings = requested_settings(request, scenario.clearance_mm)
-    if request.video is not None:
-        check_film(request.video)
-    return scenario, settings
-
-
-def work_on(request: Request, spec: TrialSettings, say: Say, show: Show | None = None) -> None:
-    """Run what was asked for and say its row, then write the film.
-
-    Args:
-        say: Told "began" when the time of the trial begins to count, and "row" with the row when it ends.
-        show: Called with what is to be seen of the trial, if anything was replayed.
-    """
+    _, spec = checked_request(request)
     scene = scene_of(spec)
     simulated = None
     track = FilmTrack() if request.video or show else None
     watch = None if track is None else track.hooks
     if request.video:
         renderer(scene.work.model, 16, 12).close()  # is there anything to draw with? asked before the trial is run
-    say("began")
     seen: Observation | None = None
     if request.observation:
         from apo_bench.files.observation import read_stated
@@ -210,14 +183,27 @@ def work_on(request: Request, spec: TrialSettings, say: Say, show: Show | None =
         row = _drawn(request, spec, scene, simulated, watch)
         if track is not None and row["sim_seconds"] is not None:
             seen = look(spec, scene, simulated)
-    say("row", row)
     if track is None or seen is None or row["sim_seconds"] is None:
-        return
+        return row
     story = trial_story(spec, scene, seen, track, row, simulated)
     if request.video:
         write_film(scene.scenario.assembly, story.assembled, story.chapters, request.video)
     if show is not None:
         show(story)
+    return row
+
+
+def checked_request(request: Request) -> tuple[Scenario, TrialSettings]:
+    """The scenario and the settings of a request.
+
+    Raises:
+        InputError: A setting that is not allowed, two that contradict each other, or a film that cannot be written.
+    """
+    scenario = load_scenario(request.scenario)
+    settings = requested_settings(request, scenario.clearance_mm)
+    if request.video is not None:
+        check_film(request.video)
+    return scenario, settings
 
 
 def lost_request(request: Request, spec: TrialSettings, scenario: Scenario, code: str) -> Row:
