@@ -27,10 +27,11 @@ def stoppable() -> Iterator[None]:
         raise Stopped(number)
 
     in_main = threading.current_thread() is threading.main_thread()
-    known = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    ours = [number for number in known if in_main and signal.getsignal(number) is signal.SIG_DFL]
-    for number in ours:
-        signal.signal(number, stop)
+    ours = []
+    for number in {signal.SIGTERM, getattr(signal, "SIGHUP", signal.SIGTERM)}:
+        if in_main and signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, stop)
+            ours.append(number)
     try:
         yield
     except KeyboardInterrupt as error:

@@ -83,7 +83,8 @@ def run_sweep(
     loaded = load_all(grids)
     _check_names(grids)
     physics(grids[0].timestep_s)
-    arm = find_arm(grids[0].arm)
+    arm_name = grids[0].arm
+    arm = find_arm(arm_name)
     content = {source: content_hash(scenario, source, arm.files) for source, scenario in loaded.items()}
     inputs = SweepInputs(content, versions())
     salt = None if salt_file is None else salt_of_sweep(salt_file, out)
@@ -108,16 +109,17 @@ def run_sweep(
 
             if here:
                 worker = Worker(inputs, {"worker": 0})
-                for ended in (each for batch in batches for each in worker.run(batch)):
-                    emit(*ended)
+                for batch in batches:
+                    for ended in worker.run(batch):
+                        emit(*ended)
             elif backend == "local":
                 run_locally(batches, inputs, workers or 1, limit_s, emit)
             else:
                 from apo_bench.sweeps.cluster import run_on_cluster
                 from apo_bench.sweeps.travelling import travelling_files
 
-                names = [name for axis in ("methods", "noises", "relations") for name in _names(grids, axis)]
-                files = travelling_files(loaded, arm.files, [*names, grids[0].arm])
+                names = (*_names(grids, "methods"), *_names(grids, "noises"), *_names(grids, "relations"), arm_name)
+                files = travelling_files(loaded, arm.files, names)
                 run_on_cluster(batches, inputs, workers, limit_s, emit, address, files)
         return store.rows()
 
@@ -141,7 +143,8 @@ def _left(
                 f"'{store.folder}' holds a row of {loaded[trial.scenario].name}, method {trial.method}, seed "
                 f"{trial.seed}, that was made with other code or settings; choose another folder.",
             )
-        yield from (tuple(left[i : i + BATCH]) for i in range(0, len(left), BATCH))
+        for first in range(0, len(left), BATCH):
+            yield tuple(left[first : first + BATCH])
 
 
 def _check_executor(workers: int | None, limit_s: float, backend: str, address: str | None) -> None:

@@ -26,7 +26,8 @@ def travelling_files(
     for source, scenario in loaded.items():
         if not is_named(source):
             files.append(Path(source))
-            files.extend(file for part in scenario.part_files.values() for file in part_files_of(part))
+            for part in scenario.part_files.values():
+                files.extend(part_files_of(part))
     for name in names:
         noise = noise_path(name)
         files.extend(own_files(name) if noise is None else (noise,))
