@@ -16,14 +16,13 @@ from typing import Any, final
 import numpy as np
 
 from apo_bench.assembly import Correction, Observation
-from apo_bench.correction.own_code.own import OwnCorrectors
 from apo_bench.errors import require, unknown
 from apo_bench.records import CORRECTOR, TrialSettings
 from apo_bench.scoring.track import read_track
 from apo_bench.simulation.scene import Scene
 from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.trial.fingerprint import content_hash
-from apo_bench.trial.stages import scene_key, scene_of, simulate_demonstration
+from apo_bench.trial.stages import demonstration_of, scene_key, scene_of
 from apo_bench.trial.trial import trial_row
 
 _MOST = 100_000
@@ -113,10 +112,9 @@ def assert_success_rate(
     require(isinstance(method, str) or callable(method), f"{method!r} was given as method; give a name or a corrector.")
     name = method if isinstance(method, str) else CORRECTOR
     cells = _cells(trials, name)
-    with OwnCorrectors() as own:
-        corrector = own.find(method) if ":" in name or not isinstance(method, str) else None
-        said: list[str] = []
-        decision = sequential_test(_outcomes(cells, seed, corrector, said), at_least, margin, error, most)
+    said: list[str] = []
+    corrector = None if isinstance(method, str) else method
+    decision = sequential_test(_outcomes(cells, seed, corrector, said), at_least, margin, error, most)
     if not decision.passed:
         called = name if isinstance(method, str) else getattr(method, "__name__", type(method).__name__)
         raise AssertionError(f"{called}, {decision.sentence}{''.join(f'; the last failure: {x}' for x in said[-1:])}.")
@@ -139,7 +137,7 @@ def _cells(trials: Any, method: str) -> list[TrialSettings]:
     )
     track = read_track(trials)
     grids: list[SweepSettings] = [replace(grid, trials=1) for arm in track.arms for grid in track.of(method, arm)]
-    return [trial for grid in grids for unit in units([grid], load_all([grid])) for trial in unit.trials]
+    return [trial for grid in grids for unit in units([grid], load_all([grid])) for trial in unit]
 
 
 def _outcomes(cells: list[TrialSettings], seed: int, method: Any, said: list[str]) -> Iterator[bool]:
@@ -152,9 +150,7 @@ def _outcomes(cells: list[TrialSettings], seed: int, method: Any, said: list[str
             scene = scene_of(settings)
             scenes[key] = scene, content_hash(scene.scenario, settings.scenario, scene.arm.files)
         scene, content = scenes[key]
-        shown = simulate_demonstration(scene, settings.careless, settings.seed, settings.eye, settings.salt)
-        more = {} if method is None else {"method": method}
-        row = trial_row(settings, scene, shown, content, **more)
+        row = trial_row(settings, scene, demonstration_of(settings, scene), content, method=method)
         if row["success"] is not None:
             said += [str(row["sentence"])] * (not row["success"])
             yield row["success"]

@@ -16,7 +16,7 @@ from typing import Any, NamedTuple
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.sweeps.grid import load_all, units
-from apo_bench.sweeps.sweep import read_sweep
+from apo_bench.sweeps.sweep_file import read_sweep
 
 ROOT = Path(__file__).resolve().parents[1]
 FIRST = "<!-- seeds -->"
@@ -87,7 +87,7 @@ def _trials(path: Path) -> Iterator[Any]:
     grids = read_sweep(path)
     loaded = load_all(grids)
     for unit in units(grids, loaded):
-        yield from unit.trials
+        yield from unit
 
 
 def _key(trial: Any, place: tuple[str, ...]) -> tuple[Any, ...]:

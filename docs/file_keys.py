@@ -31,7 +31,7 @@ from apo_bench.records import SETTINGS, SettingInfo
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.sweeps.grid import AXES, SHARED
-from apo_bench.sweeps.sweep import read_sweep
+from apo_bench.sweeps.sweep_file import read_sweep
 
 ROOT = Path(__file__).parents[1]
 EXAMPLES = ROOT / "docs" / "guide" / "scenario.md", ROOT / "docs" / "guide" / "sweeps.md"

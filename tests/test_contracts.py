@@ -55,7 +55,6 @@ BREACHES = {
         ("apo_bench.correction.baselines.paper", "apo_bench.correction.contact.problem"),
         ("apo_bench.correction.contact.starts", "apo_bench.correction.robust.views"),
         ("apo_bench.correction.robust.views", "apo_bench.correction.directions"),
-        ("apo_bench.correction.correctors", "apo_bench.correction.own_code.forms"),
     ],
     "contact": [
         ("apo_bench.correction.contact.problem", "apo_bench.correction.contact.solved"),
@@ -83,14 +82,10 @@ BREACHES = {
         ("apo_bench.statistics.paired", "apo_bench.statistics.power"),
     ],
     "sweeps": [
-        ("apo_bench.sweeps.work.worker", "apo_bench.sweeps.grid"),
-        ("apo_bench.sweeps.work.worker", "apo_bench.sweeps.local.process"),
-        ("apo_bench.sweeps.local.pool", "apo_bench.sweeps.ray.task"),
-        ("apo_bench.sweeps.ray.backend", "apo_bench.sweeps.sweep"),
-    ],
-    "work": [
-        ("apo_bench.sweeps.work.environment_lock", "apo_bench.sweeps.work.dispatch"),
-        ("apo_bench.sweeps.work.environment_lock", "apo_bench.sweeps.work.worker"),
+        ("apo_bench.sweeps.grid", "apo_bench.sweeps.worker"),
+        ("apo_bench.sweeps.worker", "apo_bench.sweeps.pool"),
+        ("apo_bench.sweeps.pool", "apo_bench.sweeps.cluster"),
+        ("apo_bench.sweeps.cluster", "apo_bench.sweeps.sweep"),
     ],
     "judge": [
         ("apo_bench.judging.verdict", "apo_bench.observation.noise"),

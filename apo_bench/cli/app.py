@@ -28,7 +28,7 @@ from apo_bench.cli import (
 from apo_bench.cli.printing import Grouped, GroupedOptions
 from apo_bench.cli.setting_options import NO_RESULT
 from apo_bench.errors import InputError
-from apo_bench.io import brief, clean, processes
+from apo_bench.io import brief, clean, streams
 from apo_bench.names import own_modules_in
 
 app = typer.Typer(
@@ -45,26 +45,26 @@ _INTERRUPTED = 130
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return its exit code. What `module:name` names may lie in the current folder."""
     try:
-        here = processes.prepare()
+        here = streams.prepare()
         words = list(sys.argv[1:] if arguments is None else arguments)
         with own_modules_in(here):
             code = app(args=words or ["--help"], prog_name="apo-bench", standalone_mode=False)
-        processes.finish()
+        streams.finish()
     except InputError as error:
         return _complain(str(error), WRONG_REQUEST)
     except (sweep.Interrupted, KeyboardInterrupt) as error:
         return _complain(str(error) or "interrupted.", getattr(error, "code", _INTERRUPTED))
-    except (RuntimeError, processes.Unusable) as error:
+    except (RuntimeError, streams.Unusable) as error:
         return _complain(str(error), NO_RESULT)
     except MemoryError:
         return _complain("there is not enough memory.", NO_RESULT)
     except OSError as error:
-        return _complain(processes.unexpected(error), NO_RESULT)
+        return _complain(streams.unexpected(error), NO_RESULT)
     except SystemExit as error:
         # what the command line library makes of a pipe that nobody reads
         if not isinstance(error.__context__, OSError):
             raise
-        return _complain(processes.unexpected(error.__context__), NO_RESULT)
+        return _complain(streams.unexpected(error.__context__), NO_RESULT)
     except Exception as error:
         if not hasattr(error, "format_message"):
             raise

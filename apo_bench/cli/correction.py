@@ -104,7 +104,7 @@ def correct_command(
     as_json: AsJson = False,
 ) -> None:
     """Correct observed poses by their face contacts; no simulator is needed."""
-    from apo_bench.correction.own_code.own import correct_named
+    from apo_bench.correction.correctors import correct
     from apo_bench.show.correct_text import correction_form, correction_lines, pose_table, suspect_table
     from apo_bench.trial.promise import promise_sentence
 
@@ -125,7 +125,7 @@ def correct_command(
         seen = restated(seen, *read_noise(camera_noise))
         assumed = False
     with redirect_output(as_json):
-        correction = correct_named(seen, corrector)
+        correction = correct(seen, corrector)
     explanation = _explained(seen, correction)
     plan, moved = _planned(loaded, seen, correction) if correction.ok else (None, "")
     promised = None if plan is None else _promised(plan, seen, correction, loaded)

@@ -13,11 +13,10 @@ from typing import Annotated, Any
 import typer
 
 from apo_bench.cli.printing import print_answer, print_json
-from apo_bench.cli.setting_options import AsJson, CorrectorLimit, check_writable, completion, cores, path_given
+from apo_bench.cli.setting_options import AsJson, check_writable, completion, cores, path_given
 from apo_bench.cli.sweep import interrupted
 from apo_bench.errors import InputError, require
 from apo_bench.io import brief, clean
-from apo_bench.records import CORRECTOR_LIMIT_S
 
 _OF_ESTIMATORS = "measured"
 """The track that a pose estimator is scored in where none is named."""
@@ -67,7 +66,6 @@ def score_command(
         typer.Option(parser=path_given, metavar="<path>", help="Draw trials that nobody can draw without this file."),
     ] = None,
     workers: Annotated[int | None, typer.Option(help="Processes; default: the cores there are.")] = None,
-    corrector_limit: CorrectorLimit = CORRECTOR_LIMIT_S,
     backend: Annotated[str, typer.Option(help="local, or ray for a cluster.")] = "local",
     address: Annotated[str | None, typer.Option(help="Of the Ray cluster, host:port.")] = None,
     as_json: AsJson = False,
@@ -92,7 +90,6 @@ def score_command(
         "workers": cores() if workers is None and backend == "local" else workers,
         "backend": backend,
         "address": address,
-        "corrector_limit_s": corrector_limit,
         "salt_file": salt_file,
     }
     if export is not None:
@@ -116,7 +113,7 @@ def score_command(
             typer.echo(f"{track.name}: {track.title}", err=True)
 
     try:
-        with entrant(method, command, answers, rows, tracks, **how) as (found, how):
+        with entrant(method, command, answers, rows, tracks, **how) as found:
             entry = score(
                 found,
                 tracks,

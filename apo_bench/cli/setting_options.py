@@ -153,18 +153,6 @@ ScenarioArgument = Annotated[
 AsJson = Annotated[bool, typer.Option("--json", help="Print one JSON object, and nothing else.")]
 StatedMm = Annotated[float | None, typer.Option(help="Its standard deviation where it states none, mm.")]
 StatedDeg = Annotated[float | None, typer.Option(help="The same in degrees.")]
-CorrectorLimit = Annotated[
-    float,
-    typer.Option(metavar="SECONDS", help="A corrector given as package.module:name that takes longer has failed."),
-]
-CacheFolder = Annotated[
-    Path | None,
-    typer.Option(
-        parser=path_given,
-        metavar="<path>",
-        help="Keep demonstrations in this folder, for the next time; results are the same.",
-    ),
-]
 
 
 def takes(options: Iterable[Parameter]) -> Callable[[Command], Command]:

@@ -15,8 +15,6 @@ from apo_bench.assembly import Observation
 from apo_bench.cli.printing import print_json
 from apo_bench.cli.setting_options import (
     NO_RESULT,
-    CacheFolder,
-    CorrectorLimit,
     ScenarioArgument,
     StatedDeg,
     StatedMm,
@@ -30,7 +28,7 @@ from apo_bench.cli.sweep import interrupted
 from apo_bench.errors import InputError, require
 from apo_bench.files.csv_form import assumed_deviations
 from apo_bench.io import redirect_output
-from apo_bench.records import CORRECTOR, CORRECTOR_LIMIT_S, with_simulated
+from apo_bench.records import CORRECTOR, with_simulated
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
 
@@ -113,12 +111,12 @@ def view_command(
 
 
 def _corrected(scenario: Scenario, observed: Observation, method: str, step: int) -> BeliefPanel:
-    from apo_bench.correction.own_code.own import correct_named
+    from apo_bench.correction.correctors import correct
     from apo_bench.show.believed_picture import belief_panel
     from apo_bench.trial.fitting import fitting_plan
     from apo_bench.trial.planning import plan_warning
 
-    correction = correct_named(observed, with_simulated(method))
+    correction = correct(observed, with_simulated(method))
     if not correction.ok:
         raise RuntimeError(
             f"{method} did not correct what was seen: {correction.sentence.rstrip('.')}; --seen draws what was seen."
@@ -160,8 +158,6 @@ def run_replay(
         float | None,
         typer.Option(metavar="SECONDS", help="End a trial that takes longer; it runs in a process of its own."),
     ] = None,
-    corrector_limit: CorrectorLimit = CORRECTOR_LIMIT_S,
-    cache: CacheFolder = None,
     view: Annotated[bool, typer.Option("--view", help="Then look at it and step through it, as `view` does.")] = False,
     port: Port = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the row, one JSON object, and nothing else.")] = False,
@@ -185,8 +181,6 @@ def run_replay(
         observation=observation,
         save_observation=save_observation,
         video=video,
-        corrector_limit_s=corrector_limit,
-        cache=cache,
     )
     stories: list[Story] = []
     try:
@@ -194,7 +188,7 @@ def run_replay(
             if trial_limit is None:
                 row = run_request(request, stories.append if view else None)
             else:
-                from apo_bench.sweeps.local.pool import run_request_alone
+                from apo_bench.sweeps.pool import run_request_alone
 
                 row = run_request_alone(request, trial_limit)
     except KeyboardInterrupt as error:

@@ -18,8 +18,6 @@ import typer
 
 from apo_bench.cli.printing import group
 from apo_bench.cli.setting_options import (
-    CacheFolder,
-    CorrectorLimit,
     ScenarioArgument,
     axis_flag,
     axis_option,
@@ -33,7 +31,7 @@ from apo_bench.cli.setting_options import (
     writing,
 )
 from apo_bench.errors import InputError, require
-from apo_bench.records import CORRECTOR_LIMIT_S, FIRST_TRAINING_TRIAL, in_python
+from apo_bench.records import FIRST_TRAINING_TRIAL, in_python
 from apo_bench.scenario.file import load_scenario
 
 if TYPE_CHECKING:
@@ -90,8 +88,6 @@ def sweep_command(
     trial_limit: Annotated[
         float, typer.Option(metavar="SECONDS", help="A trial that takes longer has failed.")
     ] = 600.0,
-    corrector_limit: CorrectorLimit = CORRECTOR_LIMIT_S,
-    cache: CacheFolder = None,
     backend: Annotated[str, typer.Option(help="local, or ray for a cluster.")] = "local",
     address: Annotated[str | None, typer.Option(help="Of the Ray cluster, host:port.")] = None,
     **options: Any,
@@ -111,12 +107,10 @@ def sweep_command(
             out,
             workers=used,
             limit_s=trial_limit,
-            corrector_limit_s=corrector_limit,
             backend=backend,
             address=address,
             command=command,
             salt_file=salt_file,
-            cache=cache,
         )
     except KeyboardInterrupt as error:
         raise interrupted(error, "; what had ended is kept, and the same command continues") from error
@@ -130,7 +124,7 @@ def sweep_command(
 def _grids(scenarios: list[str], options: Mapping[str, Any]) -> tuple[SweepSettings, ...]:
     """The grid of the options, or those of a sweep file with some settings replaced."""
     from apo_bench.sweeps.grid import AXES, SweepSettings
-    from apo_bench.sweeps.sweep import is_sweep_file, read_sweep
+    from apo_bench.sweeps.sweep_file import is_sweep_file, read_sweep
 
     axes = {axis_option(info): info for info in AXES}
     texts = {axes[option]: text for option, text in options.items() if option in axes}

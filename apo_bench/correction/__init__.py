@@ -27,5 +27,5 @@ What one correction by `contact` calls, in the folder `contact` unless another i
 `solvers` know equations, `checks` what all corrections are asked. `baselines` are what `contact` is compared with
 (`paper` is the method as it was published), `robust` is the corrector that doubts observations, `touches` learns what
 is wrong with the robot from what it touches. The files beside these folders stand above them: who asks for a
-correction, and what is said of one. Above these files stands only `own_code`, the processes of correctors of one's own.
+correction, and what is said of one.
 """

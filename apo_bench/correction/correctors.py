@@ -109,10 +109,13 @@ def _admitted(returned: Any, observation: Observation, chosen: Any, name: str) -
 
 
 def _ours(corrector: Any) -> bool:
-    """Whether a corrector comes with the package; what others say of the gaps that they leave is measured instead."""
+    """Whether a corrector comes with the package; what others say of the gaps that they leave is measured instead.
+
+    Programs and files of answers, which `apo_bench.scoring` stands for, are others.
+    """
     while isinstance(corrector, partial):
         corrector = corrector.func
-    return str(getattr(corrector, "__module__", "")).startswith("apo_bench.")
+    return str(getattr(corrector, "__module__", "")).startswith(("apo_bench.correction.", "apo_bench.simulation."))
 
 
 def _bare(returned: Any, n: int, name: str) -> Array:

@@ -21,7 +21,7 @@ from apo_bench.errors import RAISED, InputError, missing_package, require, requi
 from apo_bench.io import has_parquet, write_file
 from apo_bench.names import resolve
 from apo_bench.records import TrialSettings
-from apo_bench.sweeps.work.environment_lock import Check, listening
+from apo_bench.sweeps.stopping import Check, listening
 from apo_bench.trial.stages import scene_of
 
 _FRAME = "way in"

@@ -15,7 +15,7 @@ from apo_bench.io.documents import (
 from apo_bench.io.figures import default_looks, load_matplotlib, save_figure
 from apo_bench.io.named_files import named_files
 from apo_bench.io.ordinary_files import decoded, each_line, opened, read_bytes, read_text
-from apo_bench.io.processes import SAFE_PATH, descendants, end_descendants, environment, flush, redirect_output
+from apo_bench.io.processes import SAFE_PATH, environment
 from apo_bench.io.result_files import (
     check_folders,
     check_target,
@@ -25,6 +25,7 @@ from apo_bench.io.result_files import (
     replace_file,
     write_file,
 )
+from apo_bench.io.streams import redirect_output
 from apo_bench.io.strict_csv import Columns, CsvRow, check_separator, has_parquet, read_csv, write_columns, write_csv
 from apo_bench.io.words import (
     CONTROL,
@@ -57,12 +58,9 @@ __all__ = (
     "columns",
     "decoded",
     "default_looks",
-    "descendants",
     "direction",
     "each_line",
-    "end_descendants",
     "environment",
-    "flush",
     "grouped",
     "half_letter",
     "has_parquet",

@@ -68,7 +68,6 @@ from apo_bench.records.short_names import (
     WRONG_RELATIONS,
     as_seen,
     feels,
-    is_own,
     knows_relations,
     knows_truth,
     may_look,
@@ -77,7 +76,6 @@ from apo_bench.records.short_names import (
     with_simulated,
 )
 from apo_bench.records.thresholds import (
-    CORRECTOR_LIMIT_S,
     MEANINGS,
     USUAL_LIMITS,
     Criteria,
@@ -91,7 +89,6 @@ __all__ = (
     "CODES",
     "CORRECTOR",
     "CORRECTORS",
-    "CORRECTOR_LIMIT_S",
     "ENV_ID",
     "EVALUATION_STARTS",
     "FAILURES",
@@ -147,7 +144,6 @@ __all__ = (
     "feels",
     "finite",
     "in_python",
-    "is_own",
     "knows_relations",
     "knows_truth",
     "level_pair",

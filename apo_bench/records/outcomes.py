@@ -1,7 +1,7 @@
 """The closed list of stages and codes: every way a trial can end, with its sentence.
 
-A physical failure is a result, not an exception. `{part}`, `{operation}` (counted from 1) and `{what}` (the
-trial or its corrector) are filled in where the outcome is made; no other words appear in a row.
+A physical failure is a result, not an exception. `{part}` and `{operation}` (counted from 1) are filled in where the
+outcome is made; no other words appear in a row.
 """
 
 from types import MappingProxyType
@@ -46,8 +46,8 @@ CODES = MappingProxyType(
         "not_released": "a part is still held",
         "not_at_rest": "a part still moves",
         # worker: of trials in a process of their own, whatever they were doing
-        "worker_died": "the process that ran the {what} died",
-        "time_limit": "the {what} took longer than its limit",
+        "worker_died": "the process that ran the trial died",
+        "time_limit": "the trial took longer than its limit",
     }
 )
 
@@ -66,6 +66,6 @@ def touching_sentence(code: str, *, part: str = "") -> str:
     return _TOUCHING[code].format(part=part)
 
 
-def sentence(code: str, *, part: str = "", operation: int = 0, what: str = "trial") -> str:
-    """The sentence of a code; `operation` counted from 0, `what` is `trial` or `corrector`."""
-    return CODES[code].format(part=part, operation=operation + 1, what=what)
+def sentence(code: str, *, part: str = "", operation: int = 0) -> str:
+    """The sentence of a code; `operation` counted from 0."""
+    return CODES[code].format(part=part, operation=operation + 1)

@@ -24,7 +24,7 @@ from apo_bench.records.robot_error import (
 )
 from apo_bench.records.salt import Salt
 from apo_bench.records.setting_info import SettingInfo, about, check_value
-from apo_bench.records.short_names import CORRECTOR, checked_method, checked_relations, feels, is_own, parsed
+from apo_bench.records.short_names import CORRECTOR, checked_method, checked_relations, feels
 
 ENV_ID = "APOReplay-v0"
 ROW = "apo-bench/row/9"
@@ -277,7 +277,6 @@ class TrialSettings:
                 object.__setattr__(self, info.name, info.spelled(getattr(self, info.name)))
         check_together(self.fidelity, self.grasp)
         check_squares(feels(self.method), self.grasp)
-        check_asks(self.method, self.looks)
         if self.eye == RANGE:
             if self.noise not in (USUAL, RANGE):
                 refuse_noise(self.noise)
@@ -325,17 +324,6 @@ def check_squares(feels: bool, *grasps: str) -> None:
         not feels or "weld" not in grasps,
         "the grasp 'weld' was given for a robot that feels, which squares parts between pads that close; use the "
         "grasp friction, or a robot that does not feel.",
-    )
-
-
-def check_asks(method: str, looks: int) -> None:
-    """Raise an `InputError` if looks are allowed to a corrector that nobody could answer."""
-    plan = parsed(method).plan
-    require(
-        not looks or not is_own(plan),
-        f"a number of looks of {looks} was given with the method '{plan}', which runs in a process of its own and "
-        "cannot ask from there; leave it out, or hand the corrector over in Python: apo_bench.correct(observation, "
-        "corrector, look).",
     )
 
 

@@ -168,8 +168,9 @@ def knows_relations(method: str) -> bool:
 
 
 def may_look(method: str) -> bool:
-    """Whether a method can ask to see operations again."""
-    return parsed(method).plan in LOOKING
+    """Whether a method may ask to see operations again: one of those that do, or a corrector of one's own."""
+    plan = parsed(method).plan
+    return plan in LOOKING or ":" in plan
 
 
 def feels(method: str) -> bool:
@@ -181,8 +182,3 @@ def with_simulated(corrector: Any) -> Any:
     """What to pass to `correct`: the function, where a name stands for a corrector that needs a simulator."""
     known = isinstance(corrector, str) and corrector in SIMULATED
     return resolve(corrector, SIMULATED, "corrector") if known else corrector
-
-
-def is_own(method: object) -> bool:
-    """Whether a corrector is named as `module:name`, so that it runs in a process of its own."""
-    return isinstance(method, str) and ":" in method

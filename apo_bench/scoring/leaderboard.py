@@ -18,8 +18,8 @@ from apo_bench.scoring.track import read_track, track_names
 
 _PROVES = (
     "`self-reported` proves nothing: public seeds can be drawn again by whoever has the package. `verified` entries "
-    "were run by whoever wrote this table, with trials drawn by a salt whose hash was published before; the entrant "
-    "ran in a process of its own that was given observations and nothing else. Entries marked `quick` ran a few "
+    "were run by whoever wrote this table, with trials drawn by a salt whose hash was published before; entrants that "
+    "are not trusted ran as programs, which are given observations and nothing else. Entries marked `quick` ran a few "
     "trials, which are no score."
 )
 _EVERY = (

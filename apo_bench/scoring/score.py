@@ -45,7 +45,7 @@ def score(
         quick: A few seeds of each cell, to see whether it works.
         command: What to note as the command line.
         said: Called with each track before it runs.
-        how: As for `run_sweep`: `workers`, `backend`, `salt_file`, `cache`.
+        how: As for `run_sweep`: `workers`, `backend`, `salt_file`.
 
     Raises:
         InputError, RuntimeError, KeyboardInterrupt: As `run_sweep`; what had ended is kept.

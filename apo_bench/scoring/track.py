@@ -22,7 +22,7 @@ from apo_bench.io import read_bytes, read_toml
 from apo_bench.records import TrialSettings
 from apo_bench.resources import folder
 from apo_bench.sweeps.grid import SweepSettings
-from apo_bench.sweeps.sweep import read_sweep
+from apo_bench.sweeps.sweep_file import read_sweep
 
 SCHEMA = "apo-bench/track/1"
 TABLE = "track"

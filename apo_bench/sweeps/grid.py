@@ -8,7 +8,7 @@ from numbers import Real
 from typing import Any, final
 
 from apo_bench.arguments import check_arguments
-from apo_bench.errors import require
+from apo_bench.errors import require, require_text
 from apo_bench.io import UNSHOWN, grouped
 from apo_bench.records import (
     LEVEL,
@@ -28,23 +28,19 @@ from apo_bench.records import (
     refuse_noise,
 )
 from apo_bench.scenario import Scenario, load_scenario
-from apo_bench.sweeps.work.environment_lock import Unit
 
-LARGEST_TRIALS = 1_000_000
-_MOST_TRIALS = 1_000_000
+MOST_TRIALS = 1_000_000
 """Of all cells of a sweep together: their specifications are held in memory, half a kilobyte each."""
 AXES: tuple[SettingInfo, ...] = tuple(info for info in (*SETTINGS.values(), LEVEL) if info.axis)
 """What a sweep has several of."""
 _MAY_BE_EMPTY = ("clearance_mm", "noise")
 SHARED: tuple[str, ...] = tuple(info.name for info in SETTINGS.values() if info.shared)
 """What all grids of a sweep have in common, so that no key tells trials apart by it."""
-_BY_RULE = (
-    *("scenario", "careless", "clearance_mm", "eye", "noise"),
-    *("relations", "looks", "wrench", "stated_error", "method"),
-)
-_PLAIN = tuple(info for info in SETTINGS.values() if info.axis and info.name not in _BY_RULE)
-"""Settings that every trial has, the oracle too."""
-
+_VARIED = tuple(info for info in AXES if info.name not in ("scenario", "clearance_mm"))
+_MET_BY_SOME = {"relations": knows_relations, "looks": may_look, "wrench": feels, "stated_error": feels}
+"""What not every method meets: contacts, looks, and what a robot that feels is given."""
+Batch = tuple[TrialSettings, ...]
+"""Trials of one scenario, clearance, seed, carelessness and eye: they share layout and demonstration."""
 _Level = float | tuple[float, float]
 """Mm and degrees, or the two apart."""
 
@@ -94,8 +90,8 @@ class SweepSettings:
             )
             object.__setattr__(self, info.axis, values)
         require(
-            1 <= self.trials <= LARGEST_TRIALS,
-            f"{self.trials} trials were given; a whole number from 1 to {LARGEST_TRIALS} is allowed.",
+            type(self.trials) is int and 1 <= self.trials <= MOST_TRIALS,
+            f"{self.trials} trials were given; a whole number from 1 to {MOST_TRIALS} is allowed.",
         )
         check("seed", self.seed)
         check("seed", self.seed + self.trials - 1)
@@ -116,6 +112,8 @@ class SweepSettings:
         ).items():
             for value in values:
                 check(name, value)
+                if SETTINGS[name].is_text:
+                    require_text(name, value)
                 require(
                     not SETTINGS[name].is_text or name == "scenario" or not UNSHOWN.search(value),
                     f"the name {value!r} was given, which has control characters or half letters; use another one.",
@@ -131,10 +129,10 @@ def check_grids(grids: Sequence[SweepSettings]) -> None:
     for name in SHARED:
         values = {getattr(grid, name): None for grid in grids}
         require(len(values) <= 1, f"{name} of a sweep is {' and '.join(map(str, values))}; run a sweep for each.")
-    most = sum(grid.trials * _per_seed(grid) for grid in grids)
+    most = sum(grid.trials * math.prod(max(1, len(getattr(grid, info.axis))) for info in AXES) for grid in grids)
     require(
-        most <= _MOST_TRIALS,
-        f"the sweep has up to {most:,} trials, and at most {_MOST_TRIALS:,} are allowed in one folder; share them "
+        most <= MOST_TRIALS,
+        f"the sweep has up to {most:,} trials, and at most {MOST_TRIALS:,} are allowed in one folder; share them "
         "out over several: other seeds, or other scenarios, in each.",
     )
 
@@ -159,7 +157,7 @@ def load_all(grids: Sequence[SweepSettings]) -> Mapping[str, Scenario]:
     return loaded
 
 
-def units(grids: Sequence[SweepSettings], loaded: Mapping[str, Scenario], salt: Salt | None = None) -> Iterator[Unit]:
+def units(grids: Sequence[SweepSettings], loaded: Mapping[str, Scenario], salt: Salt | None = None) -> Iterator[Batch]:
     """All the work of a sweep, each trial once, seeds first, so that every cell of an interrupted sweep is about
     equally full.
 
@@ -185,24 +183,9 @@ def described(grids: Sequence[SweepSettings], loaded: Mapping[str, Scenario]) ->
     return forms
 
 
-def _per_seed(grid: SweepSettings) -> int:
-    """How many trials a grid has for one seed, if none is the same as another."""
-    ways = len(_ways(grid))
-    of_oracle, of_others = (
-        sum(len(_met_by(grid, method)) for method in grid.methods if knows_truth(method) == known)
-        for known in (True, False)
-    )
-    return (
-        len(grid.scenarios)
-        * max(1, len(grid.clearances_mm))
-        * math.prod(len(getattr(grid, info.axis)) for info in _PLAIN)
-        * (len(grid.careless) * len(grid.levels) * ways * of_others + of_oracle)
-    )
-
-
 def _units(
     grids: Sequence[SweepSettings], source: str, scenario: Scenario, seed: int, salt: Salt | None
-) -> Iterator[Unit]:
+) -> Iterator[Batch]:
     """The trials of a scenario and a seed, by what they share."""
     together = grouped(
         ((clearance, trial.careless, trial.eye), trial)
@@ -211,44 +194,33 @@ def _units(
         for clearance in grid.clearances_mm or (scenario.clearance_mm,)
         for trial in _trials(grid, source, clearance, seed, salt)
     )
-    return (Unit(tuple(dict.fromkeys(trials))) for trials in together.values())
+    return (tuple(dict.fromkeys(trials)) for trials in together.values())
 
 
 def _trials(
     grid: SweepSettings, source: str, clearance_mm: float, seed: int, salt: Salt | None
 ) -> Iterator[TrialSettings]:
+    """Every combination of a grid as what its method meets of it; some are the same."""
     same: dict[str, Any] = {name: getattr(grid, name) for name in SHARED}
     same |= {"scenario": source, "clearance_mm": clearance_mm, "seed": seed, "salt": salt}
-    names = [info.name for info in _PLAIN]
-    plain: list[dict[str, Any]] = [
-        dict(zip(names, each, strict=True)) for each in product(*(getattr(grid, info.axis) for info in _PLAIN))
-    ]
-    ways = _ways(grid)
-    truth: dict[str, Any] = {"level_mm": 0.0, "level_deg": 0.0, "careless": 0.0}
-    for method, others in product(filter(knows_truth, grid.methods), plain):
-        for met in _met_by(grid, method):
-            yield TrialSettings(**same, **others, **truth, **ways[0], **met, method=method)
-    for others, careless, level, way, method in product(plain, grid.careless, grid.levels, ways, grid.methods):
-        if not knows_truth(method):
-            mm, deg = level_pair(level, way["eye"])
-            seen: dict[str, Any] = {"level_mm": mm, "level_deg": deg, "careless": careless}
-            for met in _met_by(grid, method):
-                yield TrialSettings(**same, **others, **seen, **way, **met, method=method)
+    values = [getattr(grid, info.axis) or (RANGE,) for info in _VARIED]
+    for combination in product(*values):
+        asked = dict(zip((info.name for info in _VARIED), combination, strict=True))
+        yield TrialSettings(**same, **_met(asked, grid))
 
 
-def _met_by(grid: SweepSettings, method: str) -> list[dict[str, Any]]:
-    """What not every method meets: contacts, looks, and what a robot that feels is given; once what is usual if not."""
-    meets = {"relations": knows_relations, "looks": may_look, "wrench": feels, "stated_error": feels}
-    axes = [
-        getattr(grid, SETTINGS[name].axis) if asks(method) else (SETTINGS[name].default,)
-        for name, asks in meets.items()
-    ]
-    return [dict(zip(meets, each, strict=True)) for each in product(*axes)]
-
-
-def _ways(grid: SweepSettings) -> list[dict[str, Any]]:
-    """Eye and noise model, of every way of seeing; a range finder has no noise model."""
-    return [{"eye": eye, "noise": x} for eye in grid.eyes for x in ((RANGE,) if eye == RANGE else grid.noises)]
+def _met(asked: dict[str, Any], grid: SweepSettings) -> dict[str, Any]:
+    """What a method meets of the settings that were asked for, in place of the others what is usual."""
+    method = asked["method"]
+    if knows_truth(method):
+        asked |= {"level": 0.0, "careless": 0.0, "eye": grid.eyes[0], "noise": grid.noises[0] if grid.noises else RANGE}
+    if asked["eye"] == RANGE:
+        asked["noise"] = RANGE
+    for name, is_met in _MET_BY_SOME.items():
+        if not is_met(method):
+            asked[name] = SETTINGS[name].default
+    asked["level_mm"], asked["level_deg"] = level_pair(asked.pop("level"), asked["eye"])
+    return asked
 
 
 def _plain(value: Any) -> Any:

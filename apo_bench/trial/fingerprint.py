@@ -8,8 +8,10 @@ import json
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from functools import cache
+from importlib import metadata
 from importlib.resources import files
 from importlib.resources.abc import Traversable
+from importlib.util import find_spec
 from pathlib import Path
 from types import MappingProxyType
 
@@ -31,10 +33,24 @@ ROOMS_WITHOUT_TRIALS = (
     "scoring",
     "show",
     "statistics",
-    "sweeps/local",
-    "sweeps/ray",
+    "sweeps",
 )
 """Commands, imports that end in files, how work is spread, and all that is made of rows afterwards."""
+
+_PACKAGES = (
+    *("apo_bench", "mujoco", "mink", "daqp", "gymnasium"),
+    *("numpy", "scipy", "trimesh", "manifold3d", "shapely"),
+)
+"""The packages whose version may show in a row."""
+_OPTIONAL = ("numba",)
+"""The same, and without them rows are only rounded otherwise."""
+
+
+def versions() -> dict[str, str]:
+    """Package -> version, as installed here; `none` of an optional one that is not."""
+    return {package: metadata.version(package) for package in _PACKAGES} | {
+        package: metadata.version(package) if find_spec(package) else "none" for package in _OPTIONAL
+    }
 
 
 def content_hash(scenario: Scenario, source: str | Path | Scenario, arm_files: Path | tuple[Path, ...]) -> str:

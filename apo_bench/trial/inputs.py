@@ -1,4 +1,4 @@
-"""The files that shape a trial, and their digests: what a record's identity and the key of a demonstration are made of.
+"""The files that shape a trial, and their digests: what a record's identity is made of.
 
 Python modules of the user count with the modules that they import from the same place, as far as their source names
 them. Data that such a module reads for itself does not count.
@@ -27,9 +27,6 @@ from apo_bench.resources import folder
 from apo_bench.scenario import Scenario, scenario_path
 
 _CHUNK = 1 << 20
-ARM = "arm"
-WEIGHTS = "learned weights"
-"""Pieces that no demonstration depends on."""
 
 
 def content_pieces(
@@ -48,8 +45,8 @@ def content_pieces(
     files = {
         **{f"part {part}": part_files_of(path) for part, path in sorted(scenario.part_files.items())},
         "room": (folder("assets") / "room.xml",),
-        ARM: arm_files if isinstance(arm_files, tuple) else (arm_files,),
-        WEIGHTS: tuple(sorted((folder("assets") / "learned").glob("*.npz"))),
+        "arm": arm_files if isinstance(arm_files, tuple) else (arm_files,),
+        "learned weights": tuple(sorted((folder("assets") / "learned").glob("*.npz"))),
     }
     return {
         "scenario": _scenario_digest(scenario, source),

@@ -260,17 +260,16 @@ def result(end: Outcome, *, success: bool | None) -> Row:
     return cast(Row, dict.fromkeys(_OUTCOME_COLUMNS)) | known
 
 
-def lost(spec: TrialSettings, content: str, code: str, what: str = "trial") -> Row:
-    """The failed row of a trial whose process, or that of its corrector, died (`worker_died`) or took too long.
+def lost(spec: TrialSettings, content: str, code: str) -> Row:
+    """The failed row of a trial whose process died (`worker_died`) or took too long.
 
     Nothing is compiled for it, and it says nothing of wall times, so that it is the same wherever it happens.
 
     Args:
-        content: From the lock of the sweep: `lock.content[spec.scenario]`.
+        content: From `content_hash`.
         code: `worker_died` or `time_limit`.
-        what: Whose process died or whose limit it was: `trial` or `corrector`.
     """
-    return _failed(spec, content, None, Outcome("worker", code, None, sentence(code, what=what)))
+    return _failed(spec, content, None, Outcome("worker", code, None, sentence(code)))
 
 
 def misbehaved(spec: TrialSettings, content: str, demonstration: str, why: str) -> Row:

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from apo_bench.assembly import Correction, Look, Observation, Outcome, Plan, largest_gap
-from apo_bench.correction.own_code.own import correct_named
+from apo_bench.correction.correctors import correct
 from apo_bench.geometry import Array, pose
 from apo_bench.prediction.failure import predict
 from apo_bench.records import with_simulated
@@ -104,7 +104,7 @@ def apply_method(
 
     Args:
         method: `oracle` takes the truth, `none` what was seen, `by-heart` the goals of the scenario of `where`;
-            anything else is a corrector or names one; what is named as `module:name` runs in a process of its own.
+            anything else is a corrector or names one.
         observation: As the planner has it: its contacts may be missed, false or recognised, and are those of the plan.
         truth: (n, 4, 4) goals of the layout; only the oracle looks at them.
         look: What a corrector that can ask sees operations again by.
@@ -117,7 +117,7 @@ def apply_method(
         return _uncorrected(observation, observation.goals, observation_failure(observation))
     if isinstance(method, str) and method == "by-heart" and where is not None:
         return _by_heart(observation, where)
-    correction = correct_named(observation, with_simulated(method), look)
+    correction = correct(observation, with_simulated(method), look)
     if not correction.ok:
         failure = Outcome("correct", correction.status, None, correction.sentence)
         return MethodResult(None, failure, correction.gap_before_m, math.nan, correction)

@@ -9,18 +9,15 @@ from pathlib import Path
 from typing import Any, final
 
 from apo_bench.assembly import Observation
-from apo_bench.correction.own_code.own import OwnCorrectors
 from apo_bench.errors import InputError, require
 from apo_bench.io import read_text
 from apo_bench.records import (
-    CORRECTOR_LIMIT_S,
     LEVEL,
     RANGE,
     RECOGNISED,
     Row,
     TrialSettings,
     in_python,
-    parsed,
     read_salt,
 )
 from apo_bench.scenario import Scenario, in_the_air, load_scenario
@@ -30,18 +27,17 @@ from apo_bench.simulation.film.still import FilmTrack
 from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.scene import Scene, check_film
 from apo_bench.trial.fingerprint import content_hash, spec_hash
-from apo_bench.trial.kept_demonstrations import KeptDemonstrations, demonstration_of
 from apo_bench.trial.outcome_columns import lost
 from apo_bench.trial.stages import (
     SimulatedDemonstration,
     demonstration_failure,
+    demonstration_of,
     observe_demonstration,
     scene_of,
 )
 from apo_bench.trial.story import Story, trial_story
 from apo_bench.trial.trial import MEASURED, noise_of, run_measured, trial_row
 
-Say = Callable[..., None]
 Show = Callable[[Story], None]
 _DRAWN = (
     *(LEVEL.name, "level_mm", "level_deg", "careless", "noise", "relations"),
@@ -64,10 +60,6 @@ class Request:
     observation: Path | None = None
     save_observation: Path | None = None
     video: Path | None = None
-    corrector_limit_s: float = CORRECTOR_LIMIT_S
-    """Wall time that a corrector named as `module:name` may take."""
-    cache: Path | None = None
-    """A folder where demonstrations are kept; the row is the same with and without it."""
 
 
 def requested_settings(request: Request, clearance_mm: float) -> TrialSettings:
@@ -149,8 +141,8 @@ def look(spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration) -
 def _refuse_contradictions(request: Request, options: Mapping[str, Any]) -> None:
     may_be = options.get("relations") in ("given", *RECOGNISED)
     drawn = [name for name in _DRAWN if name in options and not (name == "relations" and may_be)]
-    files = [name for name in ("save_observation", "cache") if getattr(request, name) is not None]
-    for name in (*drawn, *files):
+    saved = ["save_observation"] if request.save_observation is not None else []
+    for name in (*drawn, *saved):
         raise InputError(
             f"{_option(name)} was given together with --observation, which draws nothing; leave one of them out."
         )
@@ -169,47 +161,13 @@ def run_request(request: Request, show: Show | None = None) -> Row:
     Raises:
         InputError: A setting that is not allowed, or two that contradict each other.
     """
-    _, settings = checked_request(request)
-    rows: list[Row] = []
-    work_on(request, settings, lambda kind, *news: rows.extend(news), show)
-    return rows[0]
-
-
-def checked_request(request: Request) -> tuple[Scenario, TrialSettings]:
-    """The scenario and the settings of a request.
-
-    Raises:
-        InputError: A setting that is not allowed, two that contradict each other, no place for demonstrations, or a
-            film that cannot be written.
-    """
-    scenario = load_scenario(request.scenario)
-    settings = requested_settings(request, scenario.clearance_mm)
-    if request.cache is not None:
-        KeptDemonstrations(request.cache)
-    if request.video is not None:
-        check_film(request.video)
-    return scenario, settings
-
-
-def work_on(request: Request, spec: TrialSettings, say: Say, show: Show | None = None) -> None:
-    """Run what was asked for and say its row, then write the film.
-
-    Args:
-        say: Told "began" when the time of the trial begins to count, and "row" with the row when it ends.
-        show: Called with what is to be seen of the trial, if anything was replayed.
-    """
-    with OwnCorrectors(request.corrector_limit_s) as own:
-        _run_by(own.find(parsed(spec.method).plan), request, spec, say, show)
-
-
-def _run_by(method: Any, request: Request, spec: TrialSettings, say: Say, show: Show | None) -> None:
+    _, spec = checked_request(request)
     scene = scene_of(spec)
     simulated = None
     track = FilmTrack() if request.video or show else None
     watch = None if track is None else track.hooks
     if request.video:
         renderer(scene.work.model, 16, 12).close()  # is there anything to draw with? asked before the trial is run
-    say("began")
     seen: Observation | None = None
     if request.observation:
         from apo_bench.files.observation import read_stated
@@ -219,20 +177,33 @@ def _run_by(method: Any, request: Request, spec: TrialSettings, say: Say, show: 
         aloft = in_the_air(seen.assembly, seen.start, _MEASURED_AIR_M)
         if aloft is not None:
             raise InputError(f"{path}, start, {aloft[0]}: {aloft[1]}; give the pose at which it stands.")
-        row = run_measured(spec, scene, seen, read_text(path, "observation file"), method=method, watch=watch)
+        row = run_measured(spec, scene, seen, read_text(path, "observation file"), watch=watch)
     else:
-        simulated = demonstration_of(spec, scene, KeptDemonstrations(request.cache) if request.cache else None)
-        row = _drawn(request, spec, scene, simulated, method, watch)
+        simulated = demonstration_of(spec, scene)
+        row = _drawn(request, spec, scene, simulated, watch)
         if track is not None and row["sim_seconds"] is not None:
             seen = look(spec, scene, simulated)
-    say("row", row)
     if track is None or seen is None or row["sim_seconds"] is None:
-        return
+        return row
     story = trial_story(spec, scene, seen, track, row, simulated)
     if request.video:
         write_film(scene.scenario.assembly, story.assembled, story.chapters, request.video)
     if show is not None:
         show(story)
+    return row
+
+
+def checked_request(request: Request) -> tuple[Scenario, TrialSettings]:
+    """The scenario and the settings of a request.
+
+    Raises:
+        InputError: A setting that is not allowed, two that contradict each other, or a film that cannot be written.
+    """
+    scenario = load_scenario(request.scenario)
+    settings = requested_settings(request, scenario.clearance_mm)
+    if request.video is not None:
+        check_film(request.video)
+    return scenario, settings
 
 
 def lost_request(request: Request, spec: TrialSettings, scenario: Scenario, code: str) -> Row:
@@ -249,13 +220,11 @@ def lost_request(request: Request, spec: TrialSettings, scenario: Scenario, code
     return row | {"spec_hash": spec_hash(spec, content, text), **MEASURED}
 
 
-def _drawn(
-    request: Request, spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration, method: Any, watch: Any
-) -> Row:
+def _drawn(request: Request, spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration, watch: Any) -> Row:
     if request.save_observation:
         from apo_bench.files.json_forms import observation_form, write_form
 
         name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
         write_form(observation_form(look(spec, scene, simulated), name), request.save_observation)
     content = content_hash(scene.scenario, spec.scenario, scene.arm.files)
-    return trial_row(spec, scene, simulated, content, method=method, watch=watch)
+    return trial_row(spec, scene, simulated, content, watch=watch)

@@ -83,6 +83,15 @@ def simulate_demonstration(
     return SimulatedDemonstration(layout, demonstrate(scene, layout, careless, rng, watcher), watcher.watched())
 
 
+def demonstration_of(settings: TrialSettings, scene: Scene) -> SimulatedDemonstration:
+    """The demonstration of a trial.
+
+    Args:
+        scene: As compiled for these settings.
+    """
+    return simulate_demonstration(scene, settings.careless, settings.seed, settings.eye, settings.salt)
+
+
 def watch_again(
     scene: Scene, simulated: SimulatedDemonstration, careless: float, seed: int, salt: Salt | None, watch: Any
 ) -> None:

@@ -10,7 +10,6 @@ from typing import Any, cast
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Correction, Observation, Plan
 from apo_bench.correction.correctors import CorrectorMisbehaved
-from apo_bench.correction.own_code.own import CorrectorLost
 from apo_bench.correction.touches import UNSTATED, believe, slip_sigmas
 from apo_bench.errors import require
 from apo_bench.geometry import Array
@@ -39,7 +38,6 @@ from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.outcome_columns import (
     confidence_columns,
     head,
-    lost,
     method_columns,
     misbehaved,
     replay_columns,
@@ -53,6 +51,7 @@ from apo_bench.trial.stages import (
     WRENCH,
     SimulatedDemonstration,
     demonstration_failure,
+    demonstration_of,
     draw_robot_error,
     looks_at,
     observe_demonstration,
@@ -60,7 +59,6 @@ from apo_bench.trial.stages import (
     range_sensor,
     replay_and_judge,
     scene_of,
-    simulate_demonstration,
     stream,
     stream_key,
     trial_outcome,
@@ -113,7 +111,7 @@ def run_trial(
             not at hand.
         simulated: The demonstration of this seed and carelessness, if it is at hand.
         content: From `content_hash`, if it is at hand.
-        method: What `OwnCorrectors.find` makes of the method of `settings`, if it is at hand.
+        method: A corrector itself, in place of the one that `settings` name.
         watch: Called with the `MjData` of the replay about every 20 ms of simulated time; or several `Hooks`.
         cache: What replays of this scene and seed have in common; changes nothing but the time it takes.
 
@@ -121,9 +119,7 @@ def run_trial(
         InputError: The noise model, the relations or the corrector are unknown or returned what they must not.
     """
     scene = scene or scene_of(settings)
-    simulated = simulated or simulate_demonstration(
-        scene, settings.careless, settings.seed, settings.eye, settings.salt
-    )
+    simulated = simulated or demonstration_of(settings, scene)
     content = content or content_hash(scene.scenario, settings.scenario, scene.arm.files)
     first = head(settings, scene.scenario, spec_hash(settings, content))
     first |= {"demonstration": simulated.demonstration.code}
@@ -154,8 +150,6 @@ def trial_row(spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstrati
         if not wrong:
             return row
         why = f"the corrector '{spec.method}' returned what no row can hold ({wrong})"
-    except CorrectorLost as error:
-        return lost(spec, content, error.code, "corrector")
     except CorrectorMisbehaved as error:
         why = str(error)
     return misbehaved(spec, content, simulated.demonstration.code, why)
@@ -174,7 +168,6 @@ def run_measured(
     observation: Observation,
     text: str,
     *,
-    method: Any = None,
     watch: Any = None,
 ) -> Row:
     """Replay an observation that came from a file: its truth is not known.
@@ -184,7 +177,6 @@ def run_measured(
 
     Args:
         text: The content of the file, for the hash.
-        method: The method, as in `run_trial`.
 
     Raises:
         InputError: The method is `oracle`, which would need the truth.
@@ -198,7 +190,7 @@ def run_measured(
     first = head(settings, scene.scenario, spec_hash(settings, content, text)) | MEASURED | {"demonstration": "ok"}
     reference = nominal_where_seen(scene.scenario.goals, observation)
     corrector_input = _corrector_input(settings, observation, None)
-    return first | _row(settings, scene, observation, corrector_input, reference, None, method, watch, None, None)
+    return first | _row(settings, scene, observation, corrector_input, reference, None, None, watch, None, None)
 
 
 def _row(

@@ -16,7 +16,7 @@ from apo_bench import SweepSettings
 from apo_bench.records import ROW
 from apo_bench.statistics import Cell, tally
 from apo_bench.sweeps.grid import load_all, units
-from apo_bench.sweeps.sweep import read_sweep
+from apo_bench.sweeps.sweep_file import read_sweep
 from benchmarks import headline
 from benchmarks.headline import BEGIN, BLOCKS, END, KEPT, PAGE
 from benchmarks.headline_figure import NAME_HEIGHT, apart
@@ -58,7 +58,7 @@ def grid_of(described: dict[str, Any]) -> SweepSettings:
 
 def test_the_headline_holds_every_trial_of_its_grids_once() -> None:
     grids = [grid_of(described) for described in run_file()["grids"]]
-    asked = [trial for unit in units(grids, load_all(grids)) for trial in unit.trials]
+    asked = [trial for unit in units(grids, load_all(grids)) for trial in unit]
     expected = [(t.scenario, t.seed, t.method, t.level_mm, t.careless, t.noise, t.robot_error) for t in asked]
     assert sorted(map(key, kept_rows())) == sorted(expected)
     assert run_file()["rows"] == len(expected)
@@ -70,7 +70,7 @@ def test_the_page_says_so_where_the_sweep_file_asks_for_other_trials() -> None:
 
 def test_the_sweep_of_the_headline_is_small_and_meets_what_breaks_it() -> None:
     grids = read_sweep(GRID, {"trials": 1})
-    trials = [trial for unit in units(grids, load_all(grids)) for trial in unit.trials]
+    trials = [trial for unit in units(grids, load_all(grids)) for trial in unit]
     assert SEEDS * len(trials) <= MOST_TRIALS
     by_method = {method: {t.level_mm for t in trials if t.method == method and t.careless == 0} for method in METHODS}
     assert all(by_method[method] >= {0.1, 0.25, 0.5, 1.0, 2.0, 4.0} for method in METHODS)

@@ -244,14 +244,14 @@ def test_without_a_replay_there_is_no_film(capsys: pytest.CaptureFixture[str], t
 def test_no_result_is_exit_code_one(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     from dataclasses import replace
 
-    from apo_bench.trial import kept_demonstrations
+    from apo_bench.trial import stages
 
     def fails(*arguments: Any) -> Any:
         simulated = record(*arguments)
         return replace(simulated, demonstration=replace(simulated.demonstration, code="demonstration_failed"))
 
-    record = kept_demonstrations.simulate_demonstration
-    monkeypatch.setattr(kept_demonstrations, "simulate_demonstration", fails)
+    record = stages.simulate_demonstration
+    monkeypatch.setattr(stages, "simulate_demonstration", fails)
     code, out, _ = run(capsys, *TRIAL, "--json")
     assert code == 1
     assert json.loads(out)["success"] is None

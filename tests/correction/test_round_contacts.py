@@ -1,7 +1,6 @@
 """Contacts of round faces: what each fixes, that the goals are the best ones, and that what is said names them."""
 
 import gc
-import json
 import weakref
 from dataclasses import replace
 
@@ -13,7 +12,6 @@ from apo_bench import Assembly, ContactCorrector, InputError, Observation, corre
 from apo_bench.assembly import Gap, PartFace, SharedError, largest_gap, lowered
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.contact.contact import contact
-from apo_bench.correction.own_code.forms import observation_message, parse_observation
 from apo_bench.correction.region import contains_truth
 from apo_bench.correction.solvers.play import fit_covariance
 from apo_bench.geometry import pose
@@ -388,18 +386,15 @@ def test_a_lying_shaft_rolls_and_a_roof_of_two_planes_holds_it_on_a_line():
 
 
 def test_a_corrector_of_ones_own_gets_the_round_faces():
-    """The message to its process and back keeps faces, pieces and inertia, and so the equations."""
     observation, _ = case("cone in cone")
-    solids = {**observation.assembly.solids}
-    solids["pin"] = replace(solids["pin"], inertia=np.diag([3e-10, 3e-10, 1e-10]))
-    observation = replace(observation, assembly=replace(observation.assembly, solids=solids))
-    form, arrays = observation_message(observation)
-    again = parse_observation(json.loads(json.dumps(form)), arrays)
-    assert observation_message(again)[0] == form
-    pins = [one.assembly.solids["pin"] for one in (observation, again)]
-    assert pins[1].pieces[0].cylinder.radius == pins[0].pieces[0].cylinder.radius
-    assert pins[1].inertia.tobytes() == pins[0].inertia.tobytes()
-    assert correct(again).goals.tobytes() == correct(observation).goals.tobytes()
+    given = []
+
+    def own(seen):
+        given.append(seen)
+        return seen.goals
+
+    correct(observation, own)
+    assert given[0].assembly is observation.assembly
 
 
 def test_sheets_are_of_no_part():

@@ -17,7 +17,7 @@ from apo_bench.io.documents import DEEPEST_NESTING, parse_json, parse_toml
 from apo_bench.io.ordinary_files import read_bytes, read_text
 from apo_bench.observation.noise_file import read_noise
 from apo_bench.parts import load_part
-from apo_bench.sweeps.sweep import read_sweep
+from apo_bench.sweeps.sweep_file import read_sweep
 
 READERS: dict[str, Callable[[Path], object]] = {
     "any": lambda path: read_text(path, "file"),

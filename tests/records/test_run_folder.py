@@ -25,8 +25,7 @@ from apo_bench.records import KEY, ROW
 from apo_bench.records.run import run_folder
 from apo_bench.records.run.run_file import run_record
 from apo_bench.records.run.run_folder import RunFolder, read_rows
-from apo_bench.sweeps.work.environment_lock import versions
-from apo_bench.trial.fingerprint import code_files
+from apo_bench.trial.fingerprint import code_files, versions
 from apo_bench.trial.outcome_columns import result
 
 GRID = {"scenarios": ["block_on_block"], "levels": [1.0], "trials": 60}

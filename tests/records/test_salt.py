@@ -176,9 +176,9 @@ def test_a_salt_that_is_lost_is_not_made_again(tmp_path: Path) -> None:
 
 
 def test_every_trial_of_a_sweep_has_the_salt() -> None:
-    trials = [trial for unit in units([GRID], load_all([GRID]), HERE) for trial in unit.trials]
+    trials = [trial for unit in units([GRID], load_all([GRID]), HERE) for trial in unit]
     assert {trial.salt for trial in trials} == {HERE}
-    assert {trial.salt for unit in units([GRID], load_all([GRID])) for trial in unit.trials} == {None}
+    assert {trial.salt for unit in units([GRID], load_all([GRID])) for trial in unit} == {None}
 
 
 def of_salt(salt: str | None, methods: tuple[str, ...] = ("none",)) -> list[dict[str, Any]]:

@@ -20,7 +20,7 @@ from apo_bench.records import KEY, LEVEL, REQUIRED, ROW_FIELDS, SETTINGS, look_u
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.report.comparison.compare import compare
 from apo_bench.statistics import tally
-from apo_bench.sweeps.sweep import SWEEP_KEYS
+from apo_bench.sweeps.sweep_file import SWEEP_KEYS
 
 ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "tests" / "kept" / "row7"
@@ -72,10 +72,6 @@ def test_settings_of_a_row_are_those_that_it_was_made_with() -> None:
     [
         ({"grasp": "glue"}, "unknown grasp 'glue'. Known: friction, weld."),
         ({"looks": 101}, "a number of looks of 101 was given; whole numbers from 0 to 100 are allowed."),
-        (
-            {"looks": 1, "method": "m:f"},
-            "a number of looks of 1 was given with the method 'm:f', which runs in a process",
-        ),
         ({"wrench": "externall"}, "unknown wrench sensor 'externall'; did you mean 'external'?"),
         ({"stated_error": "drawnn"}, "unknown stated error 'drawnn'; did you mean 'drawn'?"),
         ({"wrench": None}, "None was given as wrench sensor; a name is needed, a str."),

@@ -7,18 +7,21 @@ import os
 import sys
 import time
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from apo_bench import InputError
+from apo_bench import InputError, correct
 from apo_bench.cli.app import main
-from apo_bench.scoring import program
+from apo_bench.correction.correctors import CorrectorMisbehaved
+from apo_bench.scoring import answers, program
+from apo_bench.scoring.answers import read_answers, write_request
 from apo_bench.scoring.entry import read_entry
-from apo_bench.scoring.program import LARGEST_ANSWER_BYTES, Program, read_answers
-from tests import scenes
+from apo_bench.scoring.program import LARGEST_ANSWER_BYTES, ask_program
+from tests import round_contacts, scenes
 
 TOWER = scenes.stick_in_tower()
 SEEN = scenes.seen(TOWER, TOWER.goals)
@@ -29,8 +32,7 @@ print(json.dumps({"goals": [{k: o[k] for k in ("position_mm", "quaternion_wxyz")
 ENDLESS = """
 import subprocess, sys
 from pathlib import Path
-endless = "import sys\\nwhile True: sys.stdout.write('x' * 65536)"
-child = subprocess.Popen([sys.executable, "-c", endless])
+child = subprocess.Popen([sys.executable, "-c", "import sys\\nCHILD"])
 Path("pid").write_text(str(child.pid))
 child.wait()
 """
@@ -47,9 +49,9 @@ title = "A small one"
 """
 
 
-def started(folder: Path, source: str) -> Program:
+def started(folder: Path, source: str) -> Any:
     (folder / "program.py").write_text(source)
-    return Program((sys.executable, "program.py"), str(folder))
+    return partial(ask_program, (sys.executable, "program.py"), str(folder))
 
 
 def test_a_program_finds_a_path_and_a_language_in_its_environment_and_nothing_else(
@@ -67,12 +69,25 @@ def test_a_program_finds_a_path_and_a_language_in_its_environment_and_nothing_el
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="what a program has started is found in /proc")
-def test_a_program_that_writes_without_end_is_ended_with_all_that_it_started(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="wrote more than 16 MB and was ended; one line of JSON is needed"):
-        started(tmp_path, ENDLESS)(SEEN)
-    child = int((tmp_path / "pid").read_text())
+@pytest.mark.parametrize(
+    ("child", "said"),
+    [
+        (
+            "while True: sys.stdout.write('x' * 65536)",
+            "wrote more than 16 MB and was ended; one line of JSON is needed",
+        ),
+        ("while True: pass", "took longer than 1 s and was ended"),
+    ],
+)
+def test_a_program_without_end_is_ended_with_its_children(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, child: str, said: str
+) -> None:
+    monkeypatch.setattr(program, "ANSWER_LIMIT_S", 1.0)
+    with pytest.raises(InputError, match=said):
+        started(tmp_path, ENDLESS.replace("CHILD", child))(SEEN)
+    command = Path(f"/proc/{(tmp_path / 'pid').read_text()}/cmdline")
     for _ in range(100):
-        if not Path(f"/proc/{child}/cmdline").exists() or not Path(f"/proc/{child}/cmdline").read_bytes():
+        if not command.exists() or not command.read_bytes():
             return
         time.sleep(0.1)
     pytest.fail("what the program started runs on")
@@ -85,6 +100,16 @@ def test_a_program_may_write_as_much_as_is_allowed_before_it_reads(tmp_path: Pat
         started(tmp_path, "raise SystemExit(3)")(SEEN)
     with pytest.raises(InputError, match="wrote no answer"):
         started(tmp_path, "")(SEEN)
+
+
+def test_a_program_is_told_of_round_faces_by_their_axes(tmp_path: Path) -> None:
+    contact, at, _ = round_contacts.CONTACTS["shaft in hole"]
+    observation = round_contacts.seen(*round_contacts.scene(contact, at=at), np.random.default_rng(0))
+    with pytest.raises(CorrectorMisbehaved, match="the request was written"):
+        correct(observation, partial(write_request, str(tmp_path)))
+    faces = json.loads(next(tmp_path.iterdir()).read_text())["faces"]
+    assert {face["kind"] for face in faces.values()} == {"plane", "cylinder"}
+    assert set(faces) == {"plate.bottom", "table.top", "pin.shaft", "plate.bore"}
 
 
 @pytest.fixture(scope="module")
@@ -121,14 +146,13 @@ def _one_pose_less(answers: list[Any]) -> str:
     [
         (lambda answers: lines(answers[:1]), "has no answer for 1 of 2 requests of the tracks, such as"),
         (lambda answers: lines([{**answer, "id": f"{i}"} for i, answer in enumerate(answers)]), "2 of 2 requests"),
-        (_one_pose_less, "entries are needed"),
-        (lambda answers: lines([answers[0], answers[0], answers[1]]), "line 2: a second answer for the request"),
+        (_one_pose_less, "2 goals are needed, 1 were given"),
+        (lambda answers: lines([answers[0], answers[0], answers[1]]), "line 2: a second answer for"),
         (lambda answers: lines([{**answers[0], "goals": "left"}, answers[1]]), "line 1, goals: a list is needed"),
         (lambda answers: lines([{"id": answers[0]["id"]}, answers[1]]), "the key 'goals' is missing"),
         (lambda answers: lines(["none", 5]), "line 1: an object"),
         (lambda answers: "these are no answers\n", "this is not JSON"),
         (lambda answers: lines(answers).replace("1", "NaN"), "must be finite"),
-        (lambda answers: " " * 1_000_001, "line 1: an answer has at most"),
     ],
 )
 def test_answers_that_are_not_those_of_the_track_are_refused_before_a_trial_runs(
@@ -161,7 +185,7 @@ def test_a_file_of_answers_may_be_large_and_answer_more_than_is_asked(
 
 
 def test_a_file_of_answers_has_a_largest_size(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(program, "LARGEST_ANSWERS_BYTES", 3)
+    monkeypatch.setattr(answers, "LARGEST_ANSWERS_BYTES", 3)
     (tmp_path / "goals.jsonl").write_text("    ")
-    with pytest.raises(InputError, match="has at most 3e-06 MB"):
+    with pytest.raises(InputError, match=r"goals\.jsonl"):
         read_answers(tmp_path / "goals.jsonl")

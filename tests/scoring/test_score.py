@@ -57,7 +57,7 @@ def test_every_track_is_no_larger_than_was_promised(name: str) -> None:
         grids = [grid for arm in track.arms for grid in track.of(method, arm)]
         for grid in grids:
             check_grids([grid])
-        trials = sum(len(unit.trials) for grid in grids for unit in units([grid], loaded))
+        trials = sum(len(unit) for grid in grids for unit in units([grid], loaded))
         assert 0 < trials <= FEWER.get(name, MOST)
         quick = [grid for arm in track.arms for grid in track.of(method, arm, quick=True)]
         assert all(grid.trials == track.quick_trials for grid in quick)

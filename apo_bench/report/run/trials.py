@@ -116,9 +116,7 @@ def limits_of(run: Mapping[str, Any]) -> Limits:
     """The limits that a sweep had when it was last started; the usual ones where it does not say."""
     limits = run.get("limits") or {}
     trial_s = limits.get("trial_s", USUAL_LIMITS.trial_s)
-    return Limits(
-        None if trial_s is None else float(trial_s), float(limits.get("corrector_s") or USUAL_LIMITS.corrector_s)
-    )
+    return Limits(None if trial_s is None else float(trial_s))
 
 
 def run_facts(run: Mapping[str, Any], rows: Mapping[str, Any]) -> list[FactTable]:

@@ -1,0 +1,128 @@
+"""Correctors of one's own, named as `module:name`: imported like any module, and whatever they do is one sentence."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from apo_bench import InputError, Scene, TrialSettings, build_scene, correct, load_scenario
+from apo_bench.correction.correctors import CorrectorMisbehaved
+from apo_bench.trial.stages import simulate_demonstration
+from apo_bench.trial.trial import trial_row
+from tests import scenes
+
+TOWER = scenes.stick_in_tower()
+SEEN = scenes.seen(TOWER, TOWER.goals)
+CODE = """
+import numpy as np
+from apo_bench.assembly.correction_record import Correction
+from apo_bench.correction.contact.contact import contact
+
+number = 3
+
+def leaves(seen):
+    raise SystemExit(0)
+
+def raises(seen):
+    raise ZeroDivisionError(object())
+
+def halves(seen):
+    raise ValueError("half a letter: \\ud800 and \\x1b[31m red")
+
+def nonsense(seen):
+    return "goals"
+
+def imaginary(seen):
+    return seen.goals * (1 + 0j)
+
+def wide(seen):
+    goals = np.array(seen.goals)
+    goals[:, 0, 3] = 1e9
+    return Correction(goals, "converged", "far", (), 0.0, 0.0, 0)
+
+def odd(seen):
+    return Correction(seen.goals, "converged", "odd", (0.5,), 0.0, 0.0, 0)
+
+def red(seen):
+    return Correction(seen.goals, "converged", "\\x1b[31m red", (), 0.0, 0.0, 0)
+
+class Asking:
+    def __call__(self, seen):
+        return seen.goals
+
+    def looking(self, seen, look):
+        raise ValueError(f"{look.left} looks")
+
+asking = Asking()
+"""
+MISBEHAVED = {
+    "leaves": r"it raised SystemExit\(0\)",
+    "raises": r"it raised ZeroDivisionError\(<object object at 0x\.\.\.>\)",
+    "halves": r"half a letter: \? and \\x1b\[31m red",
+    "nonsense": "returned a str",
+    "imaginary": "returned complex numbers as goals; return real ones",
+    "wide": r"a position of 1e\+09 m",
+    "odd": "'users:odd' returned",
+    "red": r"returned '\\x1b\[31m red' as its sentence",
+}
+
+
+@pytest.fixture(scope="module", autouse=True)
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    made = tmp_path_factory.mktemp("own")
+    (made / "users.py").write_text(CODE)
+    (made / "leaving.py").write_text("raise SystemExit(0)")
+    (made / "broken.py").write_text("def")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.syspath_prepend(str(made))
+        yield made
+    sys.modules.pop("users", None)
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return build_scene(load_scenario("block_on_block"))
+
+
+def row_of(scene: Scene, method: str, **more: Any) -> dict[str, Any]:
+    settings = TrialSettings("block_on_block", careless=0.0, method=method, seed=1, **more)
+    return dict(trial_row(settings, scene, simulate_demonstration(scene, 0.0, 1), "content"))
+
+
+def test_a_function_named_by_its_module_is_asked_as_one_by_name() -> None:
+    assert correct(SEEN, "users:contact").goals.tobytes() == correct(SEEN, "contact").goals.tobytes()
+
+
+@pytest.mark.parametrize("name", MISBEHAVED)
+def test_a_corrector_that_misbehaves_is_a_failure_with_its_sentence(name: str, scene: Scene) -> None:
+    row = row_of(scene, f"users:{name}")
+    assert (row["success"], row["failure_stage"], row["failure_code"]) == (False, "correct", "raised")
+    assert row["sentence"].isprintable()
+    assert re.search(MISBEHAVED[name], row["sentence"])
+
+
+def test_a_corrector_of_ones_own_may_look_again(scene: Scene) -> None:
+    assert "2 looks" in row_of(scene, "users:asking", looks=2)["sentence"]
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("not_there:at_all", "cannot be imported"),
+        ("users:leves", "did you mean 'leaves'"),
+        ("users:number", "is an int; give a function"),
+        ("users:", "is not of the form"),
+        (":leaves", "is not of the form"),
+        ("leaving:any", "SystemExit"),
+        ("broken:any", "SyntaxError"),
+    ],
+)
+def test_what_cannot_be_had_is_refused(name: str, words: str) -> None:
+    with pytest.raises(InputError, match=words) as raised:
+        correct(SEEN, name)
+    assert not isinstance(raised.value, CorrectorMisbehaved)
