@@ -5,8 +5,10 @@ from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.printing import group, print_answer, say
-from apo_bench.cli.setting_options import NO_RESULT, AsJson, check_outputs
+from apo_bench.cli.arguments import NO_RESULT, AsJson
+from apo_bench.cli.help import group
+from apo_bench.cli.outputs import check_outputs
+from apo_bench.cli.printing import print_answer, say
 from apo_bench.errors import require
 from apo_bench.io import write_file
 from apo_bench.records import check

@@ -12,57 +12,48 @@ from apo_bench.geometry import Array, pose
 from apo_bench.show.explain_text import explanation_form, hypothesis_forms, hypothesis_lines, sentences, total
 
 _CORRECTION = "apo-bench/correction/1"
-_TOO_GOOD = 1e-6
-"""A p-value nearer to 1 happens to nobody whose noise is what was stated, ..."""
-_TESTED = 3
-"""... if at least so many degrees of freedom are tested."""
+_TOO_GOOD = 1e-6  # a p-value nearer to 1 happens to nobody whose noise is what was stated ...
+_TESTED = 3  # ... if at least so many degrees of freedom are tested
 
 
-def correction_lines(
-    observation: Observation, correction: Correction, explanation: Explanation | None
-) -> list[tuple[str, str]]:
+def correction_lines(correction: Correction, explanation: Explanation | None) -> list[tuple[str, str]]:
     """How it ended, the gaps, the test, what is free: name and text of each line."""
+    contradictory = correction.status == "inconsistent"
     facts = {
-        "ended": f"{'' if correction.ok else f'{correction.status}: '}{correction.sentence}",
-        "contact gap": _gaps(correction),
-        "test": _test(correction.test, correction.status == "inconsistent"),
-        "left out": ", ".join(correction.dropped),
-        "test without": _test(correction.test_after, correction.status == "inconsistent"),
+        "ended": [correction.sentence if correction.ok else f"{correction.status}: {correction.sentence}"],
+        "contact gap": [_gaps(correction)],
+        "test": [_test(correction.test, contradictory)],
+        "left out": [", ".join(correction.dropped)],
+        "test without": [_test(correction.test_after, contradictory)],
         "may be": hypothesis_lines(correction.hypotheses),
-        "contacts": "" if explanation is None else total(explanation),
+        "contacts": [] if explanation is None else [total(explanation)],
         "free": [] if explanation is None else sentences(explanation),
     }
-    return [
-        ("" if i else name, text)
-        for name, said in facts.items()
-        for i, text in enumerate([said] if isinstance(said, str) else said)
-        if text
-    ]
+    return [("" if i else name, text) for name, texts in facts.items() for i, text in enumerate(texts) if text]
 
 
-def pose_table(observation: Observation, correction: Correction) -> Any:
-    """Corrected poses in mm and wxyz, and how far they were moved, as a table of `rich`."""
-    numbers = ("x mm", "y mm", "z mm", "qw", "qx", "qy", "qz", "moved mm", "turned deg")
-    table = Table("", "part", *(Column(name, justify="right") for name in numbers), box=None, pad_edge=False)
-    moved = _moved(observation, correction)
-    for k, operation in enumerate(observation.assembly.operations):
-        packed = pose.pack(correction.goals[k])
-        places = (*(_short(x, 3) for x in packed[:3] * 1e3), *(_short(q, 6) for q in packed[3:]))
-        table.add_row(str(k + 1), operation.main, *places, *(f"{x:.3f}" for x in moved[k]))
-    return table
-
-
-def suspect_table(test: Consistency) -> Any:
-    """Every relation, and how well the rest fits without it, as a table of `rich`."""
-    numbers = (Column(name, justify="right") for name in ("chi-square", "of", "p"))
-    table = Table("without", "made", "contacts", *numbers, "", box=None, pad_edge=False)
-    for suspect in test.suspects:
-        table.add_row(
-            *(suspect.relation, str(suspect.made + 1), ", ".join(map(str, suspect.contacts))),
-            *(f"{suspect.chi_square:.1f}", str(suspect.freedom), f"{suspect.p_value:.2g}"),
-            "may be wrong" if suspect in test.ambiguous else "",
-        )
-    return table
+def correction_tables(form: dict[str, Any]) -> list[Any]:
+    """Tables of `rich` of what `correction_form` says: corrected poses, and relations that may be wrong."""
+    tables = []
+    if form["operations"] is not None:
+        names = ("x mm", "y mm", "z mm", "qw", "qx", "qy", "qz", "moved mm", "turned deg")
+        poses = Table("", "part", *(Column(name, justify="right") for name in names), box=None, pad_edge=False)
+        for each in form["operations"]:
+            lengths = (f"{x:z.3f}" for x in each["position_mm"])
+            quaternion = (f"{q:z.6f}" for q in each["quaternion_wxyz"])
+            moved = (f"{each[key]:.3f}" for key in ("moved_mm", "turned_deg"))
+            poses.add_row(str(each["operation"]), each["part"], *lengths, *quaternion, *moved)
+        tables.append(poses)
+    if form["test"] is not None and form["test"]["suspects"]:
+        numbers = (Column(name, justify="right") for name in ("chi-square", "of", "p"))
+        suspects = Table("without", "made", "contacts", *numbers, "", box=None, pad_edge=False)
+        for each in form["test"]["suspects"]:
+            doubt = "may be wrong" if each["relation"] in form["test"]["ambiguous"] else ""
+            chi_square = np.inf if each["chi_square"] is None else each["chi_square"]
+            sizes = (f"{chi_square:.1f}", str(each["freedom"]), f"{each['p_value']:.2g}")
+            suspects.add_row(each["relation"], str(each["made"]), ", ".join(each["contacts"]), *sizes, doubt)
+        tables.append(suspects)
+    return tables
 
 
 def correction_form(
@@ -108,9 +99,7 @@ def _gaps(correction: Correction) -> str:
 def _test(test: Consistency | None, contradictory: bool) -> str:
     if test is None:
         return ""
-    numbers = (
-        f"chi-square {test.chi_square:.1f}, {test.freedom} degrees of freedom, p {shown_p(test.p_value, test.level)}"
-    )
+    numbers = f"chi-square {test.chi_square:.1f}, {test.freedom} degrees of freedom, p {test.p_value:.2g}"
     if test.passes and contradictory:
         return f"{numbers}, but the contacts contradict each other"
     if test.passes and test.p_value > 1.0 - _TOO_GOOD and test.freedom >= _TESTED:
@@ -122,13 +111,6 @@ def _test(test: Consistency | None, contradictory: bool) -> str:
     if contradictory:
         return f"{numbers}: the contacts contradict each other{who}"
     return f"{numbers}: longer than the stated noise explains{who}"
-
-
-def shown_p(p: float, level: float) -> str:
-    """Two digits, or as many as it takes to see on which side of the level it is."""
-    return next(
-        text for text in (f"{p:.{digits}g}" for digits in range(2, 18)) if (float(text) >= level) == (p >= level)
-    )
 
 
 def _moved(observation: Observation, correction: Correction) -> Array:
@@ -175,11 +157,6 @@ def _test_form(test: Consistency | None) -> dict[str, Any] | None:
         ],
         "ambiguous": [suspect.relation for suspect in test.ambiguous],
     }
-
-
-def _short(x: float, digits: int) -> str:
-    """No `-0.000`."""
-    return f"{round(float(x), digits) + 0.0:.{digits}f}"
 
 
 def _number(x: float) -> float | None:

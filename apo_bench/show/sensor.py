@@ -1,20 +1,14 @@
-"""One demonstration through the range finder, and all that it made of that: as a record, a form, lines, and a picture
-with a row for each operation: what a camera sees, range, difference, regions, fitted model."""
+"""One demonstration through the range finder, and what it made of that: as a record, as JSON, and in lines."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, final
 
 import numpy as np
 
-from apo_bench.assembly import Assembly
-from apo_bench.depth_camera.distance import strike_distances
 from apo_bench.depth_camera.follow import Event
-from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder
+from apo_bench.depth_camera.range_finder import RangeFinder
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
-from apo_bench.io import default_looks, save_figure
 from apo_bench.records import RANGE, check
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene import build_scene
@@ -29,14 +23,6 @@ from apo_bench.trial.stages import (
 )
 
 _FORM = "apo-bench/eye/1"
-_TITLES = ("TV camera, quiet", "range image [m]", "minus the one before [mm]", "appeared, vanished", "fitted model")
-_APPEARED = "#1b7837"
-_VANISHED = "#b2182b"
-_OUTLINE = "#d95f02"
-_AROUND = 20
-"""Pixels around what changed."""
-_LARGEST_MM = 60.0
-_RESIDUAL_MM = 5.0
 
 
 @final
@@ -140,68 +126,3 @@ def _seen(operation: dict[str, Any]) -> str:
         f"at {operation['time_s']:.2f} s; off by {operation['error_mm']:.2f} mm, {operation['error_deg']:.2f} deg; "
         f"known to {mm} mm, {deg} deg; explained by {models}"
     )
-
-
-@default_looks()
-def draw_sensor(run: SensorRun, out: Path, view: int = 0) -> None:
-    """Draw every operation that was noticed, in one view of the range finder."""
-    from matplotlib.figure import Figure
-
-    events = run.events
-    figure = Figure(figsize=(15.0, 2.55 * max(1, len(events)) + 0.3), layout="constrained")
-    rows = figure.subplots(max(1, len(events)), len(_TITLES), squeeze=False)
-    for axes, title in zip(rows[0], _TITLES, strict=True):
-        axes.set_title(title, fontsize=11)
-    for axes in rows.ravel():
-        axes.set(xticks=[], yticks=[])
-    for row, event in zip(rows, events, strict=False):
-        row[0].set_ylabel(_label(run.simulated.demonstration.assembly, event), fontsize=9)
-        _draw_row(row, run.watched, run.images, event, view)
-    # only where anything ever changed is shown
-    changed = [event.regions[view].appeared | event.regions[view].vanished for event in events]
-    v, u = np.nonzero(np.any(changed, axis=0)) if changed else (np.zeros(0), np.zeros(0))
-    for axes in rows[:, 1:].ravel() if len(u) else ():
-        axes.set(xlim=(u.min() - _AROUND, u.max() + _AROUND), ylim=(v.max() + _AROUND, v.min() - _AROUND))
-    save_figure(figure, out, dpi=72)
-
-
-def _label(assembly: Assembly, event: Event) -> str:
-    moved = ", ".join(sorted(event.moved)) or "nothing"
-    if event.operation is None:
-        return f"{moved}: not expected"
-    ended = "not recognised" if event.found is None else f"{100 * event.found.explained:.0f} % explained"
-    return f"{event.operation + 1}: {moved}, {ended}"
-
-
-def _draw_row(row: Any, watched: DemonstrationImages, images: Sequence[Array], event: Event, view: int) -> None:
-    from matplotlib.colors import ListedColormap
-
-    before = images[event.first][view]
-    after = images[event.last][view]
-    regions = event.regions[view]
-    row[0].imshow(watched.pictures[event.last], cmap="gray", vmin=0.0, vmax=1.0)
-    row[1].imshow(after, cmap="viridis_r", vmin=np.nanmin(after), vmax=np.nanquantile(after, 0.95))
-    row[2].imshow(1e3 * (after - before), cmap="RdBu", vmin=-_LARGEST_MM, vmax=_LARGEST_MM)
-    row[3].imshow(after, cmap="gray_r", vmin=np.nanmin(after), vmax=2.0 * np.nanmax(after))
-    for mask, color in ((regions.appeared, _APPEARED), (regions.vanished, _VANISHED)):
-        row[3].imshow(np.where(mask, 1.0, np.nan), cmap=ListedColormap([color]), vmin=0.0, vmax=1.0, alpha=0.8)
-    row[4].imshow(after, cmap="gray_r", vmin=np.nanmin(after), vmax=2.0 * np.nanmax(after))
-    if event.found is not None and event.shape is not None:
-        expected = _expected(watched.finder.views[view], event.found.T, event.shape)
-        drawn = row[4].imshow(
-            np.where(regions.appeared & (np.abs(after - expected) < 0.02), 1e3 * (after - expected), np.nan),
-            cmap="coolwarm",
-            vmin=-_RESIDUAL_MM,
-            vmax=_RESIDUAL_MM,
-        )
-        row[4].contour(np.isfinite(expected), levels=[0.5], colors=_OUTLINE, linewidths=1.2)
-        bar = row[4].figure.colorbar(drawn, ax=row[4], shrink=0.85)
-        bar.ax.tick_params(labelsize=7)
-        bar.set_label("measured - model [mm]", fontsize=7)
-
-
-def _expected(view: PinholeView, T: Array, shape: Any) -> Array:
-    """The range image of the fitted model alone, (height, width), [m]."""
-    # rays in the frame of the model, where its faces are known
-    distance, _ = strike_distances(shape, pose.apply(pose.inverse(T), view.origin[None])[0], view.rays @ T[:3, :3])
-    return distance.reshape(view.height, view.width)

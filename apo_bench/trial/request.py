@@ -26,7 +26,7 @@ from apo_bench.records import (
 from apo_bench.scenario import Scenario, in_the_air, load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.film.film import write_film
-from apo_bench.simulation.film.still import FilmTrack
+from apo_bench.simulation.film.track import FilmTrack
 from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.scene import Scene, check_film
 from apo_bench.trial.fingerprint import content_hash, spec_hash

@@ -11,8 +11,9 @@ import pytest
 import typer
 
 from apo_bench.cli.app import app, main
-from apo_bench.cli.printing import GROUPS, OPTIONS, OTHERS
-from apo_bench.cli.setting_options import axis_flag, completion, offered_names
+from apo_bench.cli.help import GROUPS, OPTIONS, OTHERS
+from apo_bench.cli.completion import completion, offered_names
+from apo_bench.cli.setting_options import axis_flag
 from apo_bench.observation.noise import NOISES, Level, make_noise
 from apo_bench.records import LEVEL, SETTINGS
 from apo_bench.records.short_names import checked_method, checked_relations
