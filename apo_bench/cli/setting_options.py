@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 from inspect import Parameter, signature
 from pathlib import Path
-from typing import Annotated, Any, TypeVar, get_origin
+from typing import Annotated, Any, TypeVar
 
 import typer
 
@@ -65,7 +65,8 @@ def _of_trial(info: SettingInfo) -> Parameter:
     described = f"{info.help}; default: {shown_default(info)}."
     if info.name == "salt":
         return _option(info.keyword, Path, described, parser=path_given, metavar="<path>")
-    return _option(info.keyword, get_origin(info.kind) or info.kind, described, autocompletion=_completion_of(info))
+    kind = getattr(info.kind, "__origin__", info.kind)
+    return _option(info.keyword, kind, described, autocompletion=_completion_of(info))
 
 
 def _axis(info: SettingInfo) -> Parameter:

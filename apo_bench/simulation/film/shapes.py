@@ -46,9 +46,7 @@ def shapes_of(scene: Scene, data: Any, snapshot: Snapshot) -> Iterator[Shape]:
     draw_over(scene, snapshot, drawn)
     for geom in drawn.geoms[: drawn.ngeom]:
         if geom.rgba[3] > 0.0 and geom.type != mujoco.mjtGeom.mjGEOM_PLANE:
-            kind = ShapeKind(
-                geom.type, tuple(geom.size.tolist()), geom.dataid // 2, tuple(geom.rgba.tolist()), geom.label
-            )
+            size, rgba = (tuple(numbers.tolist()) for numbers in (geom.size, geom.rgba))
             T = np.eye(4)
             T[:3, :3] = geom.mat
             T[:3, 3] = geom.pos
