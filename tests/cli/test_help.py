@@ -11,8 +11,8 @@ import pytest
 import typer
 
 from apo_bench.cli.app import app, main
-from apo_bench.cli.help import GROUPS, OPTIONS, OTHERS
 from apo_bench.cli.completion import completion, offered_names
+from apo_bench.cli.help import GROUPS, OPTIONS, OTHERS
 from apo_bench.cli.setting_options import axis_flag
 from apo_bench.observation.noise import NOISES, Level, make_noise
 from apo_bench.records import LEVEL, SETTINGS
@@ -107,9 +107,7 @@ def test_after_a_comma_what_is_there_is_not_offered_again() -> None:
 @pytest.mark.parametrize(
     ("shell", "typed", "words", "not_offered"),
     [
-        ("bash", "apo-bench com", "compare", "sweep"),
         ("bash", "apo-bench sweep stick_in_tower --methods none,contact", "none,contact-robust", "paper"),
-        ("zsh", "apo-bench replay stick", "stick_in_tower", "pocket"),
         ("fish", "apo-bench replay stick_in_tower --noise mega", "megapose-tless", "isotropic"),
     ],
 )
@@ -121,6 +119,6 @@ def test_a_shell_is_offered_names_and_commands(shell: str, typed: str, words: st
 
 def test_completion_loads_no_simulator() -> None:
     names = "[offered_names(what) for what in ('scenario', 'noise', 'arm')]"
-    program = f"import sys, apo_bench.cli.app; from apo_bench.cli.setting_options import offered_names; {names}"
+    program = f"import sys, apo_bench.cli.app; from apo_bench.cli.completion import offered_names; {names}"
     check = f"{program}; sys.exit(any(name in sys.modules for name in ('mujoco', 'scipy', 'matplotlib', 'mink')))"
     assert subprocess.run([sys.executable, "-c", check], check=False).returncode == 0

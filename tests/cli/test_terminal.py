@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 
 from apo_bench.assembly import Outcome
-from apo_bench.cli.terminal import print_cells, print_row
+from apo_bench.cli.terminal import print_cells
+from apo_bench.cli.trial_text import print_row
 from apo_bench.statistics import tally
 from apo_bench.trial.outcome_columns import result
 from tests.statistics.test_rates import row

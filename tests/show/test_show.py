@@ -78,9 +78,7 @@ def test_a_picture_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
             ("--level", "1", "--observation", "docs/seen.csv"),
             "--level, which draws a trial, was given together with",
         ),
-        (("--method", "contakt"), "contact"),
         (("--out", "seen.jpg"), "ends in .png"),
-        (("--eye", "telescope"), "telescope"),
     ],
 )
 def test_wrong_requests(arguments: tuple[str, ...], part: str, capsys: pytest.CaptureFixture[str]) -> None:
