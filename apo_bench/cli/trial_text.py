@@ -13,6 +13,30 @@ from apo_bench.trial.promise import promise_sentence
 _SAID = ("eye", "noise", "relations", "looks", "robot_error", "abstain", "wrench", "stated_error")
 """Settings that are said if they are not as usual; the last two only of robots that feel."""
 
+_MEASURED = (
+    ("gap_before_mm", "contact gap", "{gap_before_mm:.3f} mm as seen"),
+    ("gap_after_mm", "planned gap", "{gap_after_mm:.3f} mm"),
+    ("worst_gap_mm", "reached", "least overlap {least_overlap:.2f}, worst gap {worst_gap_mm:.3f} mm"),
+    (
+        "pose_error_fixed_mm",
+        "pose error",
+        "{pose_error_fixed_mm:.3f} mm fixed by contacts, {pose_error_free_mm:.3f} mm free",
+    ),
+    (
+        "planned_error_fixed_mm",
+        "planned error",
+        "{planned_error_fixed_mm:.3f} mm fixed by contacts, {planned_error_free_mm:.3f} mm free",
+    ),
+    ("sim_seconds", "peak force", "{peak_force_n:.1f} N in {sim_seconds:.1f} simulated seconds"),
+    (
+        "touches",
+        "felt",
+        "its base is off by {felt_mm:.2f} mm and {felt_deg:.2f} degrees (deviations {felt_sure_mm:.2f} and "
+        "{felt_sure_deg:.2f}): {touches} touches, {touches_refused} more refused",
+    ),
+)
+"""Column -> name and text of a line, if the column has a value."""
+
 
 def print_row(row: Row) -> None:
     """Print a line for everything that is known of a trial."""
@@ -22,48 +46,34 @@ def print_row(row: Row) -> None:
     console().print(table)
 
 
-def _lines(row: Row) -> list[tuple[str, str]]:
-    lines = [
-        ("scenario", f"{row['scenario']}, {row['grasp']} grasp, {row['clearance_mm']:g} mm clearance"),
-        ("trial", "measured observation" if row["level"] is None else ", ".join(_settings(row))),
-        ("method", row["method"]),
-        ("result", _result(row)),
-        ("ended", row["sentence"] or ""),
-    ]
-    if row["gap_before_mm"] is not None:
-        gaps = f"{row['gap_before_mm']:.3f} mm as seen"
-        gaps += "" if row["gap_after_mm"] is None else f", {row['gap_after_mm']:.3f} mm as planned"
-        lines.append(("contact gap", gaps))
+def _lines(row: Row) -> Iterator[tuple[str, str]]:
+    yield "scenario", f"{row['scenario']}, {row['grasp']} grasp, {row['clearance_mm']:g} mm clearance"
+    yield "trial", "measured observation" if row["level"] is None else ", ".join(_settings(row))
+    yield "method", row["method"]
+    yield "result", _result(row)
+    yield "ended", row["sentence"] or ""
     for attempt in row["tried"] or ():
-        lines.append((f"after step {attempt['step']}", _attempt(attempt)))
+        yield f"after step {attempt['step']}", _attempt(attempt)
     if row["freed"]:
-        lines.append(("freed", _braced(row["freed"])))
+        yield "freed", _braced(row["freed"])
     if row["extra_operations"]:
-        lines.append(("schedule", f"{row['extra_operations']} operations beyond doing each once"))
+        yield "schedule", f"{row['extra_operations']} operations beyond doing each once"
     if row["free_moved"]:
         moved = ", ".join(f"operation {move['operation']} by {move['mm']:.1f} mm" for move in row["free_moved"])
-        lines.append(("free directions", f"{moved}, so that the plan fits"))
+        yield "free directions", f"{moved}, so that the plan fits"
     if row["predicted"] is not None:
-        lines.append(("predicted", _predicted(row["predicted"])))
+        yield "predicted", _predicted(row["predicted"])
     if (promised := row.get("promised")) is not None:
-        lines.append(("promised", promise_sentence(promised)))
-    if row["worst_gap_mm"] is not None:
-        reached = f"least overlap {row['least_overlap']:.2f}, worst gap {row['worst_gap_mm']:.3f} mm"
-        missed = "" if row["loose_success"] else "not every contact was made, even loosely: "
-        lines.append(("reached", f"{missed}{reached}"))
-    if row["pose_error_fixed_mm"] is not None:
-        lines.append(("pose error", _errors(row["pose_error_fixed_mm"], row["pose_error_free_mm"])))
-    if row["planned_error_fixed_mm"] is not None:
-        lines.append(("planned error", _errors(row["planned_error_fixed_mm"], row["planned_error_free_mm"])))
+        yield "promised", promise_sentence(promised)
+    if row["loose_success"] is False and row["worst_gap_mm"] is not None:
+        yield "contacts", "not every contact was made, even loosely"
     if row["p_value"] is not None:
-        lines.append(("test", _test(row)))
-    if row["sim_seconds"] is not None:
-        lines.append(("peak force", f"{row['peak_force_n']:.1f} N in {row['sim_seconds']:.1f} simulated seconds"))
-    if (touches := row.get("touches")) is not None:
-        lines.append(("felt", _felt(row, touches)))
+        yield "test", _test(row)
+    for column, name, template in _MEASURED:
+        if row.get(column) is not None:
+            yield name, template.format_map(row)
     if row["moved_in_hand"]:
-        lines.append(("in the hand", _in_hand(row["moved_in_hand"], row["failure_operation"])))
-    return lines
+        yield "in the hand", _in_hand(row["moved_in_hand"], row["failure_operation"])
 
 
 def _settings(row: Row) -> Iterator[str]:
@@ -75,18 +85,6 @@ def _settings(row: Row) -> Iterator[str]:
         value = look_up(row, name) or SETTINGS[name].default
         if value != SETTINGS[name].default:
             yield f"{name.replace('_', ' ')} {value}"
-
-
-def _errors(fixed_mm: float | None, free_mm: float | None) -> str:
-    return f"{fixed_mm:.3f} mm fixed by contacts, {free_mm:.3f} mm free"
-
-
-def _felt(row: Row, touches: int) -> str:
-    """`its base is off by 0.62 mm and 0.08 degrees (deviations 0.05 and 0.01): 9 touches, 1 more refused`."""
-    off = f"its base is off by {row['felt_mm']:.2f} mm and {row['felt_deg']:.2f} degrees"
-    sure = f"deviations {row['felt_sure_mm']:.2f} and {row['felt_sure_deg']:.2f}"
-    refused = f", {row['touches_refused']} more refused" * bool(row["touches_refused"])
-    return f"{off} ({sure}): {touches} touch{'es' * (touches != 1)}{refused}"
 
 
 def _in_hand(moved: Sequence[MovedInHand], failed: int | None) -> str:

@@ -44,9 +44,10 @@ def layout_graph(graph: Graph) -> GraphLayout:
     rows = _rows(graph, ground)
     row = {item: j for j, items in enumerate(rows) for item in items}
     routes = tuple(_route(i, arc, row) for i, arc in enumerate(graph.arcs))
-    for bend in (item for route in routes for item in route[1:-1]):
-        rows[bend.row].append(bend)
-        row[bend] = bend.row
+    for item in (item for route in routes for item in route):
+        if isinstance(item, Bend):
+            rows[item.row].append(item)
+            row[item] = item.row
     return GraphLayout(ground, row, _columns(rows, routes, ground), routes)
 
 

@@ -114,7 +114,7 @@ def _draw_node(axes: Any, node: Node, at: Array, width_in: float, face: Any) -> 
     pad = 0.08
     axes.add_patch(
         FancyBboxPatch(
-            at - [width_in / 2 - pad, _BOX_IN / 2 - pad],
+            (at[0] - width_in / 2 + pad, at[1] - _BOX_IN / 2 + pad),
             width_in - 2 * pad,
             _BOX_IN - 2 * pad,
             boxstyle=f"round,pad={pad}",

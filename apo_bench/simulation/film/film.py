@@ -65,14 +65,16 @@ def frames(
                 empty = moment.doing.macro in (BY_HAND, TOUCHING)
                 force = "" if empty else f"force {force_n:.1f} N, most {most_n:.1f} N"
                 caption = Caption(chapter.title, pace, _lines(assembly, moment), force)
-                yield add_caption(*_draw(chapter, data, moment, views), caption), 1.0 / fps
+                yield _draw(chapter, data, moment, views, caption), 1.0 / fps
             ending = tuple(textwrap.wrap(chapter.ending, _LETTERS, max_lines=2, placeholder=" .."))
             caption = Caption(chapter.title, pace, ending, good=chapter.good)
-            yield add_caption(*_draw(chapter, data, chapter.moments[-1], views), caption), _ENDING_S
+            yield _draw(chapter, data, chapter.moments[-1], views, caption), _ENDING_S
 
 
-def _draw(chapter: Chapter, data: Any, moment: FilmMoment, views: Sequence[tuple[Any, Any]]) -> list[Picture]:
-    """A moment as each renderer sees it through its camera."""
+def _draw(
+    chapter: Chapter, data: Any, moment: FilmMoment, views: Sequence[tuple[Any, Any]], caption: Caption
+) -> Picture:
+    """A moment as both renderers see it through their cameras, the large one first."""
     data.qpos[:] = moment.qpos
     if len(moment.hands):
         data.mocap_pos[:] = moment.hands
@@ -82,7 +84,7 @@ def _draw(chapter: Chapter, data: Any, moment: FilmMoment, views: Sequence[tuple
         draws.update_scene(data, camera=camera)
         draws.scene.flags[mujoco.mjtRndFlag.mjRND_SHADOW] = False
         pictures.append(draws.render())
-    return pictures
+    return add_caption(pictures[0], pictures[1], caption)
 
 
 def sampled(moments: Sequence[FilmMoment], every_s: float) -> Iterator[tuple[FilmMoment, float, float]]:
