@@ -1,17 +1,17 @@
 """A trial in a browser, by viser: stepped through with a slider and buttons; served on this machine only."""
 
 import io
-import threading
 import time
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable
 from contextlib import redirect_stdout
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.show.stepping import COLOR_NAMES, FACES, Cursor
+from apo_bench.show.stepping import Cursor
 from apo_bench.simulation.film.film import FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG
 from apo_bench.simulation.film.framing import frame_parts
 from apo_bench.simulation.film.shapes import ShapeKind, shapes_of, surface
@@ -26,14 +26,14 @@ _BUTTONS = (
     {"play / stop": "play", "moment back": "previous", "moment on": "next"},
     {"operation back": "previous operation", "operation on": "next operation"},
     {"demonstration": "previous chapter", "replay": "next chapter"},
+    {"names of faces": "faces", "goals": "goals"},
 )
+"""Label -> what `Cursor.press` is told."""
 
 
 def no_browser() -> str:
     """Why nothing can be shown in a browser, empty where it can."""
-    try:
-        import viser  # noqa: F401
-    except ImportError:
+    if find_spec("viser") is None:
         return 'viser is not installed; install it with: pip install "apo_bench[view]"'
     return ""
 
@@ -55,8 +55,7 @@ def serve_story(story: Story, port: int, say: Callable[[str], None], ends: Calla
             page.draw()
             time.sleep(PICTURE_S)
             now = time.monotonic()
-            with page.lock:
-                page.cursor.pass_time(now - before)
+            page.cursor.pass_time(now - before)
             before = now
     finally:
         page.close()
@@ -67,30 +66,34 @@ class Page:
 
     def __init__(self, story: Story, port: int) -> None:
         self.cursor = Cursor(story)
-        self.lock = threading.Lock()
+        self._asked = deque[str | int]()
         self._data = initial_state(story.scene.work, story.chapters[0].start)
         self._server = _server(port)
         self._drawn: object = None
         self._shown: dict[tuple[ShapeKind, int], Any] = {}
         self.address = f"http://{HOST}:{self._server.get_port()}"
         self._aim_camera(story)
-        self._add_controls(story)
+        self._add_controls()
 
     def close(self) -> None:
         with redirect_stdout(io.StringIO()):
             self._server.stop()
 
     def draw(self) -> None:
-        """Bring the page up to date, if anything has changed."""
-        with self.lock:
-            state = (self.cursor.place, self.cursor.faces, self.cursor.goals)
-            snapshot = self.cursor.snapshot()
+        """Do what was asked for, and bring the page up to date if anything has changed."""
+        while self._asked:
+            asked = self._asked.popleft()
+            if isinstance(asked, str):
+                self.cursor.press(asked)
+            elif not self.cursor.playing:
+                self.cursor.go(asked)
+        state = (self.cursor.place, self.cursor.faces, self.cursor.shows_goals)
         if state == self._drawn:
             return
-        shapes = list(shapes_of(self.cursor.story.scene, self._data, snapshot))
+        snapshot = self.cursor.snapshot()
         count = Counter[ShapeKind]()
         with self._server.atomic():
-            for kind, at in shapes:
+            for kind, at in shapes_of(self.cursor.story.scene, self._data, snapshot):
                 handle = self._handle(kind, count[kind])
                 count[kind] += 1
                 if not np.array_equal(at, (*handle.position, *handle.wxyz)):
@@ -134,32 +137,16 @@ class Page:
         view.position = at - far * np.array(ahead)
         view.fov = _FOV_RAD
 
-    def _add_controls(self, story: Story) -> None:
+    def _add_controls(self) -> None:
         gui = self._server.gui
         gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
         gui.set_panel_label("apo-bench view")
         self._words = gui.add_markdown("")
         self._slider = gui.add_slider("moment", 0, len(self.cursor.places) - 1, 1, 0)
-        self._slider.on_update(lambda event: self._do(self._slide, int(event.target.value)))
-        for keys in _BUTTONS if len(story.chapters) > 1 else _BUTTONS[:2]:
+        self._slider.on_update(lambda event: self._asked.append(int(event.target.value)))
+        for keys in _BUTTONS:
             group = gui.add_button_group("", tuple(keys))
-            group.on_click(lambda event, keys=keys: self._do(self.cursor.press, keys[event.target.value]))
-        faces = gui.add_dropdown("names of faces", FACES, initial_value="this operation")
-        faces.on_update(lambda _: self._do(setattr, self.cursor, "faces", faces.value))
-        for name in story.goals:
-            box = gui.add_checkbox(f"{name} ({COLOR_NAMES[name]})", False)
-            box.on_update(lambda event, name=name: self._do(self._show_goals, name, event.target.value))
-
-    def _do(self, what: Callable[..., object], *arguments: object) -> None:
-        with self.lock:
-            what(*arguments)
-
-    def _slide(self, place: int) -> None:
-        if place != self.cursor.place and not self.cursor.playing:
-            self.cursor.go(place)
-
-    def _show_goals(self, name: str, wanted: bool) -> None:
-        self.cursor.goals = self.cursor.goals | {name} if wanted else self.cursor.goals - {name}
+            group.on_click(lambda event, keys=keys: self._asked.append(keys[event.target.value]))
 
 
 def _server(port: int) -> Any:

@@ -15,8 +15,12 @@ from apo_bench.trial.story import AS_CORRECTED, AS_SEEN, AS_TRUE, Story
 
 Faces = Literal["none", "this operation", "all"]
 FACES: tuple[Faces, ...] = ("none", "this operation", "all")
-COLORS: dict[str, Color] = {AS_SEEN: (0.95, 0.55, 0.1), AS_CORRECTED: (0.15, 0.7, 0.3), AS_TRUE: (0.55, 0.35, 0.85)}
-COLOR_NAMES = {AS_SEEN: "orange", AS_CORRECTED: "green", AS_TRUE: "violet"}
+_COLORS: dict[str, tuple[str, Color]] = {
+    AS_SEEN: ("orange", (0.95, 0.55, 0.1)),
+    AS_CORRECTED: ("green", (0.15, 0.7, 0.3)),
+    AS_TRUE: ("violet", (0.55, 0.35, 0.85)),
+}
+"""Of goals."""
 
 
 @final
@@ -29,8 +33,7 @@ class Cursor:
     """The number of the moment, from 0, through all chapters."""
     playing: bool = False
     faces: Faces = "this operation"
-    goals: frozenset[str] = frozenset()
-    """Names of goals that are drawn."""
+    shows_goals: bool = False
     _played_s: float = 0.0
 
     def __post_init__(self) -> None:
@@ -66,7 +69,7 @@ class Cursor:
         elif key == "faces":
             self.faces = FACES[(FACES.index(self.faces) + 1) % len(FACES)]
         elif key == "goals":
-            self.goals = frozenset() if self.goals else frozenset(self.story.goals)
+            self.shows_goals = not self.shows_goals
         elif what == "operation":
             self._jump([(id(chapter), moment.doing.operation) for chapter, moment in self.places], way)
         elif what == "chapter":
@@ -96,6 +99,8 @@ class Cursor:
             words.append(f"force {moment.doing.force_n:.1f} N")
         if k is not None:
             words += [*map(str, self._assembly.operations[k].contacts), *self._offsets(k)]
+        if self.shows_goals:
+            words += [f"{_COLORS[name][0]}: {name}" for name in self.story.goals]
         if ending and self._is_last:
             words.append(ending)
         return tuple(words)
@@ -133,12 +138,12 @@ class Cursor:
     def _overlays(self) -> tuple[Overlay, ...]:
         """What was moved up to here, where goals put it."""
         k = self.moment.doing.operation
-        if k is None:
+        if k is None or not self.shows_goals:
             return ()
         begun = self._assembly.first(k + 1)
         moved = {part for operation in begun.operations for part in operation.moves}
         overlays = []
-        for name in (name for name in self.story.goals if name in self.goals):
-            poses = placements(begun, self.chapter.start, self.story.goals[name][: k + 1])[-1]
-            overlays.append(Overlay(name, {part: poses[part] for part in poses if part in moved}, COLORS[name]))
+        for name, goals in self.story.goals.items():
+            poses = placements(begun, self.chapter.start, goals[: k + 1])[-1]
+            overlays.append(Overlay({part: poses[part] for part in moved}, _COLORS[name][1]))
         return tuple(overlays)

@@ -21,7 +21,6 @@ _OFF_M = 0.004  # how far before a flat face its name stands
 class Overlay(NamedTuple):
     """Parts drawn once more, where they are believed or should be."""
 
-    name: str
     poses: Poses
     color: Color
 

@@ -28,14 +28,8 @@ WINDOW_KEYS = {
     269: "goals",
 }
 """What keys mean, by their GLFW codes: letters and digits have a meaning for MuJoCo's window already."""
-_HELP = (
-    ("space", "play, stop"),
-    ("left, right", "a moment"),
-    ("up, down", "an operation"),
-    ("page up, page down", "demonstration, replay"),
-    ("home", "names of faces"),
-    ("end", "goals"),
-)
+_KEYS = "space\nleft, right\nup, down\npage up, page down\nhome\nend"
+_MEANINGS = "play, stop\na moment\nan operation\ndemonstration, replay\nnames of faces\ngoals"
 PICTURE_S = 1.0 / 30.0
 
 
@@ -101,6 +95,5 @@ def _draw(scene: Scene, data: Any, snapshot: Snapshot, window: Any) -> None:
     draw_over(scene, snapshot, window.user_scn)
     font = mujoco.mjtFontScale.mjFONTSCALE_150
     place = mujoco.mjtGridPos
-    keys, meanings = ("\n".join(words) for words in zip(*_HELP, strict=True))
     words = "\n".join((snapshot.chapter.title, *snapshot.words))
-    window.set_texts([(font, place.mjGRID_TOPLEFT, words, ""), (font, place.mjGRID_BOTTOMLEFT, keys, meanings)])
+    window.set_texts([(font, place.mjGRID_TOPLEFT, words, ""), (font, place.mjGRID_BOTTOMLEFT, _KEYS, _MEANINGS)])
