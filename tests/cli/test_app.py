@@ -85,18 +85,6 @@ def test_a_graph_shows_the_residuals_of_an_observation(capsys: pytest.CaptureFix
     assert out.splitlines()[-1].endswith("[pz-sfl py-sny ny-spy]  3.000 mm, above 0.1")
 
 
-def test_a_graph_says_what_was_not_seen(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    path = _castle_aside(tmp_path, 3.0)
-    document = json.loads(path.read_text())
-    document["operations"][1]["seen"] = False
-    path.write_text(json.dumps(document))
-    _, out, _ = run(capsys, "graph", "stick_in_tower", "--observation", str(path), "--json")
-    known = [arc["residual_mm"] is not None for arc in json.loads(out)["arcs"]]
-    assert known == [True, False, True, False]
-    _, out, _ = run(capsys, "graph", "stick_in_tower", "--observation", str(path))
-    assert out.splitlines()[-1].endswith("not seen")
-
-
 def _castle_aside(folder: Path, mm: float) -> Path:
     """An observation of example 5.1 that is right but for the upper castle, which stands aside along y."""
     from apo_bench import Observation
@@ -112,7 +100,7 @@ def _castle_aside(folder: Path, mm: float) -> Path:
     return folder / "seen.json"
 
 
-@pytest.mark.parametrize("arguments", [[], ["--help"], ["graph", "--help"], ["replay", "--help"], ["sweep", "--help"]])
+@pytest.mark.parametrize("arguments", [[], ["sweep", "--help"]])
 def test_help_is_a_result(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     code, out, err = run(capsys, *arguments)
     assert (code, err) == (0, "")
@@ -198,16 +186,6 @@ def test_a_table_is_replayed_like_json(capsys: pytest.CaptureFixture[str], tmp_p
     _refused(run(capsys, *MEASURED, "--observation", str(path)), "standard deviations are missing; add columns")
     code, out, err = run(capsys, "graph", "stick_in_tower", "--observation", str(path))
     assert (code, err, "mm" in out) == (0, "", True)
-
-
-def test_a_scenario_file_can_be_replayed(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
-    from apo_bench.resources import folder
-
-    path = tmp_path / "mine.toml"
-    path.write_text((folder("scenarios") / "stick_in_tower.toml").read_text())
-    code, out, _ = run(capsys, "replay", str(path), "--seed", "5", "--method", "none", *HOPELESS, "--json")
-    assert code == 0
-    assert json.loads(out)["scenario"] == "mine"
 
 
 def test_a_film_is_written(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -325,11 +303,3 @@ def _refused(ended: tuple[int, str, str], words: str) -> None:
     assert err.startswith("apo-bench: ")
     assert err.count("\n") == 1
     assert "Traceback" not in err
-
-
-def test_an_interrupted_command_says_so(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
-    def interrupted(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("apo_bench.cli.terminal.print_scenarios", interrupted)
-    assert run(capsys, "scenarios") == (130, "", "apo-bench: interrupted.\n")

@@ -13,9 +13,7 @@ import typer
 from apo_bench.cli.app import app, main
 from apo_bench.cli.completion import completion, offered_names
 from apo_bench.cli.help import GROUPS, OPTIONS, OTHERS
-from apo_bench.cli.setting_options import axis_flag
 from apo_bench.observation.noise import NOISES, Level, make_noise
-from apo_bench.records import LEVEL, SETTINGS
 from apo_bench.records.short_names import checked_method, checked_relations
 from apo_bench.scenario.file import scenario_names
 from apo_bench.simulation.arms.finding import arm_names
@@ -72,19 +70,6 @@ def test_help_cuts_no_sentence(words: tuple[str, ...], capsys: pytest.CaptureFix
     for name in EVERY[words].commands:
         first = " ".join(EVERY[(*words, name)].help.split("\n\n")[0].split())
         assert first.split(". ")[0].rstrip(".") in said
-
-
-def test_the_option_of_an_axis_is_named_as_it_is_typed() -> None:
-    typed = {option.opts[0] for option in EVERY["sweep",].params}
-    assert {axis_flag(info) for info in (LEVEL, *SETTINGS.values()) if info.axis and info.help} <= typed
-
-
-def test_the_arms_of_other_collections_are_named(capsys: pytest.CaptureFixture[str]) -> None:
-    for command in ("replay", "sweep", "scene"):
-        main([command, "--help"])
-        said = capsys.readouterr().out
-        assert "menagerie:NAME" in said
-        assert "robosuite:NAME" in said
 
 
 def test_names_that_are_offered_are_the_names_there_are() -> None:

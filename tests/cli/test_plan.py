@@ -262,23 +262,6 @@ def test_undoing_reverses_the_macros() -> None:
     assert (cube.came_from, cube.back_to, cube.goal) == ("T4", "T2", None)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("plan", "stick_in_towr"), ("unknown scenario", "stick_in_tower")),
-        (("plan", "stick_in_tower", "--method", "none"), ("--method none", "--observation")),
-        (("plan", "stick_in_tower", "--observation", "nowhere.csv"), ("nowhere.csv",)),
-        (("plan", "stick_in_tower", "--observation", str(SEEN), "--method", "papr"), ("papr", "did you mean")),
-        (("plan", "stick_in_tower", "--observation", str(SEEN), "--method", "oracle"), ("oracle", "truth")),
-        (("plan", "carried_bridge", "--observation", str(SEEN)), ("seen.csv",)),
-    ],
-)
-def test_wrong_requests(capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], words: tuple[str, ...]) -> None:
-    code, out, err = run(capsys, *arguments)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert all(word in err for word in words), err
-
-
 TOWER = (ROOT / "scenarios" / "stick_in_tower.toml").read_text(encoding="utf-8")
 ATTACH = 'attach = { along = "+x", travel_mm = 160 }\n'
 
@@ -316,12 +299,6 @@ def test_a_line_that_cannot_be_one_is_refused(tmp_path: Path, attach: str, words
     with pytest.raises(InputError) as refused:
         tower(tmp_path, attach)
     assert all(word in str(refused.value) for word in words), refused.value
-
-
-def test_no_shipped_scenario_states_what_is_found_without_need() -> None:
-    """Where a line is stated, the stated grasp asks for that end of the hole."""
-    stated = {name for name in scenario_names() if "attach =" in (ROOT / "scenarios" / f"{name}.toml").read_text()}
-    assert stated == {"stick_in_tower", "carried_bridge"}
 
 
 @pytest.mark.parametrize("name", SOME)
