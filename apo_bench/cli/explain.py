@@ -58,15 +58,16 @@ def explain_command(
         from apo_bench.show.explain_picture import draw_explanation
 
         draw_explanation(loaded, seen, explanation, out)
+    form = explanation_form(loaded.name, explanation)
     if as_json:
         known = {"promised": promised, "hypotheses": hypothesis_forms(explanation.hypotheses)}
-        print_json(explanation_form(loaded.name, explanation) | known)
+        print_json(form | known)
     else:
         lines = [f"{loaded.name}: {total(explanation)}", where]
         if promised is not None:
             lines.append(f"promised: {promise_sentence(promised)}")
         lines += [f"may be {line}" for line in hypothesis_lines(explanation.hypotheses)]
         typer.echo("\n".join([*lines, "", *sentences(explanation)]))
-        print_tables(part_table(explanation))
+        print_tables(part_table(form))
     if out is not None:
         say(f"\nWrote {out}", as_json)

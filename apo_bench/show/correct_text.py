@@ -3,17 +3,34 @@
 from typing import Any
 
 import numpy as np
-from rich.table import Column, Table
 
 from apo_bench.assembly import Consistency, Correction, Observation
 from apo_bench.correction.explanation import Explanation
 from apo_bench.files.json_forms import covariance_form, pose_form
 from apo_bench.geometry import Array, pose
 from apo_bench.show.explain_text import explanation_form, hypothesis_forms, hypothesis_lines, sentences, total
+from apo_bench.show.tables import form_table
 
 _CORRECTION = "apo-bench/correction/1"
 _TOO_GOOD = 1e-6  # a p-value nearer to 1 happens to nobody whose noise is what was stated ...
 _TESTED = 3  # ... if at least so many degrees of freedom are tested
+_POSE_COLUMNS = {
+    "operation": "d",
+    "part": "",
+    "position_mm": "z.3f",
+    "quaternion_wxyz": "z.6f",
+    "moved_mm": ".3f",
+    "turned_deg": ".3f",
+}
+_SUSPECT_COLUMNS = {
+    "relation": "",
+    "made": "d",
+    "contacts": "",
+    "chi_square": ".1f",
+    "freedom": "d",
+    "p_value": ".2g",
+    "may_be_wrong": "",
+}
 
 
 def correction_lines(correction: Correction, explanation: Explanation | None) -> list[tuple[str, str]]:
@@ -33,26 +50,12 @@ def correction_lines(correction: Correction, explanation: Explanation | None) ->
 
 
 def correction_tables(form: dict[str, Any]) -> list[Any]:
-    """Tables of `rich` of what `correction_form` says: corrected poses, and relations that may be wrong."""
+    """Tables of `rich` of what `correction_form` says: corrected poses, and the suspects."""
     tables = []
     if form["operations"] is not None:
-        names = ("x mm", "y mm", "z mm", "qw", "qx", "qy", "qz", "moved mm", "turned deg")
-        poses = Table("", "part", *(Column(name, justify="right") for name in names), box=None, pad_edge=False)
-        for each in form["operations"]:
-            lengths = (f"{x:z.3f}" for x in each["position_mm"])
-            quaternion = (f"{q:z.6f}" for q in each["quaternion_wxyz"])
-            moved = (f"{each[key]:.3f}" for key in ("moved_mm", "turned_deg"))
-            poses.add_row(str(each["operation"]), each["part"], *lengths, *quaternion, *moved)
-        tables.append(poses)
+        tables.append(form_table(form["operations"], _POSE_COLUMNS))
     if form["test"] is not None and form["test"]["suspects"]:
-        numbers = (Column(name, justify="right") for name in ("chi-square", "of", "p"))
-        suspects = Table("without", "made", "contacts", *numbers, "", box=None, pad_edge=False)
-        for each in form["test"]["suspects"]:
-            doubt = "may be wrong" if each["relation"] in form["test"]["ambiguous"] else ""
-            chi_square = np.inf if each["chi_square"] is None else each["chi_square"]
-            sizes = (f"{chi_square:.1f}", str(each["freedom"]), f"{each['p_value']:.2g}")
-            suspects.add_row(each["relation"], str(each["made"]), ", ".join(each["contacts"]), *sizes, doubt)
-        tables.append(suspects)
+        tables.append(form_table(form["test"]["suspects"], _SUSPECT_COLUMNS))
     return tables
 
 
@@ -152,6 +155,7 @@ def _test_form(test: Consistency | None) -> dict[str, Any] | None:
                 "chi_square": _number(suspect.chi_square),
                 "freedom": suspect.freedom,
                 "p_value": suspect.p_value,
+                "may_be_wrong": suspect in test.ambiguous,
             }
             for suspect in test.suspects
         ],

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly import Hypothesis, spelled
-from apo_bench.correction.directions import SHIFT_NAMES, TURN_NAMES
 from apo_bench.correction.explanation import Explanation, FreeDirection, OperationExplanation, PartExplanation
 from apo_bench.correction.relation_equations import RelationHold, SharedEstimate
 from apo_bench.files.json_forms import covariance_form, pose_form
 from apo_bench.geometry import Array
 from apo_bench.io import grouped, listed_words, with_article
+from apo_bench.show.tables import form_table
 
 _EXPLANATION = "apo-bench/explanation/1"
 _TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
@@ -56,17 +56,11 @@ def hypothesis_forms(hypotheses: Sequence[Hypothesis]) -> list[dict[str, Any]]:
     ]
 
 
-def part_table(explanation: Explanation) -> Any:
-    """How well every part is known at the end, as a table of `rich`."""
-    from rich.table import Column, Table
-
-    names = (*(f"{name} mm" for name in SHIFT_NAMES), *(f"{name} deg" for name in TURN_NAMES))
-    numbers = (Column(name, justify="right") for name in names)
-    table = Table("at the end", "pose", "fixed", *numbers, box=None, pad_edge=False)
-    for part in explanation.parts:
-        deviations = (f"{x:.2f}" for x in part.deviations * _TO_MM_DEG)
-        table.add_row(part.part, spelled(part.odl), f"{part.rank} of 6", *deviations)
-    return table
+def part_table(form: dict[str, Any]) -> Any:
+    """How well every part of `explanation_form` is known at the end, as a table of `rich`."""
+    return form_table(
+        form["parts"], {"part": "", "odl": "", "rank": "d", "deviation_mm": ".2f", "deviation_deg": ".2f"}
+    )
 
 
 def explanation_form(scenario: str, explanation: Explanation) -> dict[str, Any]:

@@ -5,27 +5,28 @@ from typing import Any
 
 from apo_bench.assembly import Assembly, Contact, Observation
 from apo_bench.recognition.thresholds import Recognised
+from apo_bench.show.tables import form_table
 from apo_bench.trial.recognised_contacts import count_contacts
 
 _SCHEMA = "apo-bench/recognised/2"
 _SURE = 0.9  # sets that are less likely are called not certain
-_NUMBERS = {"seen_gap_mm": "seen gap mm", "gap_mm": "gap mm", "allowed_gap_mm": "allowed"}
-_NUMBERS |= {"angle_deg": "angle deg", "allowed_angle_deg": "allowed"}
-"""Key -> head of its column."""
+_COLUMNS = {
+    "operation": "d",
+    "manipulated": "",
+    "environment": "",
+    "seen_gap_mm": "z.2f",
+    "gap_mm": "z.2f",
+    "allowed_gap_mm": ".2f",
+    "angle_deg": "z.2f",
+    "allowed_angle_deg": ".2f",
+    "overlap": ".0%",
+    "in_scenario": "",
+}
 
 
 def evidence_table(form: dict[str, Any]) -> Any:
     """One line per contact of `recognition_form`, with what was measured and what was allowed."""
-    from rich.table import Column, Table
-
-    numbers = (Column(name, justify="right") for name in (*_NUMBERS.values(), "overlap"))
-    table = Table("", "manipulated", "environment", *numbers, "", box=None, pad_edge=False, header_style="bold")
-    for each in form["contacts"]:
-        sizes = (f"{each[key]:z.2f}" for key in _NUMBERS)
-        strange = "" if each["in_scenario"] else "not in the scenario"
-        ends = (each["manipulated"], each["environment"])
-        table.add_row(str(each["operation"]), *ends, *sizes, f"{100 * each['overlap']:.0f} %", strange)
-    return table
+    return form_table(form["contacts"], _COLUMNS)
 
 
 def difference_lines(form: dict[str, Any]) -> list[str]:

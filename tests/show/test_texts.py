@@ -65,9 +65,9 @@ def test_evidence_is_shown_and_written_in_millimetres_and_degrees() -> None:
     recognised = Recognised(observation.assembly, evidence, 0.75, Rival(observation.assembly, 0.25))
     form = recognition_form("tower", "recognised", observation, recognised, False)
     _, right, wrong = table_lines(evidence_table(form))
-    numbers = ["1.50", "-0.20", "3.00", "0.50", "4.00", "25", "%"]
-    assert right == ["1", "castle1.bottom", "table.top", *numbers]
-    assert wrong == ["1", "castle1.py", "table.top", *numbers, "not", "in", "the", "scenario"]
+    numbers = ["1.50", "-0.20", "3.00", "0.50", "4.00", "25%"]
+    assert right == ["1", "castle1.bottom", "table.top", *numbers, "True"]
+    assert wrong == ["1", "castle1.py", "table.top", *numbers, "False"]
     first, second = form["contacts"]
     assert (first["operation"], first["in_scenario"], second["in_scenario"]) == (1, True, False)
     assert len(form["missed"]) == len(observation.assembly.relations()) - 1
