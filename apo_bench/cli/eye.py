@@ -7,7 +7,7 @@ import typer
 
 from apo_bench.cli.arguments import NO_RESULT, AsJson, ScenarioArgument
 from apo_bench.cli.outputs import check_outputs
-from apo_bench.cli.printing import print_answer, say
+from apo_bench.cli.printing import console, print_json, say
 
 
 def eye_command(
@@ -20,7 +20,7 @@ def eye_command(
     as_json: AsJson = False,
 ) -> None:
     """Watch a demonstration with a range finder: what moved, which part it was, where it went."""
-    from apo_bench.show.sensor import checked_view, run_sensor, sensor_form, sensor_lines
+    from apo_bench.show.sensor import checked_view, run_sensor, sensor_form, sensor_table
 
     check_outputs([(out, "--out", (".png",))])
     drawn_view = checked_view(view)
@@ -30,7 +30,10 @@ def eye_command(
         from apo_bench.show.sensor_picture import draw_sensor
 
         draw_sensor(sensor_run, out, drawn_view)
-    print_answer(form, sensor_lines(form), as_json)
+    if as_json:
+        print_json(form)
+    else:
+        console(140).print(sensor_table(form))
     if out is not None:
         say(f"\nWrote {out}", as_json)
     if not all(operation["found"] for operation in form["operations"]):

@@ -43,13 +43,17 @@ def belief_panel(title: str, observation: Observation, goals: Array, step: int, 
     graph = relation_graph(assembly, step)
     residuals = arc_residuals(assembly, observation.start, goals, graph)
     poses = placements(assembly.first(step), observation.start, goals[:step])[-1]
-    wrong = []
-    for e, arc in sorted(zip(residuals, graph.arcs, strict=True), key=lambda pair: -pair[0]):
-        if e > observation.gap_m:
-            wrong.append(f"{arc}: {1e3 * e:.2f} mm{' (disappeared)' * (arc.lost is not None)}")
-    for arc in graph.arcs:
-        if arc.lost is None and any(face_overlap(assembly, contact, poses).area <= 0.0 for contact in arc.contacts):
-            wrong.append(f"{arc}: beside it")
+    wrong = [
+        f"{arc}: {1e3 * e:.2f} mm{' (disappeared)' * (arc.lost is not None)}"
+        for e, arc in sorted(zip(residuals, graph.arcs, strict=True), key=lambda pair: -pair[0])
+        if e > observation.gap_m
+    ]
+    standing = [arc for arc in graph.arcs if arc.lost is None]
+    wrong += [
+        f"{arc}: beside it"
+        for arc in standing
+        if any(face_overlap(assembly, contact, poses).area <= 0.0 for contact in arc.contacts)
+    ]
     return BeliefPanel(title, poses, max(residuals, default=0.0), tuple(wrong), warning)
 
 

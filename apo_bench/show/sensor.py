@@ -1,4 +1,4 @@
-"""One demonstration through the range finder, and what it made of that: as a record, as JSON, and in lines."""
+"""One demonstration through the range finder, and what it made of that: as a record, as JSON, and as a table."""
 
 from dataclasses import dataclass
 from typing import Any, final
@@ -11,6 +11,7 @@ from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
 from apo_bench.records import RANGE, check
 from apo_bench.scenario.file import load_scenario
+from apo_bench.show.tables import form_table
 from apo_bench.simulation.scene import build_scene
 from apo_bench.simulation.sensor.watch import DemonstrationImages
 from apo_bench.trial.stages import (
@@ -23,6 +24,17 @@ from apo_bench.trial.stages import (
 )
 
 _FORM = "apo-bench/eye/1"
+_COLUMNS = {
+    "operation": "d",
+    "moves": "",
+    "found": "",
+    "time_s": ".2f",
+    "error_mm": ".2f",
+    "error_deg": ".2f",
+    "deviation_mm": ".2f",
+    "deviation_deg": ".2f",
+    "explained": ".0%",
+}
 
 
 @final
@@ -107,22 +119,6 @@ def _operation_form(event: Event | None, run: SensorRun, k: int) -> dict[str, An
     }
 
 
-def sensor_lines(form: dict[str, Any]) -> list[str]:
-    """A form of `sensor_form` as lines to be read."""
-    return [
-        f"{form['scenario']}: seed {form['seed']}, careless {form['careless']:g}, "
-        f"{form['level_mm']:g} mm per ray, {len(form['firings_s'])} range images",
-        "",
-        *(f"{o['operation']} {' + '.join(o['moves'])}: {_seen(o)}" for o in form["operations"]),
-    ]
-
-
-def _seen(operation: dict[str, Any]) -> str:
-    if not operation["found"]:
-        return "not recognised"
-    mm, deg = (", ".join(f"{x:.2f}" for x in operation[f"deviation_{unit}"]) for unit in ("mm", "deg"))
-    models = ", ".join(f"{name} {100 * share:.0f} %" for name, share in operation["explained"].items())
-    return (
-        f"at {operation['time_s']:.2f} s; off by {operation['error_mm']:.2f} mm, {operation['error_deg']:.2f} deg; "
-        f"known to {mm} mm, {deg} deg; explained by {models}"
-    )
+def sensor_table(form: dict[str, Any]) -> Any:
+    """The operations of `sensor_form` as a table of `rich`: when, how far off, how well known, explained by what."""
+    return form_table(form["operations"], _COLUMNS)

@@ -50,13 +50,12 @@ def graph_form(scenario: str, graph: Graph, residuals: ArcResiduals | None = Non
 def mermaid_text(graph: Graph) -> str:
     """A flow chart that GitHub and other readers of Markdown draw; dotted is what disappeared."""
     number = {node: i for i, node in enumerate(graph.nodes)}
-    lines = ["flowchart TD"]
-    for node, i in number.items():
-        lines.append(f'  n{i}["{node.part}<br>{_odl(node)}"]')
-    for arc in graph.arcs:
-        arrow = "-->" if arc.lost is None else "-.->"
-        lines.append(f"  n{number[arc.manipulated]} {arrow}|{arc.name}| n{number[arc.environment]}")
-    return "\n".join(lines) + "\n"
+    nodes = [f'  n{i}["{node.part}<br>{_odl(node)}"]' for node, i in number.items()]
+    arcs = [
+        f"  n{number[arc.manipulated]} {'-->' if arc.lost is None else '-.->'}|{arc.name}| n{number[arc.environment]}"
+        for arc in graph.arcs
+    ]
+    return "\n".join(["flowchart TD", *nodes, *arcs]) + "\n"
 
 
 def _size(residual: float | None, gap_m: float) -> str:
