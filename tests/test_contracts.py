@@ -31,7 +31,7 @@ BREACHES = {
         ("apo_bench.simulation.scene.scene", "apo_bench.simulation.robot.gripper"),
         ("apo_bench.simulation.robot.robot_error", "apo_bench.simulation.execution.transfer"),
         ("apo_bench.simulation.human.hands", "apo_bench.simulation.execution.fingers"),
-        ("apo_bench.simulation.execution.controller", "apo_bench.simulation.film.still"),
+        ("apo_bench.simulation.execution.controller", "apo_bench.simulation.film.track"),
         ("apo_bench.simulation.execution.prepare", "apo_bench.simulation.arm_checks.plan_check"),
         ("apo_bench.simulation.arm_checks.plan_check", "apo_bench.simulation.task.start"),
     ],

@@ -13,20 +13,19 @@ from typing import Annotated
 import typer
 
 from apo_bench import __version__
-from apo_bench.cli import (
-    correction,
-    noise,
-    part,
-    plan,
-    power,
-    recording,
-    scenario,
-    score,
-    show,
-    sweep,
-)
-from apo_bench.cli.printing import Grouped, GroupedOptions
-from apo_bench.cli.setting_options import NO_RESULT
+from apo_bench.cli import noise, part, power, recording, scenario, score, sweep
+from apo_bench.cli.arguments import NO_RESULT
+from apo_bench.cli.correct import correct_command
+from apo_bench.cli.explain import explain_command
+from apo_bench.cli.eye import eye_command
+from apo_bench.cli.graph import graph_command
+from apo_bench.cli.help import Grouped, GroupedOptions
+from apo_bench.cli.plan import plan_command
+from apo_bench.cli.recognise import recognise_command
+from apo_bench.cli.replay import run_replay
+from apo_bench.cli.scene import scene_command
+from apo_bench.cli.show import show_command
+from apo_bench.cli.view import view_command
 from apo_bench.errors import InputError
 from apo_bench.io import brief, clean, streams
 from apo_bench.names import own_modules_in
@@ -98,22 +97,22 @@ def _options(
 _LONG = ("replay", "sweep")
 """Commands whose options are listed in groups."""
 _COMMANDS: dict[str, Callable[..., None]] = {
-    "graph": plan.graph_command,
-    "explain": correction.explain_command,
-    "correct": correction.correct_command,
-    "eye": recording.eye_command,
-    "plan": plan.plan_command,
-    "recognise": recording.recognise_command,
+    "graph": graph_command,
+    "explain": explain_command,
+    "correct": correct_command,
+    "eye": eye_command,
+    "plan": plan_command,
+    "recognise": recognise_command,
     "scenarios": scenario.scenarios_command,
-    "show": show.show_command,
+    "show": show_command,
     "sweep": sweep.sweep_command,
     "report": score.report_command,
     "compare": score.compare_command,
     "score": score.score_command,
     "leaderboard": score.leaderboard_command,
-    "view": show.view_command,
-    "scene": plan.scene_command,
-    "replay": show.run_replay,
+    "view": view_command,
+    "scene": scene_command,
+    "replay": run_replay,
 }
 for _name, _command in _COMMANDS.items():
     app.command(_name, cls=GroupedOptions if _name in _LONG else None)(_command)

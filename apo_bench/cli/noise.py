@@ -5,8 +5,10 @@ from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.printing import group, print_answer
-from apo_bench.cli.setting_options import AsJson, check_outputs
+from apo_bench.cli.arguments import AsJson
+from apo_bench.cli.help import group
+from apo_bench.cli.outputs import check_outputs
+from apo_bench.cli.printing import print_answer
 from apo_bench.io import write_file
 from apo_bench.records import check
 

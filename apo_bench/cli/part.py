@@ -12,8 +12,11 @@ from typing import TYPE_CHECKING, Annotated
 import numpy as np
 import typer
 
-from apo_bench.cli.printing import group, print_json, say
-from apo_bench.cli.setting_options import AsJson, check_outputs, path_given, writing
+from apo_bench.cli.arguments import AsJson
+from apo_bench.cli.help import group
+from apo_bench.cli.outputs import check_outputs, writing
+from apo_bench.cli.printing import print_json, say
+from apo_bench.cli.values import path_given
 from apo_bench.errors import InputError, require
 from apo_bench.io import check_target, read_text, write_file
 from apo_bench.parts.allowed import LARGEST_PART_BYTES

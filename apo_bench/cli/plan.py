@@ -1,7 +1,4 @@
-"""Three commands that look into one plan: `apo-bench graph | plan | scene`.
-
-Only `plan --arm` and `scene` need a simulator.
-"""
+"""The command `apo-bench plan`: how every operation is done. Only `--arm` and `--acts` need a simulator."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -9,68 +6,19 @@ from typing import Annotated, Any
 import numpy as np
 import typer
 
-from apo_bench.assembly import Plan, observed_residuals, relation_graph
-from apo_bench.cli.printing import print_answer, print_json, say
-from apo_bench.cli.setting_options import (
-    AsJson,
-    ScenarioArgument,
-    StatedDeg,
-    StatedMm,
-    check_outputs,
-    takes,
-    trial_options,
-)
+from apo_bench.assembly import Plan
+from apo_bench.cli.arguments import AsJson, ScenarioArgument, StatedDeg, StatedMm
+from apo_bench.cli.outputs import check_outputs
+from apo_bench.cli.printing import print_json
 from apo_bench.errors import require
 from apo_bench.files.csv_form import assumed_deviations
 from apo_bench.files.json_forms import RobotFrames, read_robot_frames
-from apo_bench.files.observation import read_observation, read_observation_file
+from apo_bench.files.observation import read_observation_file
 from apo_bench.geometry import Array, pose
-from apo_bench.io import redirect_output, write_file
-from apo_bench.records import CORRECTOR, SETTINGS, check, in_python
+from apo_bench.io import redirect_output
+from apo_bench.records import CORRECTOR, SETTINGS
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.scenario import Scenario
-
-
-def graph_command(
-    scenario: ScenarioArgument,
-    step: Annotated[int | None, typer.Option(help="After this operation, from 1; default: the last.")] = None,
-    observation: Annotated[Path | None, typer.Option(help="Show the residuals of this observation file.")] = None,
-    out: Annotated[Path | None, typer.Option(help="Draw it into this file: .svg or .png.")] = None,
-    as_json: AsJson = False,
-) -> None:
-    """Print the relation graph: parts at their placements with their ODLs, contacts made and lost."""
-    from apo_bench.show.graph.drawing import draw_graph
-    from apo_bench.show.graph.text import graph_form, graph_lines, graph_title
-
-    check_outputs([(out, "--out", (".svg", ".png"))])
-    loaded = load_scenario(scenario)
-    graph = relation_graph(loaded.assembly, step)
-    seen = None if observation is None else read_observation(observation, loaded)
-    residuals = None if seen is None else observed_residuals(seen, graph)
-    gap_m = loaded.gap_mm * 1e-3 if seen is None else seen.gap_m
-    if out is not None:
-        title = graph_title(loaded.name, graph)
-        draw_graph(graph, out, title=title, residuals=residuals, gap_m=gap_m, colors=loaded.colors)
-    lines = graph_lines(loaded.name, graph, residuals, gap_m)
-    print_answer(graph_form(loaded.name, graph, residuals), lines, as_json)
-    if out is not None:
-        say(f"\nWrote {out}", as_json)
-
-
-@takes(trial_options("clearance_mm", "grasp", "arm", "timestep_s"))
-def scene_command(
-    scenario: ScenarioArgument, out: Annotated[Path, typer.Option(help="The MJCF file to write.")], **options: Any
-) -> None:
-    """Write the scene of a scenario as one MJCF file that opens in MuJoCo's viewer."""
-    from apo_bench.simulation.scene.scene import scene_xml
-
-    settings = in_python({name: value for name, value in options.items() if value is not None})
-    for name, value in settings.items():
-        check(name, value)
-    loaded = load_scenario(scenario)
-    check_outputs([(out, "--out", (".xml",))])
-    write_file(out, scene_xml(loaded, **settings))
-    typer.echo(f"Wrote {out}; open it with: python -m mujoco.viewer --mjcf={out}")
 
 
 def plan_command(

@@ -5,8 +5,10 @@ from typing import Annotated, Any
 
 import typer
 
-from apo_bench.cli.printing import group, print_answer
-from apo_bench.cli.setting_options import AsJson, numbers
+from apo_bench.cli.arguments import AsJson
+from apo_bench.cli.help import group
+from apo_bench.cli.printing import print_answer
+from apo_bench.cli.values import numbers
 from apo_bench.errors import InputError
 from apo_bench.statistics import (
     ERROR,

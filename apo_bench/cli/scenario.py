@@ -6,8 +6,10 @@ from typing import Annotated
 
 import typer
 
-from apo_bench.cli.printing import group
-from apo_bench.cli.setting_options import NO_RESULT, ScenarioArgument, check_writable, path_given
+from apo_bench.cli.arguments import NO_RESULT, ScenarioArgument
+from apo_bench.cli.help import group
+from apo_bench.cli.outputs import check_writable
+from apo_bench.cli.values import path_given
 from apo_bench.errors import InputError, require
 from apo_bench.records import check
 from apo_bench.scenario.file import load_scenario, scenario_names

@@ -12,9 +12,13 @@ from typing import Annotated, Any
 
 import typer
 
+from apo_bench.cli.arguments import AsJson
+from apo_bench.cli.completion import completion
+from apo_bench.cli.cores import cores
+from apo_bench.cli.outputs import check_writable
 from apo_bench.cli.printing import print_answer, print_json
-from apo_bench.cli.setting_options import AsJson, check_writable, completion, cores, path_given
 from apo_bench.cli.sweep import interrupted
+from apo_bench.cli.values import path_given
 from apo_bench.errors import InputError, require
 from apo_bench.io import brief, clean
 

@@ -16,20 +16,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from apo_bench.cli.printing import group
-from apo_bench.cli.setting_options import (
-    ScenarioArgument,
-    axis_flag,
-    axis_option,
-    completion,
-    cores,
-    path_given,
-    read_axis,
-    sweep_options,
-    takes,
-    trial_options,
-    writing,
-)
+from apo_bench.cli.arguments import ScenarioArgument
+from apo_bench.cli.completion import completion
+from apo_bench.cli.cores import cores
+from apo_bench.cli.help import group
+from apo_bench.cli.outputs import writing
+from apo_bench.cli.setting_options import axis_flag, axis_option, read_axis, sweep_options, takes, trial_options
+from apo_bench.cli.values import path_given
 from apo_bench.errors import InputError, require
 from apo_bench.records import FIRST_TRAINING_TRIAL, in_python
 from apo_bench.scenario.file import load_scenario

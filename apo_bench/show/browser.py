@@ -1,49 +1,39 @@
 """A trial in a browser, by viser: stepped through with a slider and buttons; served on this machine only."""
 
 import io
-import threading
 import time
+from collections import Counter, deque
 from collections.abc import Callable
 from contextlib import redirect_stdout
+from importlib.util import find_spec
 from typing import Any
 
 import numpy as np
 
 from apo_bench.errors import InputError
-from apo_bench.geometry import pose
-from apo_bench.show.stepping import COLOR_NAMES, COLORS, FACES, Cursor
-from apo_bench.simulation.film.film import FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG, framing
-from apo_bench.simulation.film.still import (
-    GHOST_OPACITY,
-    HAND_COLOR,
-    HAND_M,
-    BodyMesh,
-    Ghost,
-    body_meshes,
-    body_poses,
-    label_place,
-    part_meshes,
-    show_moment,
-)
+from apo_bench.show.stepping import Cursor
+from apo_bench.simulation.film.film import FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG
+from apo_bench.simulation.film.framing import frame_parts
+from apo_bench.simulation.film.shapes import ShapeKind, shapes_of, surface
+from apo_bench.simulation.film.window import PICTURE_S
 from apo_bench.simulation.scene import initial_state
 from apo_bench.trial.story import Story
 
 HOST = "127.0.0.1"
 PORT = 8080
-_PICTURE_S = 1.0 / 30.0
-_FOV_RAD = np.radians(45.0)
-"""As in films."""
-_GHOST_SCALE = 1.004
-"""A little larger than the part itself, whose surfaces would flicker through."""
-_BUTTONS = {"play / stop": "play", "moment back": "previous", "moment on": "next"}
-_JUMPS = {"operation back": "previous operation", "operation on": "next operation"}
+_FOV_RAD = np.radians(45.0)  # as in films
+_BUTTONS = (
+    {"play / stop": "play", "moment back": "previous", "moment on": "next"},
+    {"operation back": "previous operation", "operation on": "next operation"},
+    {"demonstration": "previous chapter", "replay": "next chapter"},
+    {"names of faces": "faces", "goals": "goals"},
+)
+"""Label -> what `Cursor.press` is told."""
 
 
 def no_browser() -> str:
     """Why nothing can be shown in a browser, empty where it can."""
-    try:
-        import viser  # noqa: F401
-    except ImportError:
+    if find_spec("viser") is None:
         return 'viser is not installed; install it with: pip install "apo_bench[view]"'
     return ""
 
@@ -63,10 +53,9 @@ def serve_story(story: Story, port: int, say: Callable[[str], None], ends: Calla
         before = time.monotonic()
         while not ends():
             page.draw()
-            time.sleep(_PICTURE_S)
+            time.sleep(PICTURE_S)
             now = time.monotonic()
-            with page.lock:
-                page.cursor.pass_time(now - before)
+            page.cursor.pass_time(now - before)
             before = now
     finally:
         page.close()
@@ -77,140 +66,87 @@ class Page:
 
     def __init__(self, story: Story, port: int) -> None:
         self.cursor = Cursor(story)
-        self.lock = threading.Lock()
-        self._scene = story.scene
+        self._asked = deque[str | int]()
         self._data = initial_state(story.scene.work, story.chapters[0].start)
         self._server = _server(port)
-        self._drawn = ""
+        self._drawn: object = None
+        self._shown: dict[tuple[ShapeKind, int], Any] = {}
         self.address = f"http://{HOST}:{self._server.get_port()}"
-        self._set_up(story)
+        self._aim_camera(story)
+        self._add_controls()
 
     def close(self) -> None:
         with redirect_stdout(io.StringIO()):
             self._server.stop()
 
     def draw(self) -> None:
-        """Bring the page up to date, if anything has changed."""
-        with self.lock:
-            still = self.cursor.still()
-            chapter = self.cursor.chapter
-            moment = self.cursor.moment
-            state = repr((chapter, moment, self.cursor.faces, sorted(self.cursor.goals), self._arm_shown.value))
+        """Do what was asked for, and bring the page up to date if anything has changed."""
+        while self._asked:
+            asked = self._asked.popleft()
+            if isinstance(asked, str):
+                self.cursor.press(asked)
+            elif not self.cursor.playing:
+                self.cursor.go(asked)
+        state = (self.cursor.place, self.cursor.faces, self.cursor.shows_goals)
         if state == self._drawn:
             return
-        show_moment(self._scene, self._data, still.chapter, still.moment)
+        snapshot = self.cursor.snapshot()
+        count = Counter[ShapeKind]()
         with self._server.atomic():
-            for body, at in zip(self._bodies, body_poses(self._data), strict=True):
-                body.position = at[:3]
-                body.wxyz = at[3:]
-            for mesh in self._arm:
-                mesh.visible = self._arm_shown.value and not len(still.moment.hands)
-            for i, hand in enumerate(self._hands):
-                hand.visible = i < len(still.moment.hands)
-                if hand.visible:
-                    hand.position = still.moment.hands[i]
-            for face, label in self._labels.items():
-                label.visible = face in still.faces
-            self._draw_ghosts(still.ghosts)
-            self._words.content = "\n\n".join((f"**{still.chapter.title}**", *still.words))
-            for i, slider in enumerate(self._sliders):
-                slider.visible = i == chapter
-            self._sliders[chapter].value = moment
+            for kind, at in shapes_of(self.cursor.story.scene, self._data, snapshot):
+                handle = self._handle(kind, count[kind])
+                count[kind] += 1
+                if not np.array_equal(at, (*handle.position, *handle.wxyz)):
+                    handle.position = at[:3]
+                    handle.wxyz = at[3:]
+            for (kind, number), handle in self._shown.items():
+                if handle.visible != (number < count[kind]):
+                    handle.visible = number < count[kind]
+            self._words.content = "\n\n".join((f"**{snapshot.chapter.title}**", *snapshot.words))
+            self._slider.value = state[0]
         self._drawn = state
 
-    def _draw_ghosts(self, ghosts: tuple[Ghost, ...]) -> None:
-        placed = {(ghost.name, part): pose.pack(T) for ghost in ghosts for part, T in ghost.poses.items()}
-        for key, mesh in ((key, mesh) for key, meshes in self._ghosts.items() for mesh in meshes):
-            mesh.visible = key in placed
-            if mesh.visible:
-                mesh.position = placed[key][:3]
-                mesh.wxyz = placed[key][3:]
+    def _handle(self, kind: ShapeKind, number: int) -> Any:
+        """What viser draws of a shape, made when one of its kind is first seen."""
+        if (kind, number) not in self._shown:
+            name = f"/{len(self._shown)}"
+            if kind.label:
+                handle = self._server.scene.add_label(name, kind.label, anchor="center-center")
+            else:
+                mesh = surface(self.cursor.story.scene.work.model, kind)
+                handle = self._server.scene.add_mesh_simple(
+                    name,
+                    mesh.vertices.astype(np.float32),
+                    mesh.faces.astype(np.uint32),
+                    color=kind.rgba[:3],
+                    opacity=None if kind.rgba[3] == 1.0 else kind.rgba[3],
+                    flat_shading=True,
+                )
+            self._shown[kind, number] = handle
+        return self._shown[kind, number]
 
-    def _set_up(self, story: Story) -> None:
-        server = self._server
-        world = story.scene.work
-        server.gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
-        server.gui.set_panel_label("apo-bench view")
-        server.scene.set_up_direction("+z")
-        server.scene.configure_default_lights(cast_shadow=False)
-        look_at, far = framing(story.scene.scenario.assembly, [story.assembled])
+    def _aim_camera(self, story: Story) -> None:
+        self._server.scene.set_up_direction("+z")
+        self._server.scene.configure_default_lights(cast_shadow=False)
+        at, far = frame_parts(story.scene.scenario.assembly, [story.assembled])
         azimuth, elevation = np.radians([FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG])
         # where the camera looks, as a unit vector
-        forwards = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
-        view = server.initial_camera
-        view.look_at = look_at
-        view.position = look_at - far * np.array(forwards)
+        ahead = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+        view = self._server.initial_camera
+        view.look_at = at
+        view.position = at - far * np.array(ahead)
         view.fov = _FOV_RAD
-        self._bodies = [server.scene.add_frame(f"/bodies/{i}", show_axes=False) for i in range(world.model.nbody)]
-        meshes = [
-            (shape.part, _add(server, f"/bodies/{shape.body}/{i}", shape, shape.rgba[:3], shape.rgba[3]))
-            for i, shape in enumerate(body_meshes(world))
-        ]
-        self._arm = [mesh for part, mesh in meshes if part is None]
-        self._hands = [
-            server.scene.add_icosphere(f"/hands/{i}", HAND_M, tuple(int(255 * c) for c in HAND_COLOR), visible=False)
-            for i in range(2)
-        ]
-        self._ghosts = {
-            (name, part): [
-                _add(server, f"/goals/{name}/{part}/{i}", shape, COLORS[name], GHOST_OPACITY, _GHOST_SCALE)
-                for i, shape in enumerate(part_meshes(world, part))
-            ]
-            for name in story.goals
-            for part in world.free
-        }
-        self._labels = {
-            face: server.scene.add_label(
-                f"/bodies/{world.body[face.part]}/{face.face}",
-                str(face),
-                position=label_place(story.scene, face),
-                anchor="center-center",
-                visible=False,
-            )
-            for face in Cursor(story, faces="all").still().faces
-        }
-        self._add_controls(story)
 
-    def _add_controls(self, story: Story) -> None:
+    def _add_controls(self) -> None:
         gui = self._server.gui
+        gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
+        gui.set_panel_label("apo-bench view")
         self._words = gui.add_markdown("")
-        if len(story.chapters) > 1:
-            titles = [chapter.title for chapter in story.chapters]
-            chosen = gui.add_dropdown("show", titles, initial_value=titles[0])
-            chosen.on_update(lambda _: self._choose(titles.index(chosen.value)))
-        self._sliders = [
-            gui.add_slider("moment", 0, len(chapter.moments) - 1, 1, 0, visible=i == 0)
-            for i, chapter in enumerate(story.chapters)
-        ]
-        for i, slider in enumerate(self._sliders):
-            slider.on_update(lambda event, i=i: self._slid(i, int(event.target.value)))
-        for labels in (_BUTTONS, _JUMPS):
-            group = gui.add_button_group("", tuple(labels))
-            group.on_click(lambda event, keys=labels: self._do(lambda cursor: cursor.press(keys[event.target.value])))
-        faces = gui.add_dropdown("names of faces", FACES, initial_value="this operation")
-        faces.on_update(lambda _: self._do(lambda cursor: setattr(cursor, "faces", faces.value)))
-        self._arm_shown = gui.add_checkbox("arm", True)
-        for name in story.goals:
-            box = gui.add_checkbox(f"{name} ({COLOR_NAMES[name]})", False)
-            box.on_update(
-                lambda event, name=name: self._do(
-                    lambda cursor: (cursor.goals.add if event.target.value else cursor.goals.discard)(name)
-                )
-            )
-
-    def _do(self, what: Callable[[Cursor], object]) -> None:
-        with self.lock:
-            what(self.cursor)
-
-    def _choose(self, chapter: int) -> None:
-        with self.lock:
-            if chapter != self.cursor.chapter:
-                self.cursor.turn_to(chapter)
-
-    def _slid(self, chapter: int, moment: int) -> None:
-        with self.lock:
-            if chapter == self.cursor.chapter and moment != self.cursor.moment and not self.cursor.playing:
-                self.cursor.go(moment)
+        self._slider = gui.add_slider("moment", 0, len(self.cursor.places) - 1, 1, 0)
+        self._slider.on_update(lambda event: self._asked.append(int(event.target.value)))
+        for keys in _BUTTONS:
+            group = gui.add_button_group("", tuple(keys))
+            group.on_click(lambda event, keys=keys: self._asked.append(keys[event.target.value]))
 
 
 def _server(port: int) -> Any:
@@ -223,15 +159,3 @@ def _server(port: int) -> Any:
         raise InputError(
             f"--port {port} was given, which cannot be served ({error.strerror or error}); choose another one."
         ) from error
-
-
-def _add(server: Any, name: str, shape: BodyMesh, color: tuple[float, ...], opacity: float, scale: float = 1.0) -> Any:
-    return server.scene.add_mesh_simple(
-        name,
-        shape.vertices.astype(np.float32),
-        shape.triangles.astype(np.uint32),
-        color=tuple(int(255 * c) for c in color),
-        opacity=None if opacity == 1.0 else opacity,
-        flat_shading=True,
-        scale=scale,
-    )

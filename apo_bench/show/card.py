@@ -12,7 +12,6 @@ from apo_bench.insertion.states import classify
 from apo_bench.io import listed_words
 from apo_bench.judging.verdict import fixtures
 from apo_bench.scenario import NOTHING_M, Carelessness, Scenario, Turn, spread_error
-from apo_bench.show.axes import holds_axis
 
 _NOTHING: Mapping[str, str] = MappingProxyType({})
 _LEVEL = 0.01
@@ -97,7 +96,11 @@ def _way(scenario: Scenario, arc: Arc) -> str:
     # normals of all faces that are touched: their span says in which contact state the part is
     N = np.array([each.normal for each in touched])
     if classify(N).state.constraining:
-        rounds = [assembly.round_face(c.manipulated) for c in arc.contacts if holds_axis(assembly, c)]
+        rounds = [
+            assembly.round_face(contact.manipulated)
+            for contact in arc.contacts
+            if all(of.face in assembly.solids[of.part].rounds for of in contact)
+        ]
         return "over" if rounds and all(face.hole for face in rounds) else "into"
     if N[:, 2].min() < -_LEVEL:
         return "under"

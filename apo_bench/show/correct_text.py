@@ -3,66 +3,60 @@
 from typing import Any
 
 import numpy as np
-from rich.table import Column, Table
 
 from apo_bench.assembly import Consistency, Correction, Observation
 from apo_bench.correction.explanation import Explanation
 from apo_bench.files.json_forms import covariance_form, pose_form
 from apo_bench.geometry import Array, pose
 from apo_bench.show.explain_text import explanation_form, hypothesis_forms, hypothesis_lines, sentences, total
+from apo_bench.show.tables import form_table
 
 _CORRECTION = "apo-bench/correction/1"
-_TOO_GOOD = 1e-6
-"""A p-value nearer to 1 happens to nobody whose noise is what was stated, ..."""
-_TESTED = 3
-"""... if at least so many degrees of freedom are tested."""
+_TOO_GOOD = 1e-6  # a p-value nearer to 1 happens to nobody whose noise is what was stated ...
+_TESTED = 3  # ... if at least so many degrees of freedom are tested
+_POSE_COLUMNS = {
+    "operation": "d",
+    "part": "",
+    "position_mm": "z.3f",
+    "quaternion_wxyz": "z.6f",
+    "moved_mm": ".3f",
+    "turned_deg": ".3f",
+}
+_SUSPECT_COLUMNS = {
+    "relation": "",
+    "made": "d",
+    "contacts": "",
+    "chi_square": ".1f",
+    "freedom": "d",
+    "p_value": ".2g",
+    "may_be_wrong": "",
+}
 
 
-def correction_lines(
-    observation: Observation, correction: Correction, explanation: Explanation | None
-) -> list[tuple[str, str]]:
+def correction_lines(correction: Correction, explanation: Explanation | None) -> list[tuple[str, str]]:
     """How it ended, the gaps, the test, what is free: name and text of each line."""
+    contradictory = correction.status == "inconsistent"
     facts = {
-        "ended": f"{'' if correction.ok else f'{correction.status}: '}{correction.sentence}",
-        "contact gap": _gaps(correction),
-        "test": _test(correction.test, correction.status == "inconsistent"),
-        "left out": ", ".join(correction.dropped),
-        "test without": _test(correction.test_after, correction.status == "inconsistent"),
+        "ended": [correction.sentence if correction.ok else f"{correction.status}: {correction.sentence}"],
+        "contact gap": [_gaps(correction)],
+        "test": [_test(correction.test, contradictory)],
+        "left out": [", ".join(correction.dropped)],
+        "test without": [_test(correction.test_after, contradictory)],
         "may be": hypothesis_lines(correction.hypotheses),
-        "contacts": "" if explanation is None else total(explanation),
+        "contacts": [] if explanation is None else [total(explanation)],
         "free": [] if explanation is None else sentences(explanation),
     }
-    return [
-        ("" if i else name, text)
-        for name, said in facts.items()
-        for i, text in enumerate([said] if isinstance(said, str) else said)
-        if text
-    ]
+    return [("" if i else name, text) for name, texts in facts.items() for i, text in enumerate(texts) if text]
 
 
-def pose_table(observation: Observation, correction: Correction) -> Any:
-    """Corrected poses in mm and wxyz, and how far they were moved, as a table of `rich`."""
-    numbers = ("x mm", "y mm", "z mm", "qw", "qx", "qy", "qz", "moved mm", "turned deg")
-    table = Table("", "part", *(Column(name, justify="right") for name in numbers), box=None, pad_edge=False)
-    moved = _moved(observation, correction)
-    for k, operation in enumerate(observation.assembly.operations):
-        packed = pose.pack(correction.goals[k])
-        places = (*(_short(x, 3) for x in packed[:3] * 1e3), *(_short(q, 6) for q in packed[3:]))
-        table.add_row(str(k + 1), operation.main, *places, *(f"{x:.3f}" for x in moved[k]))
-    return table
-
-
-def suspect_table(test: Consistency) -> Any:
-    """Every relation, and how well the rest fits without it, as a table of `rich`."""
-    numbers = (Column(name, justify="right") for name in ("chi-square", "of", "p"))
-    table = Table("without", "made", "contacts", *numbers, "", box=None, pad_edge=False)
-    for suspect in test.suspects:
-        table.add_row(
-            *(suspect.relation, str(suspect.made + 1), ", ".join(map(str, suspect.contacts))),
-            *(f"{suspect.chi_square:.1f}", str(suspect.freedom), f"{suspect.p_value:.2g}"),
-            "may be wrong" if suspect in test.ambiguous else "",
-        )
-    return table
+def correction_tables(form: dict[str, Any]) -> list[Any]:
+    """Tables of `rich` of what `correction_form` says: corrected poses, and the suspects."""
+    tables = []
+    if form["operations"] is not None:
+        tables.append(form_table(form["operations"], _POSE_COLUMNS))
+    if form["test"] is not None and form["test"]["suspects"]:
+        tables.append(form_table(form["test"]["suspects"], _SUSPECT_COLUMNS))
+    return tables
 
 
 def correction_form(
@@ -108,9 +102,7 @@ def _gaps(correction: Correction) -> str:
 def _test(test: Consistency | None, contradictory: bool) -> str:
     if test is None:
         return ""
-    numbers = (
-        f"chi-square {test.chi_square:.1f}, {test.freedom} degrees of freedom, p {shown_p(test.p_value, test.level)}"
-    )
+    numbers = f"chi-square {test.chi_square:.1f}, {test.freedom} degrees of freedom, p {test.p_value:.2g}"
     if test.passes and contradictory:
         return f"{numbers}, but the contacts contradict each other"
     if test.passes and test.p_value > 1.0 - _TOO_GOOD and test.freedom >= _TESTED:
@@ -122,13 +114,6 @@ def _test(test: Consistency | None, contradictory: bool) -> str:
     if contradictory:
         return f"{numbers}: the contacts contradict each other{who}"
     return f"{numbers}: longer than the stated noise explains{who}"
-
-
-def shown_p(p: float, level: float) -> str:
-    """Two digits, or as many as it takes to see on which side of the level it is."""
-    return next(
-        text for text in (f"{p:.{digits}g}" for digits in range(2, 18)) if (float(text) >= level) == (p >= level)
-    )
 
 
 def _moved(observation: Observation, correction: Correction) -> Array:
@@ -170,16 +155,12 @@ def _test_form(test: Consistency | None) -> dict[str, Any] | None:
                 "chi_square": _number(suspect.chi_square),
                 "freedom": suspect.freedom,
                 "p_value": suspect.p_value,
+                "may_be_wrong": suspect in test.ambiguous,
             }
             for suspect in test.suspects
         ],
         "ambiguous": [suspect.relation for suspect in test.ambiguous],
     }
-
-
-def _short(x: float, digits: int) -> str:
-    """No `-0.000`."""
-    return f"{round(float(x), digits) + 0.0:.{digits}f}"
 
 
 def _number(x: float) -> float | None:

@@ -6,19 +6,16 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly import Hypothesis, spelled
-from apo_bench.correction.directions import SHIFT_NAMES, TURN_NAMES, Direction
 from apo_bench.correction.explanation import Explanation, FreeDirection, OperationExplanation, PartExplanation
 from apo_bench.correction.relation_equations import RelationHold, SharedEstimate
 from apo_bench.files.json_forms import covariance_form, pose_form
-from apo_bench.geometry import Array, RoundFace
+from apo_bench.geometry import Array
 from apo_bench.io import grouped, listed_words, with_article
+from apo_bench.show.tables import form_table
 
 _EXPLANATION = "apo-bench/explanation/1"
 _TO_MM_DEG = np.array([1e3] * 3 + [180.0 / np.pi] * 3)
-_OFF_M = 1e-6
-"""A turn is said to be about a point only if that is farther from the origin of the part."""
-_ALONG = 1e-9
-"""Cosines that are nearer to 1 are of one direction."""
+_OFF_M = 1e-6  # a turn is said to be about a point only if that is farther from the origin of the part
 
 
 def total(explanation: Explanation) -> str:
@@ -30,10 +27,8 @@ def total(explanation: Explanation) -> str:
 
 def sentences(explanation: Explanation) -> list[str]:
     """One for each operation: what is fixed by which parts, and what is free; then one for each shared error."""
-    return [
-        f"{o.operation + 1} {o.part}: {_fixed(o)}; {_loose(explanation, o)}{_along_axes(explanation, o)}"
-        for o in explanation.operations
-    ] + [_shared(estimate) for estimate in explanation.shared]
+    lines = [f"{o.operation + 1} {o.part}: {_fixed(o)}; {_loose(explanation, o)}" for o in explanation.operations]
+    return [*lines, *map(_shared, explanation.shared)]
 
 
 def hypothesis_lines(hypotheses: Sequence[Hypothesis]) -> list[str]:
@@ -61,24 +56,11 @@ def hypothesis_forms(hypotheses: Sequence[Hypothesis]) -> list[dict[str, Any]]:
     ]
 
 
-def explanation_tables(explanation: Explanation) -> list[Any]:
-    """What holds each operation, and how well every part is known at the end, as tables of `rich`."""
-    from rich.table import Column, Table
-
-    operations = Table("", "operation", "fixed", "free", "through", "agrees", box=None, pad_edge=False)
-    for o in explanation.operations:
-        through, agreeing = ("\n".join(map(_hold, some)) or "-" for some in (o.through, o.agreeing))
-        operations.add_row(
-            str(o.operation + 1), o.part, f"{o.rank} of 6", "\n".join(map(_free, o.free)) or "-", through, agreeing
-        )
-    names = (*(f"{name} mm" for name in SHIFT_NAMES), *(f"{name} deg" for name in TURN_NAMES))
-    numbers = (Column(name, justify="right") for name in names)
-    parts = Table("at the end", "pose", "fixed", *numbers, box=None, pad_edge=False)
-    for part in explanation.parts:
-        parts.add_row(
-            part.part, spelled(part.odl), f"{part.rank} of 6", *[f"{x:.2f}" for x in part.deviations * _TO_MM_DEG]
-        )
-    return [operations, parts]
+def part_table(form: dict[str, Any]) -> Any:
+    """How well every part of `explanation_form` is known at the end, as a table of `rich`."""
+    return form_table(
+        form["parts"], {"part": "", "odl": "", "rank": "d", "deviation_mm": ".2f", "deviation_deg": ".2f"}
+    )
 
 
 def explanation_form(scenario: str, explanation: Explanation) -> dict[str, Any]:
@@ -107,10 +89,8 @@ def explanation_form(scenario: str, explanation: Explanation) -> dict[str, Any]:
 
 def _shared(estimate: SharedEstimate) -> str:
     """`camera: seen off by (-0.30 +- 0.50, 1.90 +- 0.30, 0.10 +- 0.40) mm and (..) deg, in its frame`."""
-    each = [
-        f"{x:.2f} +- {s:.2f}"
-        for x, s in zip(estimate.twist * _TO_MM_DEG, estimate.deviations * _TO_MM_DEG, strict=True)
-    ]
+    numbers = zip(estimate.twist * _TO_MM_DEG, estimate.deviations * _TO_MM_DEG, strict=True)
+    each = [f"{x:.2f} +- {s:.2f}" for x, s in numbers]
     frame = "in the frame of the part" if estimate.error.frame is None else "in its frame"
     return f"{estimate.error.name}: seen off by ({', '.join(each[:3])}) mm and ({', '.join(each[3:])}) deg, {frame}"
 
@@ -147,45 +127,10 @@ def _group(explanation: Explanation, along: tuple[int, ...], some: list[FreeDire
     return f"{names} free together with {listed_words(map(with_article, others))}, {sizes}"
 
 
-def _along_axes(explanation: Explanation, o: OperationExplanation) -> str:
-    """`; slides along the axis of shaft and turns freely about it`: what is free of round faces that touch."""
-    contacts = explanation.assembly.operations[o.operation].contacts
-    touching = dict.fromkeys(of.face for contact in contacts for of in contact if of.part == o.part)
-    own = explanation.assembly.solids[o.part].rounds
-    rounds = [own[name] for name in touching if name in own]
-    sentences = list[str]()
-    last = ""
-    for free in o.free:
-        face = None if free.along else next((face for face in rounds if _is_on(free.direction, face)), None)
-        if face is not None:
-            does = "turns freely about" if free.direction.turns else "slides along"
-            sentences.append(f"{does} it" if face.name == last else f"{does} the axis of {face.name}")
-            last = face.name
-    return f"; {listed_words(sentences)}" if sentences else ""
-
-
-def _is_on(direction: Direction, face: RoundFace) -> bool:
-    """Whether a direction is a shift along the axis of a face, or a pure turn about it."""
-    along = abs(direction.axis @ face.axis) >= 1.0 - _ALONG
-    # distance of the two parallel lines: |(p - q) x a| of a unit axis a
-    off = np.linalg.norm(np.cross(face.point - direction.point, face.axis)) if direction.turns else 0.0
-    return bool(along and off < _OFF_M and (not direction.turns or abs(direction.pitch_m) < _OFF_M))
-
-
 def _about(free: FreeDirection) -> str:
     """The point of a turn, if it is not the origin of the part."""
     is_off = free.direction.turns and np.abs(free.direction.point).max() >= _OFF_M
     return f" about ({', '.join(f'{x * 1e3:.0f}' for x in free.direction.point)}) mm" if is_off else ""
-
-
-def _free(free: FreeDirection) -> str:
-    goes = f", with {listed_words(f'T{j + 1}' for j in free.along)}" if free.along else ""
-    return f"{free.direction}{_about(free)} {size(free)}{goes}"
-
-
-def _hold(hold: RelationHold) -> str:
-    lost = "" if hold.lost is None else f", lost at {hold.lost + 1}"
-    return f"{hold.relation} {hold.parts[0]} on {hold.parts[1]}, {spelled(hold.word)}{lost}"
 
 
 def _deviation(free: FreeDirection) -> float:

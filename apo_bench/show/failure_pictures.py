@@ -5,7 +5,6 @@ drawn where the row says that they ended. So are those of a salted trial whose s
 """
 
 import json
-from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,24 +14,20 @@ import numpy as np
 
 from apo_bench.assembly import Contact, Poses, outline_points
 from apo_bench.errors import InputError, require
-from apo_bench.geometry import pose, world_bounds
+from apo_bench.geometry import pose
 from apo_bench.io import each_line
 from apo_bench.records import Row, Salt, TrialSettings, row_key, settings_of
 from apo_bench.records.run.replay_command import Files, left_out, own_code
 from apo_bench.records.run.validation import row_of
 from apo_bench.report.run.trials import FailurePicture
-from apo_bench.show.axes import axis_marks
 
-_WIDTH = 640
-_HEIGHT = 480
+_SIZE = (640, 480)
 _QUALITY = 82
-_NEAREST_M = 0.12
 _AZIMUTH_DEG = 128.0
 _ELEVATION_DEG = -24.0
-_ARROW_M = 0.11
-_TIP_M = 0.012
+_ARROW_M = 0.11  # how far from its contact an arrow begins
+_TIP_M = 0.012  # and ends
 _ARROW = (0.85, 0.1, 0.1)
-"""How far from a contact its arrow begins and ends, and its colour."""
 _SAME = ("success", "failure_stage", "failure_code", "failure_operation", "sentence", "worst_gap_mm", "peak_force_n")
 """A trial that was run again is the same if these are."""
 
@@ -54,13 +49,12 @@ def failure_pictures(
     """
     pictures: list[FailurePicture] = []
     missed: list[str] = []
-    scenes: dict[tuple[Any, ...], Any] = {}
     for row in chosen:
         if not trust_code and own_code(row):
             missed.append(left_out([row]))
             continue
         try:
-            pictures.append(_picture_of(row, folder, files or {}, scenes, salt))
+            pictures.append(_picture_of(row, folder, files or {}, salt))
         except (InputError, RuntimeError, OSError, ValueError) as error:
             missed.append(str(error).splitlines()[0].rstrip(".") if str(error) else type(error).__name__)
             if "no picture can be drawn here" in missed[-1]:
@@ -68,37 +62,29 @@ def failure_pictures(
     return pictures, list(dict.fromkeys(missed))
 
 
-def _picture_of(
-    row: Row, folder: Path, files: Files, scenes: dict[tuple[Any, ...], Any], salt: Salt | None
-) -> FailurePicture:
+def _picture_of(row: Row, folder: Path, files: Files, salt: Salt | None) -> FailurePicture:
     import imageio.v3 as iio
 
     from apo_bench.scenario.file import is_named
+    from apo_bench.show.again import why_not_again
     from apo_bench.simulation.scene.render import picture
-    from apo_bench.trial.fingerprint import content_hash, spec_hash
-    from apo_bench.trial.stages import scene_key, scene_of
+    from apo_bench.trial.stages import scene_of
 
-    require(
-        row["scenario"] in files or is_named(row["scenario"]),
-        f"run.json says no file of the scenario '{row['scenario']}'",
-    )
-    spec = replace(settings_of(row, files.get(row["scenario"], row["scenario"])), salt=salt)
-    key = scene_key(spec)
-    if key not in scenes:
-        scenes[key] = scene_of(spec)
-    scene = scenes[key]
+    name = row["scenario"]
+    require(name in files or is_named(name), f"run.json says no file of the scenario '{name}'")
+    spec = replace(settings_of(row, files.get(name, name)), salt=salt)
+    scene = scene_of(spec)
     picture(scene, {}, 16, 12)  # is there anything to draw with? asked before the trial is run
-    content = content_hash(scene.scenario, spec.scenario, scene.arm.files)
+    changed = why_not_again(row, spec)
     how = "how the replay ended, run again for this picture"
-    image = _again(row, spec, scene, content) if spec_hash(spec, content) == row.get("spec_hash") else None
+    image = None if changed else _draw_again(row, spec)
     if image is None:
         poses = _poses(_whole_row(folder, row).get("reached"))
-        if not poses:
-            raise ValueError(f"of seed {row['seed']} of {row['scenario']} nothing is known of where the parts ended")
-        image = picture(scene, poses, _WIDTH, _HEIGHT, _camera(scene, row, poses), _mark(row, scene, poses))
-        secret = row.get("salt") is not None and salt is None
-        why = "the file of its salt was not given (--salt-file)" if secret else "other code or assets made it"
-        how = f"where the parts ended, as the row says; {why}, so it was not run again"
+        require(bool(poses), f"of seed {row['seed']} of {name} nothing is known of where the parts ended")
+        image = picture(scene, poses, *_SIZE, _camera(scene, row, poses), _mark(row, scene, poses))
+        how = (
+            f"where the parts ended, as the row says; {changed or 'now it ends in another way'}, so it is not run again"
+        )
     contact = _failed_contact(row, scene)
     at = "" if contact is None else f"; the arrow points at {contact}"
     return FailurePicture(row, iio.imwrite("<bytes>", image, extension=".jpg", quality=_QUALITY), f"{how}{at}")
@@ -116,29 +102,32 @@ def _whole_row(folder: Path, row: Row) -> Mapping[str, Any]:
     return {}
 
 
-def _again(row: Row, spec: TrialSettings, scene: Any, content: str) -> Any:
+def _draw_again(row: Row, spec: TrialSettings) -> Any:
     """The last moment of the replay, with the arm; None if it ended in another way."""
+    from apo_bench.show.again import run_again
     from apo_bench.simulation.scene.render import picture_with_arm
-    from apo_bench.trial.trial import run_trial
 
-    last: deque[Any] = deque(maxlen=1)
-    again = run_trial(spec, scene, content=content, watch=lambda data: last.append(np.array(data.qpos)))
-    if not last or any(again.get(name) != row.get(name) for name in _SAME):
+    now, story = run_again(spec)
+    if story is None or any(now.get(name) != row.get(name) for name in _SAME):
         return None
-    poses = _poses(again["reached"])
-    camera = _camera(scene, row, poses)
-    fixed = {part: poses[part] for part in scene.scenario.assembly.fixed if part in poses}
-    return picture_with_arm(scene, fixed, last[0], _WIDTH, _HEIGHT, camera, _mark(row, scene, poses))
+    poses = _poses(now["reached"])
+    last = story.chapters[-1].moments[-1].qpos
+    camera = _camera(story.scene, row, poses)
+    return picture_with_arm(story.scene, poses, last, *_SIZE, camera, _mark(row, story.scene, poses))
 
 
 def _failed_contact(row: Row, scene: Any) -> Contact | None:
     """The contact that the sentence of a failure names; else the first one of an operation that was stopped."""
     operations = scene.scenario.assembly.operations
+    sentence = f"{row.get('sentence') or ''} "
+    for contact in (contact for operation in operations for contact in operation.contacts):
+        # with a space behind it, so that `a.px on b.n` is not found in `a.px on b.nx`
+        if f"{contact} " in sentence:
+            return contact
     k = row.get("failure_operation")
-    every = [contact for operation in operations for contact in operation.contacts]
-    # with a space behind it, so that `a.px on b.n` is not found in `a.px on b.nx`
-    named = [contact for contact in every if f"{contact} " in f"{row.get('sentence') or ''} "]
-    return next(iter(named or (operations[k - 1].contacts if k and row["failure_code"] == "force_stop" else ())), None)
+    if k and row["failure_code"] == "force_stop":
+        return next(iter(operations[k - 1].contacts), None)
+    return None
 
 
 def _mark(row: Row, scene: Any, poses: Poses) -> Any:
@@ -148,12 +137,11 @@ def _mark(row: Row, scene: Any, poses: Poses) -> Any:
 
     contact = _failed_contact(row, scene)
     assembly = scene.scenario.assembly
-    of = contact and (contact.manipulated if contact.environment.part in assembly.fixed else contact.environment)
-    if contact is None or of is None or of.part not in poses:
+    if contact is None or any(of.part not in poses for of in contact):
         return None
+    of = contact.manipulated if contact.environment.part in assembly.fixed else contact.environment
     middle = outline_points(assembly, of, poses).mean(axis=0)
-    lines = axis_marks(assembly, [contact], poses) if all(each.part in poses for each in contact) else []
-    return Marks([ShiftArrows(middle, np.array([0.0, 0.0, 1.0]), _ARROW_M, _TIP_M, _ARROW), *lines])
+    return Marks([ShiftArrows(middle, np.array([0.0, 0.0, 1.0]), _ARROW_M, _TIP_M, _ARROW)])
 
 
 def _poses(reached: Mapping[str, Sequence[float]] | None) -> Poses:
@@ -162,16 +150,13 @@ def _poses(reached: Mapping[str, Sequence[float]] | None) -> Poses:
 
 
 def _camera(scene: Any, row: Row, poses: Poses) -> Any:
-    """One that sees what failed: the parts of the operation, else all that were assembled."""
+    """One that sees the parts of the operation that failed, else all that were assembled."""
+    from apo_bench.simulation.film.framing import frame_parts
     from apo_bench.simulation.scene.render import camera_view
 
     assembly = scene.scenario.assembly
     k = row.get("failure_operation")
     failed = assembly.operations if k is None else assembly.operations[k - 1 : k]
-    near = {part for o in failed for part in (*o.moves, *(c.environment.part for c in o.contacts))}
-    parts = [part for part in sorted(near) if part in poses and part not in assembly.fixed]
-    if not parts:
-        return camera_view(np.array([*scene.scenario.site.center_m, 0.06]), 0.6, _AZIMUTH_DEG, _ELEVATION_DEG)
-    low, high = world_bounds((assembly.solids[part], poses[part]) for part in parts)
-    far = _NEAREST_M + float(np.linalg.norm(high - low))
-    return camera_view((low + high) / 2, min(far, 1.2), _AZIMUTH_DEG, _ELEVATION_DEG)
+    near = {part for o in failed for part in (*o.moves, *(contact.environment.part for contact in o.contacts))}
+    shown = (near & poses.keys()) - assembly.fixed or poses.keys() - assembly.fixed
+    return camera_view(*frame_parts(assembly, [poses], shown), _AZIMUTH_DEG, _ELEVATION_DEG)

@@ -5,61 +5,52 @@ from typing import Any
 
 from apo_bench.assembly import Assembly, Contact, Observation
 from apo_bench.recognition.evidence import Recognised
+from apo_bench.show.tables import form_table
 from apo_bench.trial.recognised_contacts import count_contacts
 
 _SCHEMA = "apo-bench/recognised/2"
-_SURE = 0.9
-"""Sets that are less likely are called not certain."""
+_SURE = 0.9  # sets that are less likely are called not certain
+_COLUMNS = {
+    "operation": "d",
+    "manipulated": "",
+    "environment": "",
+    "seen_gap_mm": "z.2f",
+    "gap_mm": "z.2f",
+    "allowed_gap_mm": ".2f",
+    "angle_deg": "z.2f",
+    "allowed_angle_deg": ".2f",
+    "overlap": ".0%",
+    "in_scenario": "",
+}
 
 
-def evidence_table(recognised: Recognised, right: Assembly) -> Any:
-    """One line per contact, with what was measured and what was allowed."""
-    from rich.table import Column, Table
-
-    names = ("seen gap mm", "gap mm", "allowed", "angle deg", "allowed", "overlap")
-    numbers = (Column(name, justify="right") for name in names)
-    table = Table("", "manipulated", "environment", *numbers, "", box=None, pad_edge=False, header_style="bold")
-    in_scenario = {(relation.made, relation.contact) for relation in right.relations()}
-    for e in recognised.evidence:
-        table.add_row(
-            str(e.made + 1),
-            str(e.contact.manipulated),
-            str(e.contact.environment),
-            f"{_mm(e.seen_gap_m):z.2f}",
-            f"{_mm(e.gap_m):z.2f}",
-            f"{_mm(e.most.gap_m):.2f}",
-            f"{degrees(e.angle_rad):z.2f}",
-            f"{degrees(e.most.angle_rad):.2f}",
-            f"{100 * e.share:.0f} %",
-            "" if (e.made, e.contact) in in_scenario else "not in the scenario",
-        )
-    return table
+def evidence_table(form: dict[str, Any]) -> Any:
+    """One line per contact of `recognition_form`, with what was measured and what was allowed."""
+    return form_table(form["contacts"], _COLUMNS)
 
 
-def difference_lines(observation: Observation, recognised: Recognised) -> list[str]:
+def difference_lines(form: dict[str, Any]) -> list[str]:
     """`all 9 contacts of the scenario were recognised, and no other`, or what differs."""
-    count = count_contacts(observation.assembly, recognised.assembly)
-    missed = [f"missed: {k + 1}: {contact}" for k, contact in _missed(observation.assembly, recognised)]
-    total = count["contacts_right"] + count["contacts_missed"]
-    if not missed and not count["contacts_false"]:
-        return [f"all {total} contacts of the scenario were recognised, and no other"]
-    line = f"{count['contacts_right']} of the {total} contacts of the scenario were recognised"
-    return [f"{line}, and {count['contacts_false']} that it does not have", *missed]
+    right = form["contacts_right"]
+    whole = right + form["contacts_missed"]
+    if right == whole and not form["contacts_false"]:
+        return [f"all {whole} contacts of the scenario were recognised, and no other"]
+    line = f"{right} of the {whole} contacts of the scenario were recognised"
+    missed = [f"missed: {c['operation']}: {c['manipulated']} on {c['environment']}" for c in form["missed"]]
+    return [f"{line}, and {form['contacts_false']} that it does not have", *missed]
 
 
-def confidence_line(recognised: Recognised) -> list[str]:
+def confidence_lines(form: dict[str, Any]) -> list[str]:
     """How likely the set of contacts is, and what the next best one would change; nothing where none were compared."""
-    if recognised.probability is None:
+    probability = form["probability"]
+    if probability is None:
         return []
-    sentence = (
-        f"{'not certain: ' * (recognised.probability < _SURE)}this set of contacts is right with probability "
-        f"{recognised.probability:.2f}, of those that were compared"
-    )
-    if recognised.rival is None:
+    doubt = "not certain: " * (probability < _SURE)
+    sentence = f"{doubt}this set of contacts is right with probability {probability:.2f}, of those that were compared"
+    if form["next"] is None:
         return [sentence]
-    added, gone = _changes(recognised.assembly, recognised.rival.assembly)
-    change = [f"{word} {', '.join(names)}" for word, names in (("with", added), ("without", gone)) if names]
-    return [f"{sentence}; the next ({recognised.rival.probability:.2f}) is {' and '.join(change)}"]
+    change = [f"{word} {', '.join(form['next'][word])}" for word in ("with", "without") if form["next"][word]]
+    return [f"{sentence}; the next ({form['next']['probability']:.2f}) is {' and '.join(change)}"]
 
 
 def _changes(best: Assembly, other: Assembly) -> tuple[list[str], list[str]]:

@@ -1,20 +1,17 @@
-"""One demonstration through the range finder, and all that it made of that: as a record, a form, lines, and a picture
-with a row for each operation: what a camera sees, range, difference, regions, fitted model."""
+"""One demonstration through the range finder, and what it made of that: as a record, as JSON, and as a table."""
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, final
 
 import numpy as np
 
-from apo_bench.assembly import Assembly
 from apo_bench.depth_camera.follow import Event
 from apo_bench.depth_camera.range_finder import RangeFinder
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
-from apo_bench.io import default_looks, save_figure
 from apo_bench.records import RANGE, check
 from apo_bench.scenario.file import load_scenario
+from apo_bench.show.tables import form_table
 from apo_bench.simulation.scene import build_scene
 from apo_bench.simulation.sensor.rays import ModelRays
 from apo_bench.simulation.sensor.watch import DemonstrationImages
@@ -28,14 +25,17 @@ from apo_bench.trial.stages import (
 )
 
 _FORM = "apo-bench/eye/1"
-_TITLES = ("TV camera, quiet", "range image [m]", "minus the one before [mm]", "appeared, vanished", "fitted model")
-_APPEARED = "#1b7837"
-_VANISHED = "#b2182b"
-_OUTLINE = "#d95f02"
-_AROUND = 20
-"""Pixels around what changed."""
-_LARGEST_MM = 60.0
-_RESIDUAL_MM = 5.0
+_COLUMNS = {
+    "operation": "d",
+    "moves": "",
+    "found": "",
+    "time_s": ".2f",
+    "error_mm": ".2f",
+    "error_deg": ".2f",
+    "deviation_mm": ".2f",
+    "deviation_deg": ".2f",
+    "explained": ".0%",
+}
 
 
 @final
@@ -122,82 +122,6 @@ def _operation_form(event: Event | None, run: SensorRun, k: int) -> dict[str, An
     }
 
 
-def sensor_lines(form: dict[str, Any]) -> list[str]:
-    """A form of `sensor_form` as lines to be read."""
-    return [
-        f"{form['scenario']}: seed {form['seed']}, careless {form['careless']:g}, "
-        f"{form['level_mm']:g} mm per ray, {len(form['firings_s'])} range images",
-        "",
-        *(f"{o['operation']} {' + '.join(o['moves'])}: {_seen(o)}" for o in form["operations"]),
-    ]
-
-
-def _seen(operation: dict[str, Any]) -> str:
-    if not operation["found"]:
-        return "not recognised"
-    mm, deg = (", ".join(f"{x:.2f}" for x in operation[f"deviation_{unit}"]) for unit in ("mm", "deg"))
-    models = ", ".join(f"{name} {100 * share:.0f} %" for name, share in operation["explained"].items())
-    return (
-        f"at {operation['time_s']:.2f} s; off by {operation['error_mm']:.2f} mm, {operation['error_deg']:.2f} deg; "
-        f"known to {mm} mm, {deg} deg; explained by {models}"
-    )
-
-
-@default_looks()
-def draw_sensor(run: SensorRun, out: Path, view: int = 0) -> None:
-    """Draw every operation that was noticed, in one view of the range finder."""
-    from matplotlib.figure import Figure
-
-    events = run.events
-    figure = Figure(figsize=(15.0, 2.55 * max(1, len(events)) + 0.3), layout="constrained")
-    rows = figure.subplots(max(1, len(events)), len(_TITLES), squeeze=False)
-    for axes, title in zip(rows[0], _TITLES, strict=True):
-        axes.set_title(title, fontsize=11)
-    for axes in rows.ravel():
-        axes.set(xticks=[], yticks=[])
-    for row, event in zip(rows, events, strict=False):
-        row[0].set_ylabel(_label(run.simulated.demonstration.assembly, event), fontsize=9)
-        _draw_row(row, run, event, view)
-    # only where anything ever changed is shown
-    changed = [event.regions[view].appeared | event.regions[view].vanished for event in events]
-    v, u = np.nonzero(np.any(changed, axis=0)) if changed else (np.zeros(0), np.zeros(0))
-    for axes in rows[:, 1:].ravel() if len(u) else ():
-        axes.set(xlim=(u.min() - _AROUND, u.max() + _AROUND), ylim=(v.max() + _AROUND, v.min() - _AROUND))
-    save_figure(figure, out, dpi=72)
-
-
-def _label(assembly: Assembly, event: Event) -> str:
-    moved = ", ".join(sorted(event.moved)) or "nothing"
-    if event.operation is None:
-        return f"{moved}: not expected"
-    ended = "not recognised" if event.found is None else f"{100 * event.found.explained:.0f} % explained"
-    return f"{event.operation + 1}: {moved}, {ended}"
-
-
-def _draw_row(row: Any, run: SensorRun, event: Event, view: int) -> None:
-    from matplotlib.colors import ListedColormap
-
-    before = run.images[event.first][view]
-    after = run.images[event.last][view]
-    regions = event.regions[view]
-    row[0].imshow(run.watched.pictures[event.last], cmap="gray", vmin=0.0, vmax=1.0)
-    row[1].imshow(after, cmap="viridis_r", vmin=np.nanmin(after), vmax=np.nanquantile(after, 0.95))
-    row[2].imshow(1e3 * (after - before), cmap="RdBu", vmin=-_LARGEST_MM, vmax=_LARGEST_MM)
-    row[3].imshow(after, cmap="gray_r", vmin=np.nanmin(after), vmax=2.0 * np.nanmax(after))
-    for mask, color in ((regions.appeared, _APPEARED), (regions.vanished, _VANISHED)):
-        row[3].imshow(np.where(mask, 1.0, np.nan), cmap=ListedColormap([color]), vmin=0.0, vmax=1.0, alpha=0.8)
-    row[4].imshow(after, cmap="gray_r", vmin=np.nanmin(after), vmax=2.0 * np.nanmax(after))
-    if event.found is not None and event.model is not None:
-        camera = run.watched.finder.views[view]
-        distance, _ = run.models(event.model.put(event.found.T), camera.origin, camera.rays)
-        expected = distance.reshape(after.shape)
-        drawn = row[4].imshow(
-            np.where(regions.appeared & (np.abs(after - expected) < 0.02), 1e3 * (after - expected), np.nan),
-            cmap="coolwarm",
-            vmin=-_RESIDUAL_MM,
-            vmax=_RESIDUAL_MM,
-        )
-        row[4].contour(np.isfinite(expected), levels=[0.5], colors=_OUTLINE, linewidths=1.2)
-        bar = row[4].figure.colorbar(drawn, ax=row[4], shrink=0.85)
-        bar.ax.tick_params(labelsize=7)
-        bar.set_label("measured - model [mm]", fontsize=7)
+def sensor_table(form: dict[str, Any]) -> Any:
+    """The operations of `sensor_form` as a table of `rich`: when, how far off, how well known, explained by what."""
+    return form_table(form["operations"], _COLUMNS)

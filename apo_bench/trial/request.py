@@ -23,7 +23,7 @@ from apo_bench.records import (
 from apo_bench.scenario import Scenario, in_the_air, load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.simulation.film.film import write_film
-from apo_bench.simulation.film.still import FilmTrack
+from apo_bench.simulation.film.track import FilmTrack
 from apo_bench.simulation.graphics import renderer
 from apo_bench.simulation.scene import Scene, check_film
 from apo_bench.trial.fingerprint import content_hash, spec_hash
@@ -162,6 +162,15 @@ def run_request(request: Request, show: Show | None = None) -> Row:
         InputError: A setting that is not allowed, or two that contradict each other.
     """
     _, spec = checked_request(request)
+    return run_settings(request, spec, show)
+
+
+def run_settings(request: Request, spec: TrialSettings, show: Show | None = None) -> Row:
+    """Run the trial of these settings; the request says what to read and to write.
+
+    Args:
+        show: As in `run_request`.
+    """
     scene = scene_of(spec)
     simulated = None
     track = FilmTrack() if request.video or show else None

@@ -10,7 +10,7 @@ from apo_bench.assembly import Observation, Poses, placements
 from apo_bench.geometry import Array
 from apo_bench.records import RANGE, Row, TrialSettings
 from apo_bench.scenario.layout import layout_at
-from apo_bench.simulation.film.still import Chapter, FilmTrack, scenario_chapter
+from apo_bench.simulation.film.track import Chapter, FilmTrack, scenario_chapter
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.stages import SimulatedDemonstration, watch_again
 

@@ -11,10 +11,9 @@ import pytest
 import typer
 
 from apo_bench.cli.app import app, main
-from apo_bench.cli.printing import GROUPS, OPTIONS, OTHERS
-from apo_bench.cli.setting_options import axis_flag, completion, offered_names
+from apo_bench.cli.completion import completion, offered_names
+from apo_bench.cli.help import GROUPS, OPTIONS, OTHERS
 from apo_bench.observation.noise import NOISES, Level, make_noise
-from apo_bench.records import LEVEL, SETTINGS
 from apo_bench.records.short_names import checked_method, checked_relations
 from apo_bench.scenario.file import scenario_names
 from apo_bench.simulation.arms.finding import arm_names
@@ -73,19 +72,6 @@ def test_help_cuts_no_sentence(words: tuple[str, ...], capsys: pytest.CaptureFix
         assert first.split(". ")[0].rstrip(".") in said
 
 
-def test_the_option_of_an_axis_is_named_as_it_is_typed() -> None:
-    typed = {option.opts[0] for option in EVERY["sweep",].params}
-    assert {axis_flag(info) for info in (LEVEL, *SETTINGS.values()) if info.axis and info.help} <= typed
-
-
-def test_the_arms_of_other_collections_are_named(capsys: pytest.CaptureFixture[str]) -> None:
-    for command in ("replay", "sweep", "scene"):
-        main([command, "--help"])
-        said = capsys.readouterr().out
-        assert "menagerie:NAME" in said
-        assert "robosuite:NAME" in said
-
-
 def test_names_that_are_offered_are_the_names_there_are() -> None:
     assert tuple(offered_names("scenario")) == scenario_names()
     assert {name for name in offered_names("arm") if not name.endswith(":")} == set(arm_names())
@@ -106,9 +92,7 @@ def test_after_a_comma_what_is_there_is_not_offered_again() -> None:
 @pytest.mark.parametrize(
     ("shell", "typed", "words", "not_offered"),
     [
-        ("bash", "apo-bench com", "compare", "sweep"),
         ("bash", "apo-bench sweep stick_in_tower --methods none,contact", "none,contact-robust", "paper"),
-        ("zsh", "apo-bench replay stick", "stick_in_tower", "pocket"),
         ("fish", "apo-bench replay stick_in_tower --noise mega", "megapose-tless", "isotropic"),
     ],
 )
@@ -120,6 +104,6 @@ def test_a_shell_is_offered_names_and_commands(shell: str, typed: str, words: st
 
 def test_completion_loads_no_simulator() -> None:
     names = "[offered_names(what) for what in ('scenario', 'noise', 'arm')]"
-    program = f"import sys, apo_bench.cli.app; from apo_bench.cli.setting_options import offered_names; {names}"
+    program = f"import sys, apo_bench.cli.app; from apo_bench.cli.completion import offered_names; {names}"
     check = f"{program}; sys.exit(any(name in sys.modules for name in ('mujoco', 'scipy', 'matplotlib', 'mink')))"
     assert subprocess.run([sys.executable, "-c", check], check=False).returncode == 0

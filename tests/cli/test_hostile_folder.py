@@ -11,7 +11,6 @@ from pathlib import Path
 
 import pytest
 
-from apo_bench.io.processes import SAFE_PATH, environment
 from apo_bench.names import admit, folder_of_own_modules, own_modules_in, resolve
 
 PROGRAM = Path(sys.executable).with_name("apo-bench")
@@ -101,26 +100,6 @@ def test_no_command_runs_what_lies_in_the_current_folder(hostile: Path, run: Pat
     }
 
 
-def test_run_as_a_module_neither_but_for_what_python_itself_imports_first(hostile: Path) -> None:
-    """Of its own modules, `python -m` takes some from the current folder before anything of ours; -P prevents it."""
-    first = subprocess.run(
-        [sys.executable, "-c", "import runpy, sys; print(*sys.modules)"], capture_output=True, text=True, check=True
-    ).stdout.split()
-    done, owned = started(hostile, sys.executable, "-P", "-m", "apo_bench", "scenarios")
-    assert (done.returncode, owned) == (0, "")
-    for name in first:
-        (hostile / f"{name}.py").unlink(missing_ok=True)
-    done, owned = started(hostile, sys.executable, "-m", "apo_bench", "graph", "block_on_block", "--out", "graph.png")
-    assert (done.returncode, owned) == (0, "")
-
-
-@pytest.mark.extras
-def test_workers_of_ray_neither(hostile: Path, run: Path) -> None:
-    ray = ("--backend", "ray", "--address", "local")
-    done, owned = started(hostile, str(PROGRAM), "sweep", "block_on_block", *SHORT, *ray, "--out", "run_on_ray")
-    assert (done.returncode, owned) == (0, "")
-
-
 @pytest.fixture
 def forgotten() -> Iterator[None]:
     before = set(sys.modules)
@@ -151,10 +130,3 @@ def test_only_what_was_admitted_and_what_that_imports_is_found(tmp_path: Path) -
     admit("stranger_one")
     with pytest.raises(ImportError):
         __import__("stranger_one")
-
-
-def test_what_is_given_to_processes_is_taken_back() -> None:
-    before = os.environ.get(SAFE_PATH)
-    with environment({SAFE_PATH: "1"}):
-        assert os.environ[SAFE_PATH] == "1"
-    assert os.environ.get(SAFE_PATH) == before

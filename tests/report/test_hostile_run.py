@@ -171,7 +171,7 @@ def test_a_terminal_shows_what_it_would_obey(tmp_path: Path, capsys: pytest.Capt
 
 def test_a_sentence_of_a_row_is_only_shown(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from apo_bench.assembly import Outcome
-    from apo_bench.cli.terminal import print_row
+    from apo_bench.cli.trial_text import print_row
     from apo_bench.trial.outcome_columns import result
 
     end = result(Outcome("correct", "raised", None, "\x1b[31mraised\nmore"), success=False)

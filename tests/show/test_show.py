@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 import numpy as np
@@ -38,14 +37,6 @@ def test_contacts_that_do_not_hold_are_named_the_worst_first() -> None:
     assert belief_lines([mended]) == ["corrected: largest gap 0.000 mm; all hold"]
 
 
-def test_only_what_was_done_by_then_is_shown() -> None:
-    seen = lifted()
-    one, two = (belief_panel("as seen", seen, seen.goals, k) for k in (1, 2))
-    assert one.open == ()
-    assert two.open == ("R2 castle2 -> castle1: 2.00 mm",)
-    np.testing.assert_array_equal(one.poses["castle2"], seen.start["castle2"])
-
-
 def test_disappeared_contacts_are_said_to_be() -> None:
     scenario = load_scenario("vanished_fixture")
     seen = as_planned(scenario, 1.0, 1.0)
@@ -78,9 +69,7 @@ def test_a_picture_is_drawn(tmp_path: Path, capsys: pytest.CaptureFixture[str]) 
             ("--level", "1", "--observation", "docs/seen.csv"),
             "--level, which draws a trial, was given together with",
         ),
-        (("--method", "contakt"), "contact"),
         (("--out", "seen.jpg"), "ends in .png"),
-        (("--eye", "telescope"), "telescope"),
     ],
 )
 def test_wrong_requests(arguments: tuple[str, ...], part: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -137,10 +126,3 @@ def test_what_speaks_against_a_correction_is_said(
     assert assumed == "a standard deviation of 3 mm and 1 deg per axis, assumed where the file states none"
     assert wrong.startswith("the stated noise does not explain the correction (p = ")
     assert "; foretold: operation 2 (castle2) will fail: " in wrong
-
-
-def test_a_plan_without_misgivings_says_nothing(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["plan", "stick_in_tower", "--observation", "docs/seen.csv", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["notes"] == []
-    assert cli.main(["plan", "stick_in_tower", "--observation", "docs/seen.csv", "--method", ""]) == 2
-    assert cli.main(["plan", "stick_in_tower", "--deviation-mm", "3"]) == 2

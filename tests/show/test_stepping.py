@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -14,9 +15,11 @@ import pytest
 
 from apo_bench import Scene, SweepSettings, run_sweep
 from apo_bench.cli.app import main
+from apo_bench.geometry import pose
+from apo_bench.show.finished_trial import trial_again
 from apo_bench.show.stepping import FACES, Cursor
-from apo_bench.show.viewing import trial_again
-from apo_bench.simulation.film.still import body_meshes, body_poses, draw_over, part_meshes, part_poses, show_moment
+from apo_bench.simulation.film.shapes import shapes_of, surface
+from apo_bench.simulation.film.track import part_poses
 from apo_bench.simulation.film.window import WINDOW_KEYS, step_in_window
 from apo_bench.simulation.scene.world import initial_state
 from apo_bench.trial.story import AS_CORRECTED, AS_SEEN, AS_TRUE, Story, scenario_story
@@ -34,26 +37,43 @@ def with_goals(scene: Scene) -> Story:
 def test_a_scenario_is_stepped_through_operation_by_operation(tower: Scene) -> None:
     cursor = Cursor(scenario_story(tower))
     assembly = tower.scenario.assembly
-    assert cursor.still().faces == ()
+    assert cursor.snapshot().faces == ()
     seen = []
     for _ in range(4):
         cursor.press("next operation")
-        seen.append(cursor.at.doing.operation)
+        seen.append(cursor.moment.doing.operation)
     assert seen == [0, 1, 2, 2]
-    last = cursor.still()
+    last = cursor.snapshot()
     assert set(last.faces) == {of for contact in assembly.operations[2].contacts for of in contact}
     assert last.words[0].endswith("operation 3 of 3, stick: in place")
     poses = part_poses(last.chapter, last.moment)
     for part, T in cursor.story.assembled.items():
         np.testing.assert_allclose(poses[part], T, atol=1e-9)
     cursor.press("previous operation")
-    assert cursor.at.doing.operation == 1
+    assert cursor.moment.doing.operation == 1
     for faces in (FACES[2], FACES[0]):
         cursor.press("faces")
         assert cursor.faces == faces
     cursor.press("play")
     cursor.pass_time(10.0)
-    assert (cursor.moment, cursor.playing) == (3, False)
+    assert (cursor.place, cursor.playing) == (3, False)
+
+
+def test_chapters_follow_each_other_and_play_one_at_a_time(tower: Scene) -> None:
+    one = scenario_story(tower)
+    cursor = Cursor(Story(tower, (one.chapters[0], replace(one.chapters[0], title="again")), one.assembled))
+    cursor.press("next chapter")
+    assert (cursor.place, cursor.chapter.title) == (4, "again")
+    cursor.press("previous")
+    cursor.press("play")
+    assert (cursor.place, cursor.playing) == (0, True)
+    cursor.pass_time(1.5)
+    assert cursor.place == 1
+    cursor.pass_time(9.0)
+    assert (cursor.place, cursor.playing) == (3, False)
+    cursor.go(99)
+    cursor.press("previous chapter")
+    assert cursor.place == 4
 
 
 def test_goals_are_laid_over_the_parts_and_said_in_millimetres(tower: Scene) -> None:
@@ -61,41 +81,35 @@ def test_goals_are_laid_over_the_parts_and_said_in_millimetres(tower: Scene) -> 
     cursor.go(2)
     assert "as seen: 10.00 mm, 0.00 degrees off" in cursor.words()
     assert "as it is now: 0.00 mm, 0.00 degrees off" in cursor.words()
-    assert cursor.still().ghosts == ()
+    assert cursor.snapshot().overlays == ()
     cursor.press("goals")
-    ghosts = cursor.still().ghosts
-    assert [(ghost.name, sorted(ghost.poses)) for ghost in ghosts] == [
-        (name, ["castle1", "castle2"]) for name in (AS_SEEN, AS_TRUE)
-    ]
-    shifts = [ghosts[0].poses[part][:3, 3] - ghosts[1].poses[part][:3, 3] for part in ghosts[0].poses]
+    seen, true = cursor.snapshot().overlays
+    assert sorted(seen.poses) == sorted(true.poses) == ["castle1", "castle2"]
+    assert cursor.words()[-2:] == ("orange: as seen", "violet: true")
+    shifts = [seen.poses[part][:3, 3] - true.poses[part][:3, 3] for part in seen.poses]
     np.testing.assert_allclose(shifts, [(0.01, 0.0, 0.0)] * 2, atol=1e-12)
-
-    drawn = mujoco.MjvScene(tower.work.model, maxgeom=2000)
-    draw_over(tower, cursor.still(), drawn)
-    geoms = drawn.geoms[: drawn.ngeom]
-    labels = [geom.label for geom in geoms if geom.type == mujoco.mjtGeom.mjGEOM_LABEL]
-    assert labels == [str(face) for face in cursor.still().faces]
-    ours = tower.work.geom_part
-    pieces = sum(
-        int(ours[i]) in (tower.work.free.index("castle1"), tower.work.free.index("castle2")) for i in range(len(ours))
-    )
-    assert sum(bool(geom.rgba[3] == np.float32(0.4)) for geom in geoms) == 2 * pieces
+    shapes = list(shapes_of(tower, initial_state(tower.work, cursor.chapter.start), cursor.snapshot()))
+    labels = [kind.label for kind, _ in shapes if kind.label]
+    assert labels == [str(face) for face in cursor.snapshot().faces]
+    names = [tower.work.free.index("castle1"), tower.work.free.index("castle2")]
+    pieces = sum(int(part) in names for part in tower.work.geom_part)
+    assert sum(kind.rgba[3] == np.float32(0.4) for kind, _ in shapes) == 2 * pieces
 
 
-def test_shapes_are_as_large_as_what_they_stand_for(tower: Scene) -> None:
-    for part in tower.work.free:
-        points = np.concatenate([shape.vertices for shape in part_meshes(tower.work, part)])
-        bounds = tower.scenario.assembly.solids[part].bounds
-        np.testing.assert_allclose([points.min(axis=0), points.max(axis=0)], bounds, atol=5e-4)  # the clearance
-    chapter = scenario_story(tower).chapters[0]
-    data = initial_state(tower.work, chapter.start)
-    show_moment(tower, data, chapter, chapter.moments[-1])
-    poses = body_poses(data)
-    found = body_meshes(tower.work)
-    assert len(poses) == tower.work.model.nbody
-    assert {shape.part for shape in found} == {None, *tower.scenario.assembly.solids}
-    for shape in found:
-        assert shape.triangles.max() < len(shape.vertices)
+def test_shapes_are_as_large_as_what_they_stand_for_and_where_it_is(tower: Scene) -> None:
+    """The castles and the stick at the end: the corners of all their shapes are those of their solids."""
+    cursor = Cursor(scenario_story(tower))
+    cursor.go(3)
+    poses = part_poses(cursor.chapter, cursor.moment)
+    points = []
+    for kind, at in shapes_of(tower, initial_state(tower.work, cursor.chapter.start), cursor.snapshot()):
+        color = next((part for part, rgb in tower.scenario.colors.items() if np.allclose(kind.rgba[:3], rgb)), None)
+        if color in tower.work.free and not kind.label:
+            points.append(pose.apply(pose.unpack(at), surface(tower.work.model, kind).vertices))
+    found = np.concatenate(points)
+    corners = [pose.apply(poses[part], tower.scenario.assembly.solids[part].bounds) for part in tower.work.free]
+    for side in (np.min, np.max):
+        np.testing.assert_allclose(side(found, axis=0), side(np.concatenate(corners), axis=0), atol=5e-4)
 
 
 class Window:
@@ -141,7 +155,7 @@ def test_keys_of_the_window_move_what_is_shown(tower: Scene, monkeypatch: pytest
     monkeypatch.setitem(sys.modules, "mujoco.viewer", SimpleNamespace(launch_passive=launch))
     monkeypatch.setattr(mujoco, "viewer", SimpleNamespace(launch_passive=launch), raising=False)
     cursor = Cursor(with_goals(tower))
-    step_in_window(tower, cursor.story.assembled, cursor.still, cursor.press, cursor.pass_time)
+    step_in_window(tower, cursor.story.assembled, cursor.snapshot, cursor.press, cursor.pass_time)
     (window,) = windows
     assert ["at the start" in window.texts[0], "operation 1 of 3" in window.texts[1]] == [True, True]
     assert window.drawn[0] == 0 < window.drawn[1] < window.drawn[2]
@@ -193,49 +207,33 @@ def test_a_browser_is_served_what_the_cursor_is_at(tower: Scene) -> None:
 
 
 def test_clicks_in_a_browser_move_the_cursor(tower: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Buttons, sliders and boxes do what stands on them; viser itself is played by a stand-in that keeps callbacks."""
+    """Buttons and the slider do what stands on them; viser itself is played by a stand-in that keeps callbacks."""
     from apo_bench.show import browser
 
     server = MagicMock()
-    sliders: list[Any] = []
-
-    def slider(*_: Any, **__: Any) -> Any:
-        sliders.append(MagicMock())
-        return sliders[-1]
-
-    server.gui.add_slider.side_effect = slider
     monkeypatch.setattr(browser, "_server", lambda _: server)
     page = browser.Page(with_goals(tower), 8080)
     cursor = page.cursor
+    groups = server.gui.add_button_group.call_args_list
+    clicked = server.gui.add_button_group.return_value.on_click.call_args_list
+
+    def happen(callback: Any, value: Any) -> None:
+        callback.args[0](SimpleNamespace(target=SimpleNamespace(value=value)))
 
     def click(label: str) -> None:
-        event = SimpleNamespace(target=SimpleNamespace(value=label))
-        for group, on_click in zip(server.gui.add_button_group.call_args_list, clicked, strict=True):
-            if label in group.args[1]:
-                on_click.args[0](event)
+        happen(next(on for group, on in zip(groups, clicked, strict=True) if label in group.args[1]), label)
 
-    clicked = server.gui.add_button_group.return_value.on_click.call_args_list
-    assert cursor.moment == 0
-    click("moment on")
-    click("moment on")
-    assert cursor.moment == 2
-    click("moment back")
-    assert cursor.moment == 1
-    click("operation on")
-    assert cursor.at.doing.operation == 1
+    for label, place in (("moment on", 1), ("moment on", 2), ("moment back", 1), ("operation on", 2)):
+        click(label)
+        page.draw()
+        assert cursor.place == place == server.gui.add_slider.return_value.value
     click("play / stop")
-    assert cursor.playing
-    click("play / stop")
-    slid = sliders[0].on_update.call_args.args[0]
-    slid(SimpleNamespace(target=SimpleNamespace(value=1)))
-    assert cursor.moment == 1
-    (seen, true) = (call.args[0] for call in server.gui.add_checkbox.return_value.on_update.call_args_list)
-    seen(SimpleNamespace(target=SimpleNamespace(value=True)))
-    assert cursor.goals == {AS_SEEN}
-    true(SimpleNamespace(target=SimpleNamespace(value=True)))
-    seen(SimpleNamespace(target=SimpleNamespace(value=False)))
-    assert cursor.goals == {AS_TRUE}
+    click("goals")
     page.draw()
-    assert sliders[0].value == 1
+    assert (cursor.playing, cursor.shows_goals) == (True, True)
+    click("play / stop")
+    happen(server.gui.add_slider.return_value.on_update.call_args, 1)
+    page.draw()
+    assert cursor.place == 1
     page.close()
     server.stop.assert_called_once()

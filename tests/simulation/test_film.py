@@ -3,8 +3,9 @@
 import numpy as np
 
 from apo_bench import Plan, build_scene, demonstrate, draw_layout, load_scenario, replay
-from apo_bench.simulation.film.film import ABOVE_PX, BELOW_PX, Caption, captioned, frames, operation_words, sampled
-from apo_bench.simulation.film.still import Chapter, FilmMoment, FilmTrack
+from apo_bench.simulation.film.caption import ABOVE_PX, BELOW_PX, Caption, add_caption
+from apo_bench.simulation.film.film import frames, operation_words, sampled
+from apo_bench.simulation.film.track import Chapter, FilmMoment, FilmTrack
 from apo_bench.simulation.hooks import BY_HAND, TOUCHING, Doing
 
 
@@ -52,8 +53,8 @@ def test_a_trial_is_told_operation_by_operation_and_shown() -> None:
 def test_words_stand_around_the_picture() -> None:
     picture = np.zeros((240, 480, 3), np.uint8)
     inset = np.full((40, 60, 3), 128, np.uint8)
-    plain = captioned(picture, inset, Caption("a", "x 2", ("done",), ""))
-    failed = captioned(picture, inset, Caption("a", "x 2", ("done",), "", good=False))
+    plain = add_caption(picture, inset, Caption("a", "x 2", ("done",), ""))
+    failed = add_caption(picture, inset, Caption("a", "x 2", ("done",), "", good=False))
     assert plain.shape == (240 + ABOVE_PX + BELOW_PX, 480, 3)
     inside = plain[ABOVE_PX:-BELOW_PX]
     assert not inside[50:].any()

@@ -22,7 +22,7 @@ from apo_bench import (
     run_trial,
 )
 from apo_bench.assembly import Consistency, Step, Suspect, Try, relation_graph
-from apo_bench.cli.terminal import print_row
+from apo_bench.cli.trial_text import print_row
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise
 from apo_bench.records import ENV_ID, ROW, level_pair, outcomes

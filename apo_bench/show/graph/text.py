@@ -1,4 +1,4 @@
-"""A relation graph in words for people, and as one JSON object."""
+"""A relation graph in words for people, as one JSON object, and as Mermaid text."""
 
 from typing import Any
 
@@ -17,15 +17,10 @@ def graph_lines(scenario: str, graph: Graph, residuals: ArcResiduals | None = No
     """Every part at its placements with the ODL, then every arc: when it was made and lost, the faces, the residual."""
     nodes = [(str(node), "" if graph.stands(node) else "moved on") for node in graph.nodes]
     sizes = [()] * len(graph.arcs) if residuals is None else [(_size(r, gap_m),) for r in residuals]
-    arcs = [
-        (
-            str(arc),
-            f"made {arc.made + 1}{'' if arc.lost is None else f', lost at {arc.lost + 1}'}",
-            f"[{' '.join(arc.pairs)}]",
-            *size,
-        )
-        for arc, size in zip(graph.arcs, sizes, strict=True)
-    ]
+    arcs = []
+    for arc, size in zip(graph.arcs, sizes, strict=True):
+        lost = "" if arc.lost is None else f", lost at {arc.lost + 1}"
+        arcs.append((str(arc), f"made {arc.made + 1}{lost}", f"[{' '.join(arc.pairs)}]", *size))
     return [graph_title(scenario, graph), "", *columns(nodes), "", *columns(arcs)]
 
 
@@ -36,7 +31,7 @@ def graph_form(scenario: str, graph: Graph, residuals: ArcResiduals | None = Non
         "schema": _GRAPH,
         "scenario": scenario,
         "step": graph.step,
-        "nodes": [{**_node_form(node), "stands": graph.stands(node)} for node in graph.nodes],
+        "nodes": [_node_form(node) | {"stands": graph.stands(node)} for node in graph.nodes],
         "arcs": [
             {
                 "name": arc.name,
@@ -52,6 +47,17 @@ def graph_form(scenario: str, graph: Graph, residuals: ArcResiduals | None = Non
     }
 
 
+def mermaid_text(graph: Graph) -> str:
+    """A flow chart that GitHub and other readers of Markdown draw; dotted is what disappeared."""
+    number = {node: i for i, node in enumerate(graph.nodes)}
+    nodes = [f'  n{i}["{node.part}<br>{_odl(node)}"]' for node, i in number.items()]
+    arcs = [
+        f"  n{number[arc.manipulated]} {'-->' if arc.lost is None else '-.->'}|{arc.name}| n{number[arc.environment]}"
+        for arc in graph.arcs
+    ]
+    return "\n".join(["flowchart TD", *nodes, *arcs]) + "\n"
+
+
 def _size(residual: float | None, gap_m: float) -> str:
     if residual is None:
         return "not seen"
@@ -60,6 +66,8 @@ def _size(residual: float | None, gap_m: float) -> str:
 
 
 def _node_form(node: Node) -> dict[str, Any]:
-    if node.placed is None:
-        return {"part": node.part, "placed": None, "odl": "T0"}
-    return {"part": node.part, "placed": node.placed + 1, "odl": spelled(node.odl)}
+    return {"part": node.part, "placed": None if node.placed is None else node.placed + 1, "odl": _odl(node)}
+
+
+def _odl(node: Node) -> str:
+    return "T0" if node.placed is None else spelled(node.odl)

@@ -9,8 +9,10 @@ import mujoco
 
 from apo_bench.assembly import Poses
 from apo_bench.errors import InputError
-from apo_bench.simulation.film.film import FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG, framing
-from apo_bench.simulation.film.still import Still, draw_over, show_moment
+from apo_bench.simulation.film.film import FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG
+from apo_bench.simulation.film.framing import frame_parts
+from apo_bench.simulation.film.overlay import Snapshot, draw_over
+from apo_bench.simulation.film.track import show_moment
 from apo_bench.simulation.graphics import need_window
 from apo_bench.simulation.scene import Scene, initial_state
 
@@ -26,15 +28,9 @@ WINDOW_KEYS = {
     269: "goals",
 }
 """What keys mean, by their GLFW codes: letters and digits have a meaning for MuJoCo's window already."""
-_HELP = (
-    ("space", "play, stop"),
-    ("left, right", "a moment"),
-    ("up, down", "an operation"),
-    ("page up, page down", "demonstration, replay"),
-    ("home", "names of faces"),
-    ("end", "goals"),
-)
-_PICTURE_S = 1.0 / 30.0
+_KEYS = "space\nleft, right\nup, down\npage up, page down\nhome\nend"
+_MEANINGS = "play, stop\na moment\nan operation\ndemonstration, replay\nnames of faces\ngoals"
+PICTURE_S = 1.0 / 30.0
 
 
 def no_window() -> str:
@@ -53,7 +49,7 @@ def no_window() -> str:
 def step_in_window(
     scene: Scene,
     assembled: Poses,
-    now: Callable[[], Still],
+    now: Callable[[], Snapshot],
     press: Callable[[str], None],
     pass_time: Callable[[float], None],
 ) -> None:
@@ -77,7 +73,7 @@ def step_in_window(
         scene.work.model, data, key_callback=on_key, show_left_ui=False, show_right_ui=False
     ) as window:
         with window.lock():
-            window.cam.lookat[:], window.cam.distance = framing(scene.scenario.assembly, [assembled])
+            window.cam.lookat[:], window.cam.distance = frame_parts(scene.scenario.assembly, [assembled])
             window.cam.azimuth = FILM_AZIMUTH_DEG
             window.cam.elevation = FILM_ELEVATION_DEG
         before = time.monotonic()
@@ -87,18 +83,17 @@ def step_in_window(
             with window.lock():
                 _draw(scene, data, now(), window)
             window.sync()
-            time.sleep(_PICTURE_S)
+            time.sleep(PICTURE_S)
             now_s = time.monotonic()
             pass_time(now_s - before)
             before = now_s
 
 
-def _draw(scene: Scene, data: Any, still: Still, window: Any) -> None:
-    show_moment(scene, data, still.chapter, still.moment)
+def _draw(scene: Scene, data: Any, snapshot: Snapshot, window: Any) -> None:
+    show_moment(scene, data, snapshot.chapter, snapshot.moment)
     window.user_scn.ngeom = 0
-    draw_over(scene, still, window.user_scn)
+    draw_over(scene, snapshot, window.user_scn)
     font = mujoco.mjtFontScale.mjFONTSCALE_150
     place = mujoco.mjtGridPos
-    keys, meanings = ("\n".join(words) for words in zip(*_HELP, strict=True))
-    words = "\n".join((still.chapter.title, *still.words))
-    window.set_texts([(font, place.mjGRID_TOPLEFT, words, ""), (font, place.mjGRID_BOTTOMLEFT, keys, meanings)])
+    words = "\n".join((snapshot.chapter.title, *snapshot.words))
+    window.set_texts([(font, place.mjGRID_TOPLEFT, words, ""), (font, place.mjGRID_BOTTOMLEFT, _KEYS, _MEANINGS)])

@@ -12,9 +12,6 @@ from apo_bench.geometry import Array, freeze
 
 _Color = tuple[float, float, float]
 _WIDTH_M = 0.0035
-_DASH_DOT = (0.007, 0.0025, 0.0008, 0.0025)
-_LINE_M = 0.0007
-"""Dash, gap, dot, gap; the radius of the line."""
 _PIECES = 48
 """Straight pieces of a whole ring."""
 _SWEEP_RAD = np.radians(304.0)
@@ -76,24 +73,10 @@ class TurnRing:
 
 @final
 @dataclass(frozen=True, eq=False)
-class AxisLine:
-    """A dash-dot line."""
-
-    begin: Array
-    """(3,), world frame, [m]."""
-    end: Array
-    color: _Color
-
-    def __post_init__(self) -> None:
-        freeze(self, begin=(3,), end=(3,))
-
-
-@final
-@dataclass(frozen=True, eq=False)
 class Marks:
     """What is drawn into a picture."""
 
-    marks: Sequence[ShiftArrows | TurnRing | AxisLine]
+    marks: Sequence[ShiftArrows | TurnRing]
     opacity: float = 1.0
     """The opacity of the parts."""
 
@@ -105,8 +88,6 @@ class Marks:
         for mark in self.marks:
             if isinstance(mark, ShiftArrows):
                 _shift(scene, mark)
-            elif isinstance(mark, AxisLine):
-                _dash_dot(scene, mark)
             else:
                 _turn(scene, mark)
 
@@ -115,17 +96,6 @@ def _shift(scene: Any, mark: ShiftArrows) -> None:
     for side in (-1.0, 1.0):
         tail, tip = (mark.center + side * far * mark.axis for far in (mark.inner_m, mark.outer_m))
         _connect(scene, mujoco.mjtGeom.mjGEOM_ARROW, tail, tip, mark.color)
-
-
-def _dash_dot(scene: Any, mark: AxisLine) -> None:
-    way = mark.end - mark.begin
-    length = float(np.linalg.norm(way))
-    for from_m in np.arange(0.0, length, sum(_DASH_DOT)):
-        dash, gap, dot, _ = _DASH_DOT
-        for at, long in ((from_m, dash), (from_m + dash + gap, dot)):
-            if at < length:
-                a, b = (mark.begin + way * (min(x, length) / length) for x in (at, at + long))
-                _connect(scene, mujoco.mjtGeom.mjGEOM_CAPSULE, a, b, mark.color, _LINE_M)
 
 
 def _turn(scene: Any, mark: TurnRing) -> None:

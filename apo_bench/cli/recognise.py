@@ -1,0 +1,51 @@
+"""The command `apo-bench recognise`: contacts from poses."""
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from apo_bench.cli.arguments import AsJson, ScenarioArgument, StatedDeg, StatedMm
+from apo_bench.cli.printing import console, print_json
+from apo_bench.cli.setting_options import takes, trial_options
+from apo_bench.errors import require_known
+from apo_bench.files.csv_form import assumed_deviations
+from apo_bench.io import redirect_output
+from apo_bench.records import RECOGNISED
+from apo_bench.scenario.file import load_scenario
+
+
+@takes(trial_options("level", "careless", "seed", "noise", "eye"))
+def recognise_command(
+    scenario: ScenarioArgument,
+    *,
+    observation: Annotated[Path | None, typer.Option(help="What was seen, .csv or .json, instead of a trial.")] = None,
+    deviation_mm: StatedMm = None,
+    deviation_deg: StatedDeg = None,
+    relations: Annotated[
+        str,
+        typer.Option(help="recognised or recognised-jointly."),
+    ] = "recognised",
+    as_json: AsJson = False,
+    **options: Any,
+) -> None:
+    """Find the contacts of what was seen, and say how they differ from those of the scenario."""
+    from apo_bench.show.recognised_text import confidence_lines, difference_lines, evidence_table, recognition_form
+    from apo_bench.trial.recognised_contacts import recognise_by
+    from apo_bench.trial.request import looked_at
+
+    require_known("way of recognising", relations, RECOGNISED)
+    name = load_scenario(scenario).name
+    with redirect_output(as_json):
+        seen, assumed = looked_at(scenario, observation, options, deviation_mm, deviation_deg)
+    form = recognition_form(name, relations, seen, recognise_by(seen, relations), assumed)
+    if as_json:
+        print_json(form)
+        return
+    console(140).print(evidence_table(form))
+    if assumed:
+        typer.echo("\n" + assumed_deviations(deviation_mm, deviation_deg))
+    typer.echo("\n" + "\n".join([*confidence_lines(form), *difference_lines(form)]))
+    if not seen.seen.all():
+        missing = ", ".join(str(k + 1) for k, was_seen in enumerate(seen.seen) if not was_seen)
+        typer.echo(f"not seen, so nothing is recognised there: operation {missing}")

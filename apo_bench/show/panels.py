@@ -1,0 +1,48 @@
+"""Pictures beside each other, each with a title above and lines below."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+from numpy.typing import NDArray
+
+_LINE_PX = 21
+_TITLE_PX = 52  # above the pictures, for the title of all and those of each
+Color = tuple[float, float, float]
+
+
+class PanelLine(NamedTuple):
+    """A line below a picture, after a square in a colour if it has one."""
+
+    text: str
+    color: Color | None = None
+
+
+class Panel(NamedTuple):
+    """One picture, (height, width, 3), and what is written with it."""
+
+    image: NDArray[Any]
+    lines: Sequence[PanelLine]
+    title: str = ""
+
+
+def draw_panels(title: str, panels: Sequence[Panel]) -> Any:
+    """A figure of matplotlib whose axes have the pixels of each picture as units; all are of one size."""
+    from matplotlib.figure import Figure
+
+    height, width = panels[0].image.shape[:2]
+    below = _LINE_PX * (max(len(panel.lines) for panel in panels) + 1)
+    whole = height + below + _TITLE_PX
+    share = 1 / len(panels)
+    figure = Figure(figsize=(width * len(panels) / 100, whole / 100))
+    figure.text(0.5, 1 - 15 / whole, title, ha="center", va="center", fontsize=12)
+    for i, panel in enumerate(panels):
+        axes = figure.add_axes((i * share, below / whole, share, height / whole))
+        axes.imshow(panel.image)
+        axes.axis("off")
+        figure.text((i + 0.5) * share, 1 - 40 / whole, panel.title, ha="center", va="center", fontsize=11)
+        for j, line in enumerate(panel.lines):
+            y = (below - _LINE_PX * (j + 0.8)) / whole
+            if line.color is not None:
+                figure.text((i + 0.02) * share, y, "\u25a0", color=line.color, fontsize=14, va="center")
+            figure.text((i + 0.045) * share, y, line.text, va="center", fontsize=10)
+    return figure

@@ -1,0 +1,92 @@
+"""A demonstration or a replay, kept moment by moment."""
+
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, final
+
+import numpy as np
+
+from apo_bench.assembly import Plan, Poses, placements
+from apo_bench.geometry import Array, frozen, pose
+from apo_bench.simulation.hooks import Doing, Hooks
+from apo_bench.simulation.scene import Scene, World, arm_home, initial_state, place, place_for_picture
+
+_NO_HANDS = frozen(np.zeros((0, 3)), None, 3)
+_IN_PLACE = "in place"
+
+
+class FilmMoment(NamedTuple):
+    """A state of a world, and what is done in it."""
+
+    time_s: float
+    qpos: Array
+    doing: Doing
+    hands: Array
+    """Where the hands of the human are, (2, 3), [m]; of a replay (0, 3)."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Chapter:
+    """A demonstration or a replay from its beginning to its end."""
+
+    title: str
+    world: World
+    start: Poses
+    """Before the first moment; what is fixed stays there."""
+    moments: tuple[FilmMoment, ...]
+    ending: str
+    """What came of it, in a sentence."""
+    good: bool | None
+    """Whether that is a success; None where nobody asks."""
+
+
+@final
+@dataclass(eq=False)
+class FilmTrack:
+    """Keeps a demonstration or a replay: pass its `hooks` as `watch`."""
+
+    plan: Plan | None = None
+    """What is replayed; None of a demonstration."""
+    moments: list[FilmMoment] = field(default_factory=list)
+
+    @property
+    def hooks(self) -> Hooks:
+        return Hooks(before_replay=self._begin, after_tick=self._keep)
+
+    def _begin(self, plan: Plan) -> None:
+        self.plan = plan
+
+    def _keep(self, data: Any, doing: Doing) -> None:
+        self.moments.append(FilmMoment(float(data.time), np.array(data.qpos), doing, np.array(data.mocap_pos)))
+
+
+def scenario_chapter(scene: Scene, start: Poses, goals: Array) -> Chapter:
+    """What a scenario asks for: the parts before the first operation and after each, a second apart."""
+    world = scene.work
+    data = initial_state(world, start)
+    moments = list[FilmMoment]()
+    arm_home(scene, data)
+    for k, poses in enumerate((start, *placements(scene.scenario.assembly, start, goals)), start=-1):
+        for part in world.free:
+            place(world, data, part, poses[part])
+        doing = Doing(None if k < 0 else k, _IN_PLACE, 0.0)
+        moments.append(FilmMoment(k + 1.0, np.array(data.qpos), doing, _NO_HANDS))
+    return Chapter(f"{scene.scenario.name}: as the scenario asks", world, start, tuple(moments), "", None)
+
+
+def part_poses(chapter: Chapter, moment: FilmMoment) -> Poses:
+    """Where every part is, world frame, [m]."""
+    free = {part: pose.unpack(moment.qpos[a : a + 7]) for part, a in chapter.world.qpos.items()}
+    return {**{part: chapter.start[part] for part in chapter.world.fixed}, **free}
+
+
+def show_moment(scene: Scene, data: Any, chapter: Chapter, moment: FilmMoment) -> None:
+    """Bring a state of the world of the robot to a moment; while a human demonstrates, the arm is at home."""
+    if chapter.world is scene.work:
+        data.qpos[:] = moment.qpos
+    else:
+        arm_home(scene, data)
+        for part, T in part_poses(chapter, moment).items():
+            if part in scene.work.qpos:
+                place(scene.work, data, part, T)
+    place_for_picture(scene.work.model, data)
