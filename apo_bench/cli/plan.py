@@ -21,9 +21,9 @@ from apo_bench.cli.setting_options import (
     trial_options,
 )
 from apo_bench.errors import require
-from apo_bench.files.csv_form import assumed_deviations
-from apo_bench.files.json_forms import RobotFrames, read_robot_frames
+from apo_bench.files.deviations import assumed_deviations
 from apo_bench.files.observation import read_observation, read_observation_file
+from apo_bench.files.robot_frames import RobotFrames, read_robot_frames
 from apo_bench.geometry import Array, pose
 from apo_bench.io import redirect_output, write_file
 from apo_bench.records import CORRECTOR, SETTINGS, check, in_python

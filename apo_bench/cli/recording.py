@@ -23,7 +23,7 @@ from apo_bench.cli.setting_options import (
     whole_numbers,
 )
 from apo_bench.errors import InputError, require, require_known
-from apo_bench.files.csv_form import assumed_deviations
+from apo_bench.files.deviations import assumed_deviations
 from apo_bench.io import redirect_output, write_csv, write_file
 from apo_bench.records import RECOGNISED
 from apo_bench.scenario.file import load_scenario

@@ -28,7 +28,7 @@ from apo_bench.cli.setting_options import (
 )
 from apo_bench.cli.sweep import interrupted
 from apo_bench.errors import InputError, require
-from apo_bench.files.csv_form import assumed_deviations
+from apo_bench.files.deviations import assumed_deviations
 from apo_bench.io import redirect_output
 from apo_bench.records import CORRECTOR, CORRECTOR_LIMIT_S, with_simulated
 from apo_bench.scenario.file import load_scenario

@@ -1,20 +1,26 @@
-"""Files are read and written here, strictly and within limits, and processes started; knows nothing of assemblies."""
+"""Read and write files within limits, and start processes; knows nothing of assemblies."""
 
+from apo_bench.io.csv_reading import Columns, CsvRow, check_separator, read_csv
+from apo_bench.io.csv_writing import write_csv
 from apo_bench.io.documents import (
-    HALF_BUT_OF_FILES,
-    HALF_LETTER,
-    WHOLE_LETTERS,
-    JsonNode,
-    half_letter,
-    is_whole,
-    parse_json,
-    read_json,
-    read_toml,
-    read_whole,
+    Finite,
+    NotNegative,
+    Positive,
+    Quadruple,
+    Table,
+    Text,
+    Triple,
+    as_typed,
+    read_plain,
+    read_typed,
+    unit_quaternion,
 )
 from apo_bench.io.figures import default_looks, load_matplotlib, save_figure
+from apo_bench.io.grouping import grouped
 from apo_bench.io.named_files import named_files
+from apo_bench.io.nodes import JsonNode, parse_json, read_json, read_toml
 from apo_bench.io.ordinary_files import decoded, each_line, opened, read_bytes, read_text
+from apo_bench.io.parquet import has_parquet, write_columns
 from apo_bench.io.processes import SAFE_PATH, descendants, end_descendants, environment, flush, redirect_output
 from apo_bench.io.result_files import (
     check_folders,
@@ -25,19 +31,9 @@ from apo_bench.io.result_files import (
     replace_file,
     write_file,
 )
-from apo_bench.io.strict_csv import Columns, CsvRow, check_separator, has_parquet, read_csv, write_columns, write_csv
-from apo_bench.io.words import (
-    CONTROL,
-    UNSHOWN,
-    brief,
-    clean,
-    columns,
-    direction,
-    grouped,
-    listed_words,
-    markdown,
-    with_article,
-)
+from apo_bench.io.safe_text import CONTROL, UNSHOWN, brief, clean, markdown
+from apo_bench.io.whole_json import HALF_BUT_OF_FILES, HALF_LETTER, WHOLE_LETTERS, half_letter, is_whole, read_whole
+from apo_bench.io.words import columns, direction, listed_words, with_article
 
 __all__ = (
     "CONTROL",
@@ -48,7 +44,15 @@ __all__ = (
     "WHOLE_LETTERS",
     "Columns",
     "CsvRow",
+    "Finite",
     "JsonNode",
+    "NotNegative",
+    "Positive",
+    "Quadruple",
+    "Table",
+    "Text",
+    "Triple",
+    "as_typed",
     "brief",
     "check_folders",
     "check_separator",
@@ -79,12 +83,15 @@ __all__ = (
     "read_bytes",
     "read_csv",
     "read_json",
+    "read_plain",
     "read_text",
     "read_toml",
+    "read_typed",
     "read_whole",
     "redirect_output",
     "replace_file",
     "save_figure",
+    "unit_quaternion",
     "with_article",
     "write_columns",
     "write_csv",

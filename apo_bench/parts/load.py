@@ -14,7 +14,7 @@ from apo_bench.geometry import Box, Face, Piece, Solid, face_area, separating_ax
 from apo_bench.parts.agreement import check_faces, check_receding
 from apo_bench.parts.allowed import HEAVIEST_KG, LIGHTEST_KG, MOST_FACES
 from apo_bench.parts.faces import SIDES, Surface, unite
-from apo_bench.parts.mjcf import Mark, PartFile, read_part
+from apo_bench.parts.part_file import Mark, PartFile, read_part
 from apo_bench.parts.stated import StatedPart
 from apo_bench.resources import folder
 

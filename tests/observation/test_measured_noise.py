@@ -15,7 +15,8 @@ from scipy.stats import chi2
 from apo_bench import InputError, Observation, TrialSettings, observe
 from apo_bench.cli.app import main
 from apo_bench.envs.spaces import LARGEST_DEVIATION
-from apo_bench.files.bop import read_results, read_truth
+from apo_bench.files.bop import read_results
+from apo_bench.files.bop_truth import read_truth
 from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.empirical import Empirical, read_residuals, residuals_text
