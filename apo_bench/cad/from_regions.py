@@ -9,7 +9,7 @@ from apo_bench.cad.pieces.cutting import Cut
 from apo_bench.cad.solids.bodies import mesh_of
 from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, Region, square_to
 from apo_bench.geometry import Array, Face, Hull, RoundFace, sides_of, straightened
-from apo_bench.parts.making.body import Moments
+from apo_bench.parts.making.moments import Moments
 from apo_bench.parts.making.outline import COARSE_SIDES
 
 _THINNEST_MM = 0.05

@@ -13,8 +13,8 @@ from apo_bench.geometry import Array, Solid, pose
 from apo_bench.insertion.arrival import Preference
 from apo_bench.io import as_typed
 from apo_bench.parts import load_part, part_path
-from apo_bench.parts.agreement import with_fit
 from apo_bench.parts.allowed import FACE_OR_PART_NAME
+from apo_bench.parts.fit import with_fit
 from apo_bench.scenario.contacts import ContactGaps, check_kinds, read_contacts
 from apo_bench.scenario.grasps import read_grasp
 from apo_bench.scenario.scenario import Grasp, Shift, Turn

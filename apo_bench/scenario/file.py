@@ -18,9 +18,9 @@ from apo_bench.insertion.arrival import Preference
 from apo_bench.io import UNSHOWN, as_typed, read_typed
 from apo_bench.records import Thresholds
 from apo_bench.resources import folder
+from apo_bench.scenario.attach_lines import with_attach_lines
 from apo_bench.scenario.checks import check_scenario
 from apo_bench.scenario.entries import OperationEntry, read_operations, read_parts
-from apo_bench.scenario.layout import with_attach_lines
 from apo_bench.scenario.scenario import Carelessness, Scenario, Shift, Site, Turn
 from apo_bench.scenario.tables import CarelessTable, JudgeTable, ScenarioTable, SiteTable
 from apo_bench.scenario.values import checked_span, unit_axis

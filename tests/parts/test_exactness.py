@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import Solid
 from apo_bench.parts import load_part
-from apo_bench.parts.load import check_matter
+from apo_bench.parts.checking import check_matter
 from apo_bench.parts.making import (
     Body,
     Edge,

@@ -15,7 +15,7 @@ from apo_bench.geometry import physical_pieces
 from apo_bench.io.documents import JsonNode
 from apo_bench.parts import load_part, part_names, part_path, read_part
 from apo_bench.parts.allowed import LARGEST_PART_BYTES
-from apo_bench.parts.load import check_part
+from apo_bench.parts.checking import check_part
 from apo_bench.parts.making import bore, circle, extrude, join, rectangle, shaft, write_part
 from apo_bench.parts.stated import _beside
 

@@ -8,7 +8,7 @@ from typing import Any, Literal, NamedTuple, final
 import numpy as np
 
 from apo_bench.geometry import WHOLE_TURN, Array
-from apo_bench.parts.making.body import Moments
+from apo_bench.parts.making.moments import Moments
 
 RegionKind = Literal["plane", "cylinder", "cone", "other"]
 Rgb = tuple[float, float, float]

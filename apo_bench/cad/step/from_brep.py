@@ -15,7 +15,7 @@ from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, Region, connected, pu
 from apo_bench.cad.step.surfaces import TRIANGLES_RAD, BrepFace, BrepSolid, Flat, Wall, is_same, surface_of
 from apo_bench.errors import InputError
 from apo_bench.geometry import WHOLE_TURN, Array
-from apo_bench.parts.making.body import Moments
+from apo_bench.parts.making.moments import Moments
 
 _SAME_CORNER = 1e-7
 """Corners nearer to each other than this part of the size are one."""
