@@ -99,7 +99,7 @@ def _tilted_parts(scenario: Scenario, stages: tuple[Poses, ...]) -> _Faults:
         if tilt > _ANGLE_DEG:
             yield (
                 f"operation {k + 1}, goal, turn_deg",
-                f"'{operation.main}' would have to be tilted by {tilt:.3g} degrees, and is only turned about the vertical",
+                f"'{operation.main}' would have to be tilted by {tilt:.3g} degrees, which the robot cannot do",
             )
 
 
