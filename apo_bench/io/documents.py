@@ -39,6 +39,7 @@ _WORDS = {
     "date": "a date",
     "datetime": "a date",
     "time": "a time",
+    "null": "nothing",
 }
 
 
@@ -133,7 +134,10 @@ def _needed(fault: str, key: str, wanted: Any) -> str:
     if "matching regex" in fault:
         return "a text without control characters"
     needed = re.sub(r", got .*", "", fault).removeprefix("Expected ")
-    needed = re.sub(r"`(\w+)(?: \| null)?`", lambda found: _WORDS.get(found[1], found[1]), needed)
+    needed = re.sub(
+        r"`(.*?)`", lambda found: " or ".join(_WORDS.get(kind, kind) for kind in found[1].split(" | ")), needed
+    )
+    needed = needed.replace(" | ", " or ")
     return re.sub(r"a number [<>]= -?1e\+300|Number out of range", "a finite number", needed)
 
 

@@ -76,8 +76,8 @@ def read_parts(tables: Mapping[str, Any], file: Path, checked: bool = True) -> M
 
 
 def _part(table: PartTable, place: str, folder: Path, solids: dict[Path, Solid], checked: bool) -> PartEntry:
-    path = folder / part_path(table.file)
     try:
+        path = folder / part_path(table.file)
         if path not in solids:
             solids[path] = load_part(path, checked)
         solid = solids[path]

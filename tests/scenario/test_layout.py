@@ -65,26 +65,6 @@ def test_the_scenes_of_the_paper_are_those_of_the_paper(name: str):
     assert scenario.goals == pytest.approx(example.goals, abs=1e-12)
 
 
-def test_all_of_the_paper_are_shipped():
-    assert set(NAMES) == {*EXAMPLES, "block_on_block", "fixture_alignment"}
-
-
-def test_who_is_careless_and_how():
-    """Along y at operation 2, along x where two pockets decide; nobody in the first figures."""
-    axes = {name: s.careless and (s.careless.operation, s.careless.axis.tolist()) for name, s in SCENARIOS.items()}
-    along_y = (1, [0.0, 1.0, 0.0])
-    assert axes == {
-        "block_on_block": None,
-        "bridge_cycle": None,
-        "fixture_alignment": None,
-        "stick_in_tower": along_y,
-        "stick_on_castles": along_y,
-        "carried_bridge": along_y,
-        "vanished_fixture": along_y,
-        "pocket_table": (1, [1.0, 0.0, 0.0]),
-    }
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_contacts_are_closed_at_the_goals_of_the_file(name: str):
     scenario = SCENARIOS[name]
@@ -148,14 +128,6 @@ def test_draws_fill_their_ranges_and_stay_inside(name: str):
         assert np.ptp(values) > 1.8 * width, "200 uniform draws come near both ends"
         assert abs(values.mean()) < 4 * width / np.sqrt(3 * len(values))
     assert np.abs(np.corrcoef(drawn) - np.eye(len(drawn))).max() < 0.3, "draws are independent"
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_the_goals_of_the_file_are_not_the_truth(name: str):
-    scenario = SCENARIOS[name]
-    for seed in GENERATOR_SEEDS:
-        goals = draw_layout(scenario, np.random.default_rng([seed, 0])).goals
-        assert np.linalg.norm(goals[0] - scenario.goals[0]) > 5e-3
 
 
 @pytest.mark.parametrize("name", NAMES)
