@@ -107,7 +107,7 @@ class ObservationForm(Table, frozen=True, kw_only=True):
     gap_mm: Positive | UnsetType = UNSET
     play_mm: NotNegative | UnsetType = UNSET
     operations: list[ObservedOperation]
-    outliers: dict[str, Finite | Triple] | UnsetType = UNSET
+    outliers: dict[str, Any] | UnsetType = UNSET
     """The keys of `OUTLIER_KEYS`, and `camera_mm`; what is left out is as usual."""
     shared: tuple[SharedForm, ...] = ()
     tails: TailsForm | UnsetType = UNSET

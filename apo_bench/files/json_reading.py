@@ -36,7 +36,7 @@ from apo_bench.files.json_forms import (
     TailsForm,
 )
 from apo_bench.geometry import Array, pose
-from apo_bench.io import Quadruple, as_typed, read_typed, unit_quaternion
+from apo_bench.io import Quadruple, Triple, as_typed, read_typed, unit_quaternion
 from apo_bench.scenario import Scenario, layout_at
 
 
@@ -166,7 +166,7 @@ def _outliers(file: str, form: Mapping[str, Any]) -> OutlierModel:
         require_known("key", key, (*OUTLIER_KEYS, "camera_mm"), place=f"{file}, outliers")
     rates = {OUTLIER_KEYS[key]: value for key, value in form.items() if key in OUTLIER_KEYS}
     if "camera_mm" in form:
-        rates["camera_m"] = [x * 1e-3 for x in form["camera_mm"]]
+        rates["camera_m"] = [x * 1e-3 for x in as_typed(form["camera_mm"], Triple, f"{file}, outliers, camera_mm")]
     return as_typed(rates, OutlierModel, f"{file}, outliers")
 
 
