@@ -106,10 +106,6 @@ class StatedPart:
     """[kg/m^3]."""
     friction: tuple[float, ...]
     """Sliding, and then turning and rolling, as in MJCF; empty if unsaid."""
-    source: str
-    licence: str
-    title: str
-    """What a person calls the part; empty if unsaid."""
 
 
 def read_stated_part(path: Path) -> StatedPart:
@@ -128,9 +124,6 @@ def read_stated_part(path: Path) -> StatedPart:
         inertia=1e-15 * _inertia(top.inertia_mm5, f"{path}, inertia_mm5"),
         density=top.density,
         friction=_friction(top.friction, f"{path}, friction"),
-        source=top.source,
-        licence=top.licence,
-        title=top.title,
     )
 
 

@@ -52,7 +52,6 @@ def test_the_part_loads_with_its_matter(part: Path) -> None:
     assert file.density == 2700.0
     assert {geom.density for geom in file.model.geoms} == {2700.0}
     assert file.stated is not None
-    assert (file.stated.source, file.stated.licence) == ("a test", "Apache-2.0")
 
 
 OUTLINE = r"(?s)(\[faces\.nx\].*?)outline_mm = .*?\n"
