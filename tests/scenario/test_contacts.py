@@ -9,12 +9,9 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError, Observation, Scenario, correct, load_scenario
-from apo_bench.assembly import Contact, Gap, PartFace, relation_graph
+from apo_bench.assembly import Contact, Gap, PartFace
 from apo_bench.observation.relations import Shifted, false, missed
 from apo_bench.resources import folder
-from apo_bench.scenario.file import scenario_names
-from apo_bench.show.card import scenario_card
-from apo_bench.show.graph.text import graph_lines
 
 SLOTS = (folder("scenarios") / "stick_on_castles.toml").read_text(encoding="utf-8")
 PAIR = '["py", "castle1.spy"]'
@@ -39,11 +36,6 @@ def seen(scenario: Scenario, goals: np.ndarray | None = None) -> Observation:
     goals = scenario.goals if goals is None else goals
     play_m = 1e-3 * scenario.clearance_mm
     return Observation(scenario.assembly, scenario.start, goals, covariance, np.ones(n, dtype=np.bool_), 1e-4, play_m)
-
-
-@pytest.mark.parametrize("name", scenario_names())
-def test_what_comes_with_the_package_asks_for_nothing_but_centred(name: str) -> None:
-    assert not load_scenario(name).assembly.gaps
 
 
 @pytest.mark.parametrize(
@@ -127,17 +119,6 @@ def test_a_contact_that_is_made_twice_is_asked_for_once(tmp_path: Path) -> None:
     ) in str(error.value)
     path.write_text(text.replace(pair, loose), encoding="utf-8")
     assert list(load_scenario(path).assembly.gaps.values()) == [Gap("clearance", -1e-3, 1e-3)]
-
-
-def test_card_and_graph_say_what_is_not_centred(tmp_path: Path) -> None:
-    named = WALLS.replace(" }", ", gap_mm = [-0.1, 0.3] }")
-    scenario = load(tmp_path, (PAIR, named), ('["ny", "castle1.sny"]', WALLS.replace("py", "ny")))
-    words = "py-spy (clearance from -0.1 to 0.3 mm)", "ny-sny (clearance)"
-    assert f"R3 stick -> castle1 (nz-sfl, {', '.join(words)})" in scenario_card(scenario)
-    text = "\n".join(graph_lines("mine", relation_graph(scenario.assembly)))
-    assert f"[nz-sfl {' '.join(words)}]" in text
-    plain = load_scenario("stick_on_castles")
-    assert "(clearance" not in scenario_card(plain) + "\n".join(graph_lines("plain", relation_graph(plain.assembly)))
 
 
 def test_what_is_asked_survives_wrong_relations_and_steps(tmp_path: Path) -> None:
