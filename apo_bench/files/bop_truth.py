@@ -10,7 +10,7 @@ from msgspec import Meta
 
 from apo_bench.errors import InputError, require
 from apo_bench.files.bop import LARGEST_ID, LARGEST_MM, PoseRows, check_rows, read_results
-from apo_bench.io import as_typed, read_typed
+from apo_bench.io import convert_typed, read_typed
 
 LARGEST_TRUTH_BYTES = 64_000_000
 """A scene of a video in the BOP format has up to some 20 MB."""
@@ -137,5 +137,5 @@ def _entries(path: Path, images: dict[str, Any]) -> Iterator[tuple[int, str, Tru
     """Image, where it stands, and what stands there, of every entry."""
     for image, entries in images.items():
         require(_is_number(image), f"{path}: the keys are numbers of images, '{image[:40]}' was given.")
-        for i, entry in enumerate(as_typed(entries, list[TruthEntry], f"{path}, image {image}"), start=1):
+        for i, entry in enumerate(convert_typed(entries, list[TruthEntry], f"{path}, image {image}"), start=1):
             yield int(image), f"image {image}, entry {i}", entry

@@ -20,7 +20,7 @@ from apo_bench.assembly import Assembly, Observation
 from apo_bench.errors import require
 from apo_bench.files.deviations import DEVIATION_DEG, DEVIATION_MM, SHIFT_M, TURN_RAD, is_within
 from apo_bench.geometry import FARTHEST_M, Array, pose
-from apo_bench.io import Columns, CsvRow, read_csv, unit_quaternion
+from apo_bench.io import Columns, CsvRow, check_quaternion, read_csv
 from apo_bench.scenario import Scenario, layout_at
 
 _POSITION = ("x", "y", "z")
@@ -114,7 +114,7 @@ def _pose(row: CsvRow) -> Array:
     units = {row.cells[name].unit for name in _POSITION}
     require(len(units) == 1, f"{row.file}: the columns of a position are of different units; give all in mm, or in m.")
     w, x, y, z = (row.number(name, 2.0) for name in _QUATERNION)
-    q = unit_quaternion((w, x, y, z), f"{row.file}, line {row.line}, columns qw to qz")
+    q = check_quaternion((w, x, y, z), f"{row.file}, line {row.line}, columns qw to qz")
     return pose.unpack(np.array([*position, *q]))
 
 

@@ -36,7 +36,7 @@ from apo_bench.files.json_forms import (
     TailsForm,
 )
 from apo_bench.geometry import Array, pose
-from apo_bench.io import Quadruple, Triple, as_typed, read_typed, unit_quaternion
+from apo_bench.io import Quadruple, check_quaternion, convert_typed, read_typed
 from apo_bench.scenario import Scenario, layout_at
 
 
@@ -135,7 +135,7 @@ def _goals(file: str, entries: Sequence[PlannedOperation]) -> Array:
 
 
 def _pose(position_mm: Position, quaternion_wxyz: Quadruple, place: str) -> Array:
-    q = unit_quaternion(quaternion_wxyz, f"{place}, quaternion_wxyz")
+    q = check_quaternion(quaternion_wxyz, f"{place}, quaternion_wxyz")
     return pose.unpack(np.concatenate([np.array(position_mm) * 1e-3, q]))
 
 
@@ -166,8 +166,10 @@ def _outliers(file: str, form: Mapping[str, Any]) -> OutlierModel:
         require_known("key", key, (*OUTLIER_KEYS, "camera_mm"), place=f"{file}, outliers")
     rates = {OUTLIER_KEYS[key]: value for key, value in form.items() if key in OUTLIER_KEYS}
     if "camera_mm" in form:
-        rates["camera_m"] = [x * 1e-3 for x in as_typed(form["camera_mm"], Triple, f"{file}, outliers, camera_mm")]
-    return as_typed(rates, OutlierModel, f"{file}, outliers")
+        rates["camera_m"] = [
+            x * 1e-3 for x in convert_typed(form["camera_mm"], list[float], f"{file}, outliers, camera_mm")
+        ]
+    return convert_typed(rates, OutlierModel, f"{file}, outliers")
 
 
 def _shared(file: str, form: SharedForm, n: int) -> SharedError:

@@ -67,7 +67,7 @@ def read_typed(
     Raises:
         InputError: No such file, too large, not UTF-8, another syntax, or something that the type does not allow.
     """
-    return as_typed(read_plain(path, kind, syntax=syntax, limit=limit), wanted, str(path))
+    return convert_typed(read_plain(path, kind, syntax=syntax, limit=limit), wanted, str(path))
 
 
 def read_plain(path: str | Path, kind: str, *, syntax: Syntax = "toml", limit: int = LARGEST_BYTES) -> Any:
@@ -94,7 +94,7 @@ def _refuse_constant(constant: str) -> None:
     raise ValueError(f"every number must be finite, {constant} was given")
 
 
-def as_typed(value: Any, wanted: type[T], place: str) -> T:
+def convert_typed(value: Any, wanted: type[T], place: str) -> T:
     """A part of a document as a type.
 
     Args:
@@ -124,13 +124,13 @@ def _sentence(said: str, value: Any, wanted: Any, place: str) -> str:
         near = get_close_matches(unknown[1], known, n=1, cutoff=0.5)
         hint = f" (did you mean '{near[0]}'?)" if near else ""
         return f"{at}: unknown key '{one_line(unknown[1], _LONGEST_VALUE)}'{hint}."
-    return f"{at}: {_needed(fault, path.rpartition('.')[2], wanted)} is needed, {shown(value)} was given."
+    return f"{at}: {_needed(fault, path.rpartition('.')[2], wanted)} is needed, {show_value(value)} was given."
 
 
 def _needed(fault: str, key: str, wanted: Any) -> str:
     """What a type allows, in words."""
     if fault.startswith("Invalid"):
-        return " or ".join(map(shown, _choices(wanted, key)))
+        return " or ".join(map(show_value, _choices(wanted, key)))
     if "matching regex" in fault:
         return "a text without control characters"
     needed = re.sub(r", got .*", "", fault).removeprefix("Expected ")
@@ -162,18 +162,18 @@ def _choices(wanted: Any, key: str) -> Iterator[Any]:
                 yield from get_args(inner)
 
 
-def shown(value: Any) -> str:
+def show_value(value: Any) -> str:
     """A value of a document for a sentence."""
     text = one_line(json.dumps(value, ensure_ascii=False, default=str), _LONGEST_VALUE)
     return text if len(text) < _LONGEST_VALUE else f"{text[: _LONGEST_VALUE - 3]}..."
 
 
-def unit_quaternion(q: Quadruple, place: str) -> Array:
+def check_quaternion(q: Quadruple, place: str) -> Array:
     """Four numbers, (4,).
 
     Raises:
         InputError: They are not of length 1.
     """
     holds = abs(np.linalg.norm(q) - 1.0) <= 1e-3
-    require(holds, f"{place}: a quaternion of length 1 (within 0.001) is needed, {shown(list(q))} was given.")
+    require(holds, f"{place}: a quaternion of length 1 (within 0.001) is needed, {show_value(list(q))} was given.")
     return np.array(q, dtype=np.float64)

@@ -13,7 +13,7 @@ import numpy as np
 
 from apo_bench.errors import InputError, one_line, require
 from apo_bench.geometry import Array
-from apo_bench.io.documents import parse_plain, read_plain, shown
+from apo_bench.io.documents import parse_plain, read_plain, show_value
 from apo_bench.io.ordinary_files import LARGEST_BYTES
 from apo_bench.io.safe_text import UNSHOWN
 
@@ -35,7 +35,9 @@ class JsonNode:
 
     def fail(self, allowed: str, remedy: str = "") -> NoReturn:
         """Raise the `InputError` that says what stands here and what is allowed instead."""
-        raise InputError(f"{self.place}: {allowed}, {shown(self.value)} was given{f'; {remedy}' if remedy else ''}.")
+        raise InputError(
+            f"{self.place}: {allowed}, {show_value(self.value)} was given{f'; {remedy}' if remedy else ''}."
+        )
 
     def require(self, holds: object, allowed: str, remedy: str = "") -> None:
         """Raise that error unless something holds."""

@@ -10,7 +10,7 @@ from msgspec import Meta
 
 from apo_bench.errors import require
 from apo_bench.geometry import WHOLE_TURN, Array, Face, RoundFace, flat_area, plane_across
-from apo_bench.io import Finite, Positive, Table, Text, Triple, as_typed, read_typed
+from apo_bench.io import Finite, Positive, Table, Text, Triple, convert_typed, read_typed
 from apo_bench.parts.allowed import DENSITY, LARGEST_PART_BYTES, MOST_FACES, is_name
 
 PART_SCHEMA = "apo-bench/part/1"
@@ -129,7 +129,7 @@ def read_stated_part(path: Path) -> StatedPart:
 
 def _face(name: str, value: Any, place: str) -> Face | RoundFace:
     require(is_name(name), f"{place}: letters, digits and underscores after a letter are needed as a name.")
-    table: FaceTable = as_typed(value, FaceTable, place)  # type: ignore[arg-type]
+    table: FaceTable = convert_typed(value, FaceTable, place)  # type: ignore[arg-type]
     return _plane(name, table, place) if isinstance(table, PlaneTable) else _round(name, table, place)
 
 

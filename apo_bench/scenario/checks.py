@@ -110,12 +110,12 @@ def _open_contacts(scenario: Scenario, case: _Case, stages: tuple[Poses, ...]) -
         for number, contact in enumerate(operation.contacts, start=1):
             # When only the site moves, a contact is another one if the face below stays where it is.
             if not case.site_only or contact.environment.part in standing:
-                fault = _open(scenario, contact, stages[k + 1])
+                fault = _find_gap(scenario, contact, stages[k + 1])
                 if fault is not None:
                     yield f"operation {k + 1}, contacts, contact {number}", f"'{contact}': {fault}"
 
 
-def _open(scenario: Scenario, contact: Contact, poses: Poses) -> str | None:
+def _find_gap(scenario: Scenario, contact: Contact, poses: Poses) -> str | None:
     """Why a contact is not closed: faces do not look at each other, do not meet, or cover nothing of each other."""
     a, b = map(scenario.assembly.face_of, contact)
     T_a, T_b = (poses[of.part] for of in contact)

@@ -11,7 +11,7 @@ from apo_bench.assembly import Operation
 from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Array, Solid, pose
 from apo_bench.insertion.arrival import Preference
-from apo_bench.io import as_typed
+from apo_bench.io import convert_typed
 from apo_bench.parts import load_part, part_path
 from apo_bench.parts.allowed import FACE_OR_PART_NAME
 from apo_bench.parts.fit import with_fit
@@ -19,7 +19,7 @@ from apo_bench.scenario.contacts import ContactGaps, check_kinds, read_contacts
 from apo_bench.scenario.grasps import read_grasp
 from apo_bench.scenario.scenario import Grasp, Shift, Turn
 from apo_bench.scenario.tables import AttachTable, OperationTable, PartTable, VaryTable
-from apo_bench.scenario.values import checked_span, unit_axis
+from apo_bench.scenario.values import check_span, normalize_axis
 
 _MOST_SHIFTS = 20
 """In a scenario: each is checked at both ends."""
@@ -68,7 +68,7 @@ def read_parts(tables: Mapping[str, Any], file: Path, checked: bool = True) -> M
             f"{place}: a part cannot be called '{name}'; use a letter, then letters, digits and underscores, and not "
             f"'{_ARM}', as the robot is called.",
         )
-        table = as_typed(value, PartTable, place)
+        table = convert_typed(value, PartTable, place)
         require(table.fixed or not table.follows_site, f"{place}, follows_site: only a fixed part can follow the site.")
         require(table.fixed or table.start, f"{place}: the key 'start' is missing; say where the part stands.")
         parts[name] = _part(table, place, file.parent, solids, checked)
@@ -149,17 +149,17 @@ def _check_movable(name: str, place: str, parts: Mapping[str, PartEntry]) -> Non
 
 def _attach(table: AttachTable, place: str) -> Preference:
     """What is stated of the line to the goal."""
-    direction = None if table.along is None else unit_axis(table.along, f"{place}, along")
+    direction = None if table.along is None else normalize_axis(table.along, f"{place}, along")
     return Preference(direction, None if table.travel_mm is None else 1e-3 * table.travel_mm)
 
 
 def _vary(table: VaryTable, operation: int, place: str) -> Shift | Turn:
     """A shift or a turn that each trial draws."""
     if table.along is not None and table.mm is not None and table.about is None and table.deg is None:
-        low, high = checked_span(table.mm, f"{place}, mm")
-        return Shift(operation, unit_axis(table.along, f"{place}, along"), 1e-3 * low, 1e-3 * high)
+        low, high = check_span(table.mm, f"{place}, mm")
+        return Shift(operation, normalize_axis(table.along, f"{place}, along"), 1e-3 * low, 1e-3 * high)
     if table.about is None or table.deg is None or table.along is not None or table.mm is not None:
         raise InputError(f"{place}: 'along' with 'mm', or 'about' with 'deg' and 'at_mm', are needed.")
-    low, high = np.radians(checked_span(table.deg, f"{place}, deg"))
-    axis = unit_axis(table.about, f"{place}, about")
+    low, high = np.radians(check_span(table.deg, f"{place}, deg"))
+    axis = normalize_axis(table.about, f"{place}, about")
     return Turn(operation, axis, 1e-3 * np.array(table.at_mm), float(low), float(high))

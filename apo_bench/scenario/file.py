@@ -15,7 +15,7 @@ from apo_bench.assembly import Assembly, Gap
 from apo_bench.errors import require, require_known
 from apo_bench.generated import generated_file, is_generated, whole_name
 from apo_bench.insertion.arrival import Preference
-from apo_bench.io import UNSHOWN, as_typed, read_typed
+from apo_bench.io import UNSHOWN, convert_typed, read_typed
 from apo_bench.records import Thresholds
 from apo_bench.resources import folder
 from apo_bench.scenario.attach_lines import with_attach_lines
@@ -23,7 +23,7 @@ from apo_bench.scenario.checks import check_scenario
 from apo_bench.scenario.entries import OperationEntry, read_operations, read_parts
 from apo_bench.scenario.scenario import Carelessness, Scenario, Shift, Site, Turn
 from apo_bench.scenario.tables import CarelessTable, JudgeTable, ScenarioTable, SiteTable
-from apo_bench.scenario.values import checked_span, unit_axis
+from apo_bench.scenario.values import check_span, normalize_axis
 
 
 def scenario_names() -> tuple[str, ...]:
@@ -112,7 +112,7 @@ def _scenario(top: ScenarioTable, path: Path, checked: bool) -> tuple[Scenario, 
         require(
             name in assembly.fixed | moved, f"{path}, parts: no operation moves '{name}'; give it one, or say fixed."
         )
-    judge = msgspec.structs.asdict(as_typed(top.judge, JudgeTable, f"{path}, judge"))
+    judge = msgspec.structs.asdict(convert_typed(top.judge, JudgeTable, f"{path}, judge"))
     success_means = judge.pop("success")
     scenario = Scenario(
         name=path.stem,
@@ -143,15 +143,15 @@ def _scenario(top: ScenarioTable, path: Path, checked: bool) -> tuple[Scenario, 
 def _site(table: SiteTable, place: str) -> Site:
     x, y = table.center_mm
     wide, deep = table.spread_mm
-    low, high = checked_span(table.yaw_deg, f"{place}, yaw_deg")
+    low, high = check_span(table.yaw_deg, f"{place}, yaw_deg")
     return Site((1e-3 * x, 1e-3 * y), (1e-3 * wide, 1e-3 * deep), (float(np.radians(low)), float(np.radians(high))))
 
 
 def _careless(table: CarelessTable, place: str, entries: tuple[OperationEntry, ...]) -> Carelessness:
     known = 1 <= table.operation <= len(entries)
     require(known, f"{place}, operation: an operation from 1 to {len(entries)} is needed, {table.operation} was given.")
-    axis = unit_axis(table.along, f"{place}, along")
+    axis = normalize_axis(table.along, f"{place}, along")
     level = abs((entries[table.operation - 1].goal[:3, :3] @ axis)[2]) <= 1e-6
     require(level, f"{place}, along: a direction that is level at the goal is needed.")
-    low, high = checked_span(table.size_mm, f"{place}, size_mm")
+    low, high = check_span(table.size_mm, f"{place}, size_mm")
     return Carelessness(table.operation - 1, axis, 1e-3 * low, 1e-3 * high)

@@ -6,7 +6,7 @@ from apo_bench.errors import InputError, require
 from apo_bench.geometry import FINGER_ROOM_M, PAD_M, Array, Solid, all_boxes, angle_between, extent, holds, holds_whole
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.scenario.tables import GraspTable
-from apo_bench.scenario.values import unit_axis
+from apo_bench.scenario.values import normalize_axis
 
 _RAISED = 0.15
 """Height of a grasp over the middle of the part, as a part of the height of the part."""
@@ -33,7 +33,7 @@ def read_grasp(stated: GraspTable, place: str, part: str, solid: Solid, before: 
     if stated.ahead is not None:
         return _tilted(stated, place, solid, before)
     point = _above_middle(solid, before) if stated.at_mm is None else 1e-3 * np.array(stated.at_mm)
-    across = None if stated.across is None else unit_axis(stated.across, f"{place}, across")
+    across = None if stated.across is None else normalize_axis(stated.across, f"{place}, across")
     if stated.at_mm is not None:
         _check_within_reach(point, f"{place}, at_mm", solid, before)
     if across is not None:
@@ -72,8 +72,8 @@ def _tilted(stated: GraspTable, place: str, solid: Solid, before: Array) -> Gras
     """A grasp of which the file says all, with fingers that point along `ahead`."""
     if stated.at_mm is None or stated.across is None or stated.ahead is None:
         raise InputError(f"{place}, ahead: 'at_mm' and an axis 'across' are needed with it.")
-    ahead = unit_axis(stated.ahead, f"{place}, ahead")
-    across = unit_axis(stated.across, f"{place}, across")
+    ahead = normalize_axis(stated.ahead, f"{place}, ahead")
+    across = normalize_axis(stated.across, f"{place}, across")
     require(abs(ahead @ across) <= _LEVEL, f"{place}, ahead: an axis that is square to 'across' is needed.")
     tilt = float(np.degrees(angle_between(-before[2, :3], ahead)))
     require(

@@ -11,7 +11,7 @@ _NO_PLAY_MM = 1e-6
 def without_play(assembly: Assembly, clearance_mm: float) -> str | None:
     """Why the first shaft that is as thick as its hole, or thicker, has no play there; None if all have some."""
     for contact in (contact for operation in assembly.operations for contact in operation.contacts):
-        if not _has_play(assembly, contact, clearance_mm):
+        if not _is_loose(assembly, contact, clearance_mm):
             a, b = map(assembly.face_of, contact)
             why = f"{1e3 * geometric_play(a, b):.4g} mm per side by their sizes"
             fit = f" and {clearance_mm:g} mm of clearance" if assembly.is_fit(contact) else ", and neither is fit"
@@ -19,9 +19,10 @@ def without_play(assembly: Assembly, clearance_mm: float) -> str | None:
     return None
 
 
-def _has_play(assembly: Assembly, contact: Contact, clearance_mm: float) -> bool:
+def _is_loose(assembly: Assembly, contact: Contact, clearance_mm: float) -> bool:
     a, b = map(assembly.face_of, contact)
-    return contact_kind(a, b) != "shaft in hole" or play_mm(a, b, clearance_mm) > _NO_PLAY_MM
+    play = play_mm(a, b, clearance_mm) if contact_kind(a, b) == "shaft in hole" else None
+    return play is None or play > _NO_PLAY_MM
 
 
 def check_clearance(scenario: Scenario, clearance_mm: float) -> None:

@@ -7,7 +7,7 @@ from msgspec import Meta
 
 from apo_bench.errors import require
 from apo_bench.geometry import Array, pose
-from apo_bench.io import Quadruple, Table, Triple, as_typed, unit_quaternion
+from apo_bench.io import Quadruple, Table, Triple, check_quaternion, convert_typed
 from apo_bench.io.nodes import JsonNode
 
 LARGEST_LENGTH_MM = 2000.0
@@ -56,10 +56,10 @@ class AnyPose(Table, frozen=True, kw_only=True):
         q = self.quaternion_wxyz or (self.quaternion_xyzw and self.quaternion_xyzw[-1:] + self.quaternion_xyzw[:-1])
         if q is None:
             return pose.at(at, self.turn_deg or (0.0, 0.0, 0.0))
-        return pose.unpack(np.concatenate([at, unit_quaternion(q, f"{place}, quaternion")]))
+        return pose.unpack(np.concatenate([at, check_quaternion(q, f"{place}, quaternion")]))
 
 
-def unit_axis(stated: Axis, place: str) -> Array:
+def normalize_axis(stated: Axis, place: str) -> Array:
     """A unit vector, (3,).
 
     Raises:
@@ -74,7 +74,7 @@ def unit_axis(stated: Axis, place: str) -> Array:
     return vector / np.linalg.norm(vector)
 
 
-def checked_span(span: tuple[float, float], place: str) -> tuple[float, float]:
+def check_span(span: tuple[float, float], place: str) -> tuple[float, float]:
     """A lowest and a highest number.
 
     Raises:
@@ -86,9 +86,9 @@ def checked_span(span: tuple[float, float], place: str) -> tuple[float, float]:
 
 def read_pose(node: JsonNode) -> Array:
     """A pose out of a document, (4, 4), [m]."""
-    return as_typed(node.value, Pose, node.place).matrix
+    return convert_typed(node.value, Pose, node.place).matrix
 
 
 def read_any_pose(node: JsonNode) -> Array:
     """A pose whose turn is stated in one of three ways, out of a document, (4, 4), [m]."""
-    return as_typed(node.value, AnyPose, node.place).matrix(node.place)
+    return convert_typed(node.value, AnyPose, node.place).matrix(node.place)

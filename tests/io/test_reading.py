@@ -13,7 +13,7 @@ import pytest
 
 from apo_bench import InputError, load_scenario, read_observation
 from apo_bench.files.bop import read_results
-from apo_bench.io import NotNegative, Table, Text, Triple, as_typed, read_typed
+from apo_bench.io import NotNegative, Table, Text, Triple, convert_typed, read_typed
 from apo_bench.io.documents import parse_plain
 from apo_bench.io.ordinary_files import read_bytes, read_text
 from apo_bench.observation.noise_file import read_noise
@@ -99,7 +99,7 @@ GOOD: dict[str, Any] = {"schema": 1, "operations": [STEP, {"type": "wait", "seco
 
 
 def test_a_document_becomes_its_type(tmp_path: Path) -> None:
-    plan = as_typed(GOOD, Plan, "plan")
+    plan = convert_typed(GOOD, Plan, "plan")
     assert plan == Plan(schema=1, operations=[Step("stick", Pose((1.0, 2.5, 3.0))), Wait(2.0)])
     path = tmp_path / "plan.toml"
     path.write_text('schema = 1\n[[operations]]\ntype = "wait"\nseconds = 2\n')
@@ -141,7 +141,7 @@ def test_a_document_becomes_its_type(tmp_path: Path) -> None:
 )
 def test_what_does_not_fit_its_type_is_said_in_one_sentence(document: Any, sentence: str) -> None:
     with pytest.raises(InputError) as refused:
-        as_typed(document, Plan, "plan")
+        convert_typed(document, Plan, "plan")
     assert str(refused.value).startswith(sentence)
     assert str(refused.value).endswith(".")
 

@@ -10,7 +10,7 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.assembly import Contact, Gap, PartFace
-from apo_bench.io import as_typed
+from apo_bench.io import convert_typed
 from apo_bench.scenario.checks import check_scenario
 from apo_bench.scenario.contacts import ContactGaps, read_contacts
 from apo_bench.scenario.play import check_clearance
@@ -31,7 +31,9 @@ SOLIDS = {
 
 
 def read(value: Any, main: str = "peg") -> ContactGaps:
-    table = as_typed({"move": main, "goal": {"at_mm": [0, 0, 0]}, "contacts": [value]}, OperationTable, "mine.toml")
+    table = convert_typed(
+        {"move": main, "goal": {"at_mm": [0, 0, 0]}, "contacts": [value]}, OperationTable, "mine.toml"
+    )
     return read_contacts(table.contacts, "mine.toml, operation 1", (main,), SOLIDS, {"table", "plate", "loose", "sunk"})
 
 
