@@ -124,6 +124,8 @@ def _sentence(said: str, value: Any, wanted: Any, place: str) -> str:
         near = get_close_matches(unknown[1], known, n=1, cutoff=0.5)
         hint = f" (did you mean '{near[0]}'?)" if near else ""
         return f"{at}: unknown key '{one_line(unknown[1], _LONGEST_VALUE)}'{hint}."
+    if not fault.startswith(("Expected", "Invalid", "Number")):
+        return f"{at}: {fault}"
     return f"{at}: {_needed(fault, path.rpartition('.')[2], wanted)} is needed, {show_value(value)} was given."
 
 
@@ -137,7 +139,6 @@ def _needed(fault: str, key: str, wanted: Any) -> str:
     needed = re.sub(
         r"`(.*?)`", lambda found: " or ".join(_WORDS.get(kind, kind) for kind in found[1].split(" | ")), needed
     )
-    needed = needed.replace(" | ", " or ")
     return re.sub(r"a number [<>]= -?1e\+300|Number out of range", "a finite number", needed)
 
 
