@@ -29,7 +29,8 @@ def check_deviations(deviation_mm: float, deviation_deg: float) -> None:
         number = isinstance(deviation, int | float | np.floating | np.integer) and not isinstance(deviation, bool)
         if not number or not is_within(deviation * size, limits):
             low, high = (x / size for x in limits)
-            raise InputError(f"{name} {deviation} was given; a number from {low:g} to {high:g} is allowed.")
+            text = f"{deviation:g}" if number else repr(deviation)
+            raise InputError(f"{name} {text} was given; a number from {low:g} to {high:g} is allowed.")
 
 
 def assumed_deviations(deviation_mm: float | None, deviation_deg: float | None) -> str:

@@ -15,6 +15,7 @@ from apo_bench.errors import InputError, one_line, require
 from apo_bench.geometry import Array
 from apo_bench.io.ordinary_files import LARGEST_BYTES, read_text
 from apo_bench.io.safe_text import UNSHOWN
+from apo_bench.io.whole_json import unique_members
 
 Finite = Annotated[float, msgspec.Meta(ge=-1e300, le=1e300)]
 """Neither infinite nor NaN."""
@@ -82,16 +83,21 @@ def parse_plain(text: str, file: str, syntax: Syntax) -> Any:
         InputError: It has another syntax.
     """
     try:
-        return tomllib.loads(text) if syntax == "toml" else json.loads(text, parse_constant=_refuse_constant)
+        if syntax == "toml":
+            return tomllib.loads(text)
+        return json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=unique_members(file))
+    except InputError:
+        raise
     except json.JSONDecodeError as error:
         raise InputError(f"{file}, line {error.lineno}: this is not JSON ({error.msg}).") from error
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{file}: this is not TOML: {error}; mend the file at that place.") from error
     except (ValueError, RecursionError) as error:
-        fault = " ".join(str(error).split())
-        raise InputError(f"{file}: this is not {syntax.upper()}: {fault}; mend the file at that place.") from error
+        raise InputError(f"{file}: this is not {syntax.upper()}: nested too deep, or a huge number.") from error
 
 
 def _refuse_constant(constant: str) -> None:
-    raise ValueError(f"every number must be finite, {constant} was given")
+    raise InputError(f"every number in a JSON file must be finite, {constant} was given.")
 
 
 def convert_typed(value: Any, wanted: type[T], place: str) -> T:

@@ -147,7 +147,6 @@ BAD: list[tuple[str | bytes, str]] = [
     (NEEDS + "fidelity = 1", "fidelity: a text in quotes is needed, 1 was given"),
     (NEEDS + "timestep_ms = 0", "timestep_ms: a finite number above 0 is needed, 0 was given"),
     (NEEDS + "timestep_ms = 5", "a time step of 5 ms was given"),
-    (NEEDS + "levels = [1979-05-27]", "levels: the date or time 1979-05-27 was given"),
     (NEEDS + "eyes = ['noise', 'range']\nlevels = [[1, 2]]", "given with the eye 'range'; one number is allowed"),
     (NEEDS + "levels = [1", "this is not TOML: Unclosed array (at end of document)"),
     (NEEDS + "levels = [1]\ntrials == 2", "this is not TOML: Invalid value (at line 3, column 9)"),
