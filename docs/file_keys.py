@@ -1,8 +1,8 @@
 """The page of every key in scenario, part, noise, arm and sweep files, read from the program itself.
 
-Readers of TOML say which keys a table may have: they are listened to while they read the files of the package and the
-example of the guide. What a key means stands here; a key without a meaning, or a meaning without a key, is an error.
-Part files have a table of what is allowed, arms are a dataclass.
+Tables of scenarios and parts are types whose fields are their keys; readers of other files are listened to while they
+read the files of the package and the example of the guide. What a key means stands here; a key without a meaning, or a
+meaning without a key, is an error. Arms are a dataclass.
 """
 
 from __future__ import annotations
@@ -17,24 +17,25 @@ from dataclasses import replace
 from pathlib import Path
 from unittest.mock import patch
 
+import msgspec
 import numpy as np
 from fields import sentences
 
 from apo_bench.cli.setting_options import shown_default
 from apo_bench.drafting.writing import THRESHOLDS
-from apo_bench.io.documents import JsonNode
+from apo_bench.io import JsonNode
 from apo_bench.observation.models.fitted import ConstantError, ViewNoise
 from apo_bench.observation.noise_file import noise_text, presets, read_noise
-from apo_bench.parts.allowed import ELEMENT_RULES
-from apo_bench.parts.stated import PART_SCHEMA, read_stated_part
+from apo_bench.parts import stated
 from apo_bench.records import SETTINGS, SettingInfo
-from apo_bench.scenario.file import load_scenario, scenario_names
+from apo_bench.scenario import tables as scenario_tables
+from apo_bench.scenario.values import Pose
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.sweeps.grid import AXES, SHARED
 from apo_bench.sweeps.sweep_file import read_sweep
 
 ROOT = Path(__file__).parents[1]
-EXAMPLES = ROOT / "docs" / "guide" / "scenario.md", ROOT / "docs" / "guide" / "sweeps.md"
+EXAMPLE = ROOT / "docs" / "guide" / "sweeps.md"
 POSE = {"at_mm": "position of the part's frame, x, y, z", "turn_deg": "angles about x, y, z; else `[0, 0, 0]`"}
 FIT = "`true`: it recedes by the clearance"
 AXIS = {
@@ -223,8 +224,8 @@ MEANINGS: Mapping[str, Mapping[str, Mapping[str, str]]] = {
 HEAD = """# File keys
 
 Every key of every file that you may write. In TOML files lengths are in mm and angles in degrees; in part files, as
-always in MJCF, lengths are in metres. A key that is not listed is refused, with the nearest one that is. *Needed*: the
-file is refused without it.
+always in MJCF, lengths are in metres. In TOML files a key that is not listed is refused, with the nearest one that is.
+*Needed*: the file is refused without it.
 """
 Keys = dict[str, tuple[frozenset[str], frozenset[str]]]
 """Table -> keys that are needed, keys that are allowed."""
@@ -250,20 +251,45 @@ def page() -> str:
             lines += ["", f"### `{table}`" if table else "### At the top", ""]
             lines += ["| key | needed | meaning |", "|---|---|---|"]
             lines += [f"| `{key}` | {'yes' if key in needed else ''} | {means} |" for key, means in keys.items()]
-    return "\n".join([*lines, *part_lines(), *arm_lines()]) + "\n"
+    return "\n".join([*lines, PART_LINES.rstrip(), *arm_lines()]) + "\n"
 
 
 def scenario_keys() -> Keys:
-    """Of scenarios whose parts have no files beside them, which have keys of their own."""
-    parts = {name: load_scenario(name).part_files.values() for name in scenario_names()}
-    plain = [name for name, files in parts.items() if not any(Path(f).with_suffix(".toml").exists() for f in files)]
-    with listening() as heard, tempfile.TemporaryDirectory() as folder:
-        for name in plain:
-            load_scenario(ROOT / "scenarios" / f"{name}.toml")
-        own = Path(folder) / "own.toml"
-        own.write_text(example(EXAMPLES[0], "own.toml"), encoding="utf-8")
-        load_scenario(own)
-    return named(heard, scenario_table)
+    types = {
+        "": scenario_tables.ScenarioTable,
+        "parts.NAME": scenario_tables.PartTable,
+        "pose: start, goal": Pose,
+        "operations": scenario_tables.OperationTable,
+        "operations, contacts": scenario_tables.ContactTable,
+        "operations, attach": scenario_tables.AttachTable,
+        "operations, grasp": scenario_tables.GraspTable,
+        "operations, vary": scenario_tables.VaryTable,
+        "site": scenario_tables.SiteTable,
+        "careless": scenario_tables.CarelessTable,
+        "judge": scenario_tables.JudgeTable,
+    }
+    return {table: keys_of(of) for table, of in types.items()}
+
+
+def face_keys() -> Keys:
+    types = {
+        "": stated.MatterTable,
+        "faces.NAME, a plane": stated.PlaneTable,
+        "faces.NAME, a cylinder": stated.CylinderTable,
+        "faces.NAME, a cone": stated.ConeTable,
+        "faces.NAME, a rim": stated.RimTable,
+    }
+    return {table: keys_of(of) for table, of in types.items()}
+
+
+def keys_of(table: type[msgspec.Struct]) -> tuple[frozenset[str], frozenset[str]]:
+    """The keys of a type that are needed, and all that are allowed."""
+    fields = msgspec.structs.fields(table)
+    tag = table.__struct_config__.tag_field
+    kind = set() if tag is None else {tag}
+    return frozenset({field.encode_name for field in fields if field.required} | kind), frozenset(
+        {field.encode_name for field in fields} | kind
+    )
 
 
 def noise_keys() -> Keys:
@@ -278,28 +304,10 @@ def noise_keys() -> Keys:
     return named(heard, lambda key: key)
 
 
-def face_keys() -> Keys:
-    """Of a file with a face of every kind."""
-    wall = "at_mm = [0, 0, 0]\naxis = [0, 0, 1]\nhole = true\n"
-    faces = {
-        "plane": "outline_mm = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]\n",
-        "cylinder": wall + "radius_mm = 1\nspan_mm = [0, 1]\n",
-        "cone": wall + "radii_mm = [1, 2]\nspan_mm = [0, 1]\n",
-        "rim": wall + "radius_mm = 1\n",
-    }
-    matter = "volume_mm3 = 1\ncentroid_mm = [0, 0, 0]\ninertia_mm5 = [1, 1, 1, 0, 0, 0]\n"
-    with listening() as heard, tempfile.TemporaryDirectory() as folder:
-        own = Path(folder) / "own.toml"
-        said = "".join(f'[faces.{kind}]\nkind = "{kind}"\n{keys}' for kind, keys in faces.items())
-        own.write_text(f'schema = "{PART_SCHEMA}"\n{matter}{said}', encoding="utf-8")
-        read_stated_part(own)
-    return named(heard, lambda key: re.sub(r"^faces, (\w+)$", r"faces.NAME, a \1", key))
-
-
 def sweep_keys() -> Keys:
     with listening() as heard, tempfile.TemporaryDirectory() as folder:
         mine = Path(folder) / "mine.toml"
-        mine.write_text(example(EXAMPLES[1], "mine.toml"), encoding="utf-8")
+        mine.write_text(example(EXAMPLE, "mine.toml"), encoding="utf-8")
         read_sweep(mine)
     return named(heard, lambda key: "" if not key else None)
 
@@ -337,31 +345,24 @@ def named(heard: Iterable[tuple[str, tuple[str, ...], tuple[str, ...]]], table_o
     return tables
 
 
-def scenario_table(key: str) -> str:
-    """`operation 2, contacts, contact 1` as the table that it is an entry of."""
-    words = [re.sub(r" \d+$", "", word) for word in key.split(", ")] if key else []
-    if words and words[-1] in ("start", "goal"):
-        return "pose: start, goal"
-    if words[:1] == ["parts"]:
-        return "parts.NAME"
-    if words[:1] == ["operation"]:
-        inside = [word for word in words[1:] if word in MEANINGS["Scenario files"]["operations"]]
-        return ", ".join(["operations", *dict.fromkeys(inside)])
-    return ", ".join(words)
+PART_LINES = """
+## Part files
 
+A part file is MJCF with one `<body>` that MuJoCo reads; the body holds all pieces and sites. These attributes count,
+also as `<default>`:
 
-def part_lines() -> list[str]:
-    lines = ["", "## Part files", "", "A part file holds these elements and attributes, and nothing else."]
-    for place, allowed in ELEMENT_RULES.items():
-        outside, element = place.split("/") if "/" in place else ("", place)
-        lines += ["", f"### `<{element}>`" + (f" in `<{outside}>`" if outside else ""), ""]
-        if allowed.inside:
-            elements = ", ".join(f"`<{name}>` (at most {n})" for name, n in allowed.inside.items())
-            lines += [f"Elements: {elements}.", ""]
-        if allowed.attributes:
-            lines += ["| attribute | value |", "|---|---|"]
-            lines += [f"| `{name}` | {value.words} |" for name, value in allowed.attributes.items()]
-    return lines
+| element | attributes |
+|---|---|
+| `<geom type="box">` | `name`, `pos`, `size`; of parts of boxes alone also `density` |
+| `<geom type="cylinder">` | `name`, `pos`, `size`, `zaxis` |
+| `<geom type="mesh">` | `name`, `mesh`: each mesh is one convex piece |
+| all of them | `friction` of parts of boxes alone, `rgba` |
+| `<geom>` with `contype="0" conaffinity="0"` | `name`, `mesh`, `rgba`: the picture, which is shown and never collides |
+| `<site>` | of parts of boxes alone: `name` of the face on which it lies, `pos`; `class="fit"`: the face recedes |
+| `<mesh>` | `name`, and `vertex`, or `file` of a picture in the folder of the part |
+
+A part has no joints, actuators, sensors, included files or plugins, no second body, and no pose or inertia of its own.
+"""
 
 
 def arm_lines() -> list[str]:

@@ -14,7 +14,7 @@ from apo_bench.insertion.arrival import Preference
 from apo_bench.parts import load_part, part_path
 from apo_bench.parts.making import Body, bore, extrude, rectangle, shaft, write_part
 from apo_bench.records import Thresholds
-from apo_bench.scenario.layout import with_attach_lines
+from apo_bench.scenario.attach_lines import with_attach_lines
 from apo_bench.scenario.scenario import Grasp, Site
 
 PEG = shaft(5, -25, 25, "wall", bottom="bottom", top="top")

@@ -10,7 +10,7 @@ from pathlib import Path
 import apo_bench
 
 PACKAGE = Path(apo_bench.__file__).parent
-IMPURE = ("simulation", "trial", "sweeps", "scoring", "testing", "datasets", "envs", "drafting", "show", "cli")
+IMPURE = ("simulation", "mjcf", "trial", "sweeps", "scoring", "testing", "datasets", "envs", "drafting", "show", "cli")
 """Rooms that know a simulator, or know one who does."""
 
 

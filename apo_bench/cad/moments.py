@@ -8,7 +8,7 @@ from apo_bench.cad.pieces.cutting import Cut
 from apo_bench.cad.solids.bodies import mesh_of
 from apo_bench.cad.solids.raw_solid import Mesh, RawSolid, Region
 from apo_bench.geometry import Hull
-from apo_bench.parts.making.body import Moments, frustum_moments
+from apo_bench.parts.making.moments import Moments, frustum_moments
 
 
 def solid_moments(raw: RawSolid, cut: Cut) -> Moments:

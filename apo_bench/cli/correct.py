@@ -11,7 +11,7 @@ from apo_bench.cli.outputs import check_outputs
 from apo_bench.cli.planned import plan_correction
 from apo_bench.cli.printing import print_json, print_lines, print_tables, say
 from apo_bench.errors import require
-from apo_bench.files.csv_form import assumed_deviations
+from apo_bench.files.deviations import assumed_deviations
 from apo_bench.files.observation import read_observation_file
 from apo_bench.io import redirect_output, write_file
 from apo_bench.records import CORRECTOR, with_simulated

@@ -66,7 +66,8 @@ def noise_fit(
     as_json: AsJson = False,
 ) -> None:
     """Measure a pose estimator: fit tails along and across the ray, outliers and misses, to its published results."""
-    from apo_bench.files.bop import read_results, read_truth
+    from apo_bench.files.bop import read_results
+    from apo_bench.files.bop_truth import read_truth
     from apo_bench.observation.fitting import fit
     from apo_bench.observation.models.empirical import residuals_text
     from apo_bench.observation.models.residuals import match_residuals

@@ -11,9 +11,9 @@ from apo_bench.cli.arguments import AsJson, ScenarioArgument, StatedDeg, StatedM
 from apo_bench.cli.outputs import check_outputs
 from apo_bench.cli.printing import print_json
 from apo_bench.errors import require
-from apo_bench.files.csv_form import assumed_deviations
-from apo_bench.files.json_forms import RobotFrames, read_robot_frames
+from apo_bench.files.deviations import assumed_deviations
 from apo_bench.files.observation import read_observation_file
+from apo_bench.files.robot_frames import RobotFrames, read_robot_frames
 from apo_bench.geometry import Array, pose
 from apo_bench.io import redirect_output
 from apo_bench.records import CORRECTOR, SETTINGS

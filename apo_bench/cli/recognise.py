@@ -9,7 +9,7 @@ from apo_bench.cli.arguments import AsJson, ScenarioArgument, StatedDeg, StatedM
 from apo_bench.cli.printing import console, print_json
 from apo_bench.cli.setting_options import takes, trial_options
 from apo_bench.errors import require_known
-from apo_bench.files.csv_form import assumed_deviations
+from apo_bench.files.deviations import assumed_deviations
 from apo_bench.io import redirect_output
 from apo_bench.records import RECOGNISED
 from apo_bench.scenario.file import load_scenario

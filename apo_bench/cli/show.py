@@ -10,7 +10,7 @@ from apo_bench.cli.arguments import ScenarioArgument, StatedDeg, StatedMm
 from apo_bench.cli.outputs import check_writable
 from apo_bench.cli.setting_options import takes, trial_options
 from apo_bench.errors import require
-from apo_bench.files.csv_form import assumed_deviations
+from apo_bench.files.deviations import assumed_deviations
 from apo_bench.geometry import Array
 from apo_bench.records import CORRECTOR, with_simulated
 from apo_bench.scenario.file import load_scenario

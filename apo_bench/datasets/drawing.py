@@ -36,7 +36,7 @@ from apo_bench.observation.noise import Level, Noise, make_noise
 from apo_bench.observation.observing import observe
 from apo_bench.records import USUAL, TrialSettings, check, level_pair
 from apo_bench.scenario import Scenario, careless_covariance, load_scenario, spread_error
-from apo_bench.scenario.layout import Layouts, draw_layouts
+from apo_bench.scenario.layouts import Layouts, draw_layouts
 
 _BY_PART = frozenset(
     (

@@ -19,7 +19,7 @@ from apo_bench.drafting.posed import PosedPart
 from apo_bench.drafting.touching import NEAR_M, NEAR_RAD, NO_PLAY_MM, PLAY_M, SHARE, walls_without_play
 from apo_bench.errors import InputError
 from apo_bench.geometry import Solid, intrusion, physical_pieces
-from apo_bench.parts.agreement import with_fit
+from apo_bench.parts.fit import with_fit
 from apo_bench.scenario.checks import DEEP_M
 
 LOOSEN_MM = 0.2

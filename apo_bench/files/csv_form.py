@@ -6,69 +6,22 @@ The unit stands in the name: lengths in `_mm` or `_m`, angles in `_deg` or `_rad
 that of the quaternion too. The last three may be left out, as columns or in single rows: standard deviations along and
 about each axis of the part (then those that are assumed), and whether the operation was seen (then it was). One more
 column, `play_mm`, is the room that parts which fit have per side (else the scenario's clearance), the same in each row.
-
-How small and how large a standard deviation may be, wherever one is stated.
 """
 
 import csv
 import io
 import math
 from collections.abc import Sequence
-from math import pi
 from pathlib import Path
 
 import numpy as np
 
 from apo_bench.assembly import Assembly, Observation
-from apo_bench.errors import InputError, require
+from apo_bench.errors import require
+from apo_bench.files.deviations import DEVIATION_DEG, DEVIATION_MM, SHIFT_M, TURN_RAD, is_within
 from apo_bench.geometry import FARTHEST_M, Array, pose
-from apo_bench.io import Columns, CsvRow, read_csv
+from apo_bench.io import Columns, CsvRow, check_quaternion, read_csv
 from apo_bench.scenario import Scenario, layout_at
-
-DEVIATION_MM = 1.0
-DEVIATION_DEG = 1.0
-"""What is assumed where a file states no standard deviations."""
-SHIFT_M = (1e-7, 10.0)
-TURN_RAD = (1e-4 * pi / 180.0, pi)
-"""Least and greatest standard deviation, [m] and [rad]: within, ranks and gaps are told from rounding."""
-ALLOWED_DEVIATIONS = "standard deviations from 0.0001 to 10000 mm and from 0.0001 to 180 deg are allowed"
-_ROUNDING = 1e-9
-
-
-def check_deviations(deviation_mm: float, deviation_deg: float) -> None:
-    """Refuse standard deviations that make no sense.
-
-    Raises:
-        InputError: One is too small, too large, or no number.
-    """
-    for name, deviation, size, limits in (
-        ("deviation_mm", deviation_mm, 1e-3, SHIFT_M),
-        ("deviation_deg", deviation_deg, pi / 180.0, TURN_RAD),
-    ):
-        number = isinstance(deviation, int | float | np.floating | np.integer) and not isinstance(deviation, bool)
-        if not number or not is_within(deviation * size, limits):
-            text = f"{deviation:g}" if number else repr(deviation)
-            low, high = (x / size for x in limits)
-            raise InputError(f"{name} {text} was given; a number from {low:g} to {high:g} is allowed.")
-
-
-def assumed_deviations(deviation_mm: float | None, deviation_deg: float | None) -> str:
-    """What is said where a file states no standard deviations; None stands for the default."""
-    mm = DEVIATION_MM if deviation_mm is None else deviation_mm
-    deg = DEVIATION_DEG if deviation_deg is None else deviation_deg
-    return f"a standard deviation of {mm:g} mm and {deg:g} deg per axis, assumed where the file states none"
-
-
-def is_within(deviation: float, limits: tuple[float, float]) -> bool:
-    """Whether a standard deviation, [m] or [rad], is between its limits; a NaN is not."""
-    return limits[0] * (1.0 - _ROUNDING) <= deviation <= limits[1] * (1.0 + _ROUNDING)
-
-
-def is_sensible(covariance: Array) -> bool:
-    """Whether every variance of a body twist, on the diagonal of (6, 6) [m, rad], is that of such a deviation."""
-    deviations = np.sqrt(np.maximum(np.diagonal(covariance), 0.0))
-    return all(is_within(float(x), SHIFT_M if i < 3 else TURN_RAD) for i, x in enumerate(deviations))
-
 
 _POSITION = ("x", "y", "z")
 _QUATERNION = ("qw", "qx", "qy", "qz")
@@ -106,15 +59,10 @@ def read_table(
     rows = dict[int, CsvRow]()
     for row in read_csv(path, _COLUMNS, _REQUIRED):
         k = _operation(row, assembly)
-        if k in rows:
-            row.fail("operation", f"every operation stands once, this one is in line {rows[k].line} already")
+        row.require(k not in rows, "operation", "every operation once is needed")
         rows[k] = row
     for k, operation in enumerate(assembly.operations):
-        require(
-            k in rows,
-            f"{path}: the row of operation {k + 1} ({operation.main}) is missing; "
-            f"give one row for each of the {len(assembly)} operations.",
-        )
+        require(k in rows, f"{path}: the row of operation {k + 1} ({operation.main}) is missing.")
     ordered = [rows[k] for k in range(len(assembly))]
     shift = [_deviation(row, "deviation", deviation_mm * 1e-3, SHIFT_M) for row in ordered]
     turn = [_deviation(row, "turn deviation", math.radians(deviation_deg), TURN_RAD) for row in ordered]
@@ -163,19 +111,10 @@ def _operation(row: CsvRow, assembly: Assembly) -> int:
 
 def _pose(row: CsvRow) -> Array:
     position = [row.number(name, FARTHEST_M) for name in _POSITION]
-    x, *others = (row.cells[name] for name in _POSITION)
-    for other in others:
-        require(
-            other[2] == x[2],
-            f"{row.file}: the columns '{x[0]}' and '{other[0]}' are of different units; "
-            "give all three positions in mm, or all in m.",
-        )
-    q = np.array([row.number(name, 2.0) for name in _QUATERNION])
-    require(
-        abs(np.linalg.norm(q) - 1.0) <= 1e-3,
-        f"{row.file}, line {row.line}, columns qw to qz: a quaternion of length 1 (within 0.001) is needed, "
-        f"one of length {np.linalg.norm(q):.4g} was given; divide it by its length.",
-    )
+    units = {row.cells[name].unit for name in _POSITION}
+    require(len(units) == 1, f"{row.file}: the columns of a position are of different units; give all in mm, or in m.")
+    w, x, y, z = (row.number(name, 2.0) for name in _QUATERNION)
+    q = check_quaternion((w, x, y, z), f"{row.file}, line {row.line}, columns qw to qz")
     return pose.unpack(np.array([*position, *q]))
 
 
@@ -184,10 +123,8 @@ def _deviation(row: CsvRow, meaning: str, assumed: float, limits: tuple[float, f
     if not row.text(meaning):
         return assumed
     x = row.number(meaning, math.inf)
-    unit = row.cells[meaning][2]
-    if not is_within(x, limits):
-        low, high = (limit / unit for limit in limits)
-        row.fail(meaning, f"a standard deviation from {low:g} to {high:g} is needed")
+    low, high = (limit / row.cells[meaning].unit for limit in limits)
+    row.require(is_within(x, limits), meaning, f"a standard deviation from {low:g} to {high:g} is needed")
     return x
 
 
@@ -195,10 +132,7 @@ def _play(rows: Sequence[CsvRow], assumed: float) -> float:
     """The play of parts that fit, [m], which is one number for all rows."""
     stated = [(row, row.number("play", FARTHEST_M)) for row in rows if row.text("play")]
     for row, x in stated:
-        row.require(x >= 0.0, "play", "a length from 0 is needed")
-        row.require(
-            x == stated[0][1], "play", f"one length for all rows is needed, line {stated[0][0].line} says another"
-        )
+        row.require(x >= 0.0 and x == stated[0][1], "play", "one length from 0 for all rows is needed")
     return stated[0][1] if stated else assumed
 
 

@@ -1,4 +1,4 @@
-"""Observed poses from a file: the JSON form of `apo_bench.files.json_forms`, or a table of comma-separated values."""
+"""Read observed poses from a file: the JSON form of `apo_bench.files.json_forms`, or comma-separated values."""
 
 from math import radians
 from pathlib import Path
@@ -10,8 +10,8 @@ from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Observation
 from apo_bench.errors import require
 from apo_bench.files import json_reading
-from apo_bench.files.csv_form import DEVIATION_DEG, DEVIATION_MM, check_deviations, read_table
-from apo_bench.geometry import FARTHEST_M
+from apo_bench.files.csv_form import read_table
+from apo_bench.files.deviations import DEVIATION_DEG, DEVIATION_MM, check_deviations
 from apo_bench.scenario import Scenario, layout_at
 
 
@@ -68,7 +68,6 @@ def read_observation_file(
     known = load_scenario(scenario)
     if Path(path).suffix.lower() != ".csv":
         seen, assumed = json_reading.read_json_observed(path, known, (deviation_mm, deviation_deg))
-        _check_near(path, seen)
     else:
         seen, assumed = read_table(path, known, deviation_mm=deviation_mm, deviation_deg=deviation_deg)
     return ObservationFile(seen, known, assumed)
@@ -81,9 +80,7 @@ def read_stated(path: str | Path, scenario: Scenario) -> Observation:
         InputError: Anything that is not as described, or a standard deviation is missing.
     """
     if Path(path).suffix.lower() != ".csv":
-        observation = json_reading.read_json_observation(path, scenario)
-        _check_near(path, observation)
-        return observation
+        return json_reading.read_json_observation(path, scenario)
     observation, _, assumed = read_observation_file(path, scenario)
     require(
         not assumed,
@@ -107,13 +104,3 @@ def as_planned(scenario: Scenario, deviation_mm: float, deviation_deg: float) ->
         gap_m=scenario.gap_mm * 1e-3,
         play_m=scenario.clearance_mm * 1e-3,
     )
-
-
-def _check_near(path: str | Path, observation: Observation) -> None:
-    """Refuse poses so far away that nothing can be computed with them; a CSV file is checked cell by cell."""
-    for k, T in enumerate(observation.goals):
-        require(
-            np.abs(T[:3, 3]).max() <= FARTHEST_M,
-            f"{path}, operation {k + 1}, position_mm: numbers of at most {FARTHEST_M * 1e3:g} are needed, "
-            f"{np.abs(T[:3, 3]).max() * 1e3:g} was given.",
-        )

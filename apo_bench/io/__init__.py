@@ -1,20 +1,26 @@
-"""Files are read and written here, strictly and within limits, and processes started; knows nothing of assemblies."""
+"""Read and write files within limits, and start processes; knows nothing of assemblies."""
 
+from apo_bench.io.csv_reading import Columns, CsvRow, check_separator, read_csv
+from apo_bench.io.csv_writing import write_csv
 from apo_bench.io.documents import (
-    HALF_BUT_OF_FILES,
-    HALF_LETTER,
-    WHOLE_LETTERS,
-    JsonNode,
-    half_letter,
-    is_whole,
-    parse_json,
-    read_json,
-    read_toml,
-    read_whole,
+    Finite,
+    NotNegative,
+    Positive,
+    Quadruple,
+    Table,
+    Text,
+    Triple,
+    check_quaternion,
+    convert_typed,
+    read_plain,
+    read_typed,
 )
 from apo_bench.io.figures import default_looks, load_matplotlib, save_figure
+from apo_bench.io.grouping import grouped
 from apo_bench.io.named_files import named_files
+from apo_bench.io.nodes import JsonNode, parse_json, read_json, read_toml
 from apo_bench.io.ordinary_files import decoded, each_line, opened, read_bytes, read_text
+from apo_bench.io.parquet import has_parquet, write_columns
 from apo_bench.io.processes import SAFE_PATH, environment
 from apo_bench.io.result_files import (
     check_folders,
@@ -25,20 +31,10 @@ from apo_bench.io.result_files import (
     replace_file,
     write_file,
 )
+from apo_bench.io.safe_text import CONTROL, UNSHOWN, brief, clean, markdown
 from apo_bench.io.streams import redirect_output
-from apo_bench.io.strict_csv import Columns, CsvRow, check_separator, has_parquet, read_csv, write_columns, write_csv
-from apo_bench.io.words import (
-    CONTROL,
-    UNSHOWN,
-    brief,
-    clean,
-    columns,
-    direction,
-    grouped,
-    listed_words,
-    markdown,
-    with_article,
-)
+from apo_bench.io.whole_json import HALF_BUT_OF_FILES, HALF_LETTER, WHOLE_LETTERS, half_letter, is_whole, read_whole
+from apo_bench.io.words import columns, direction, listed_words, with_article
 
 __all__ = (
     "CONTROL",
@@ -49,13 +45,22 @@ __all__ = (
     "WHOLE_LETTERS",
     "Columns",
     "CsvRow",
+    "Finite",
     "JsonNode",
+    "NotNegative",
+    "Positive",
+    "Quadruple",
+    "Table",
+    "Text",
+    "Triple",
     "brief",
     "check_folders",
+    "check_quaternion",
     "check_separator",
     "check_target",
     "clean",
     "columns",
+    "convert_typed",
     "decoded",
     "default_looks",
     "direction",
@@ -77,8 +82,10 @@ __all__ = (
     "read_bytes",
     "read_csv",
     "read_json",
+    "read_plain",
     "read_text",
     "read_toml",
+    "read_typed",
     "read_whole",
     "redirect_output",
     "replace_file",

@@ -1,10 +1,4 @@
-"""Figures of matplotlib: drawn as it comes, whatever a `matplotlibrc` in the current folder or at home says.
-
-Text is drawn letter by letter: `$` in the name of somebody's method begins no formula.
-
-Matplotlib reads that of the current folder when it is first imported: its settings change every picture, a file that is
-no text is an exception, and a pipe is waited for.
-"""
+"""Draw and save figures of matplotlib that no `matplotlibrc` in the current folder or at home changes."""
 
 import os
 import sys
@@ -22,7 +16,8 @@ _READ = "matplotlibrc"
 def default_looks(settings: Mapping[str, Any] | None = None) -> Iterator[Any]:
     """Matplotlib with its own settings, and with these, while something is drawn; those of before come back.
 
-    A function that draws has it as a decorator or around its body, and imports what it needs of matplotlib inside.
+    Text is drawn letter by letter: `$` in the name of a method begins no formula. A function that draws has this as a
+    decorator or around its body, and imports what it needs of matplotlib inside.
     """
     matplotlib = load_matplotlib()
     with matplotlib.rc_context():
@@ -33,7 +28,7 @@ def default_looks(settings: Mapping[str, Any] | None = None) -> Iterator[Any]:
 
 
 def load_matplotlib() -> Any:
-    """Import matplotlib, from the root folder where the current one has a file of settings."""
+    """Import matplotlib, from the root folder where the current one has a file of settings, which it would read."""
     if "matplotlib" not in sys.modules and os.path.lexists(_READ):
         here = Path.cwd()
         os.chdir(here.anchor)

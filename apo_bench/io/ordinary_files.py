@@ -1,4 +1,4 @@
-"""Files are read here: ordinary ones only, none larger than allowed, text in UTF-8; nothing else is waited for."""
+"""Read ordinary files, none larger than allowed, and text in UTF-8; pipes and devices are not waited for."""
 
 import os
 import stat
@@ -10,14 +10,11 @@ from typing import BinaryIO
 from apo_bench.errors import InputError, require
 
 LARGEST_BYTES = 1_000_000
-_LONGEST_LINE = 1 << 20
-"""Bytes; ten times the longest line that a sweep writes."""
-_FLAGS = ("O_NONBLOCK", "O_NOCTTY", "O_CLOEXEC", "O_BINARY")
 
 
 @contextmanager
 def opened(path: str | Path, kind: str) -> Iterator[BinaryIO]:
-    """An ordinary file, or a link to one, to read from; nothing else is waited for.
+    """An ordinary file, or a link to one, to read from.
 
     Args:
         kind: What the file should be, for the message: `sweep file`.
@@ -26,17 +23,21 @@ def opened(path: str | Path, kind: str) -> Iterator[BinaryIO]:
         InputError: There is no such file, it is no ordinary one, or it cannot be read, also while it is open.
     """
     try:
-        _check_ordinary(path, kind, os.stat(path).st_mode)
-        number = os.open(path, os.O_RDONLY | sum(getattr(os, flag, 0) for flag in _FLAGS))
-        with os.fdopen(number, "rb") as file:
-            _check_ordinary(path, kind, os.fstat(number).st_mode)
+        mode = os.stat(path).st_mode
+    except ValueError as error:
+        raise InputError(f"{str(path)!r}: this is not a path ({error}); give the path of a {kind}.") from error
+    except OSError as error:
+        raise _unreadable(path, kind, error) from error
+    require(stat.S_ISREG(mode), f"{path}: {kind_of(mode)} was given; give a {kind}.")
+    try:
+        with open(path, "rb") as file:
             yield file
     except OSError as error:
-        raise InputError(f"{path}: the {kind} cannot be read ({error.strerror or error}); check the path.") from error
-    except ValueError as error:
-        if isinstance(error, InputError) or not _is_no_path(path):
-            raise
-        raise InputError(f"{str(path)!r}: this is not a path ({error}); give the path of a {kind}.") from error
+        raise _unreadable(path, kind, error) from error
+
+
+def _unreadable(path: str | Path, kind: str, error: OSError) -> InputError:
+    return InputError(f"{path}: the {kind} cannot be read ({error.strerror or error}); check the path.")
 
 
 def read_bytes(path: str | Path, kind: str, limit: int = LARGEST_BYTES, *, own: bool = False) -> bytes:
@@ -74,18 +75,10 @@ def each_line(path: str | Path, kind: str) -> Iterator[tuple[int, bytes]]:
     """The lines of a file, numbered from 1; a last one without an end, torn as it was written, is left out.
 
     Raises:
-        InputError: It is no ordinary file, cannot be opened, or has a line longer than any that is written.
+        InputError: It is no ordinary file, or cannot be read.
     """
     with opened(path, kind) as file:
-        number = 0
-        while line := file.readline(_LONGEST_LINE + 1):
-            number += 1
-            require(
-                len(line) <= _LONGEST_LINE,
-                f"{path}, line {number}: at most {_LONGEST_LINE:,} bytes are allowed in a line; remove it.",
-            )
-            if line.endswith(b"\n"):
-                yield number, line
+        yield from ((number, line) for number, line in enumerate(file, start=1) if line.endswith(b"\n"))
 
 
 def decoded(raw: bytes, file: str, kind: str) -> str:
@@ -96,19 +89,6 @@ def decoded(raw: bytes, file: str, kind: str) -> str:
         raise InputError(
             f"{file}: the file is not UTF-8 text (byte {error.start}); save the {kind} as UTF-8."
         ) from error
-
-
-def _check_ordinary(path: str | Path, kind: str, mode: int) -> None:
-    require(stat.S_ISREG(mode), f"{path}: {kind_of(mode)} was given; give a {kind}.")
-
-
-def _is_no_path(path: str | Path) -> bool:
-    """Whether the system cannot even look for it: a zero byte in it, or half of a letter."""
-    try:
-        os.fsencode(path)
-    except ValueError:
-        return True
-    return "\0" in str(path)
 
 
 _KINDS = (

@@ -24,7 +24,7 @@ from apo_bench.observation.models import (
 )
 from apo_bench.records import RESIDUALS
 from apo_bench.resources import folder
-from apo_bench.scenario.contacts import read_pose
+from apo_bench.scenario.values import read_pose
 
 
 def presets() -> Mapping[str, Path]:

@@ -1,9 +1,6 @@
-"""Faces that are stated, held against the pieces: flat ones against their sides, round ones by rays from their axes.
+"""Faces that are stated, held against the pieces: flat ones against their sides, round ones by rays from their axes."""
 
-A part some of whose faces recede although its file does not say so: by the clearance, and by a length before it.
-"""
-
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import replace
 from itertools import combinations
 from pathlib import Path
@@ -25,7 +22,6 @@ from apo_bench.geometry import (
     passage,
     physical_pieces,
     plane_across,
-    receded_pieces,
     rings_of,
 )
 from apo_bench.parts.stated import twice_area
@@ -237,49 +233,3 @@ def _crossed(pieces: list[Piece], origin: Array, out: Array) -> tuple[Array, Arr
 
 def _fail(place: str, what: str) -> NoReturn:
     raise InputError(f"{place}: {what}; state the face as the pieces are, or mend the pieces.")
-
-
-def with_fit(solid: Solid, undersizes_mm: Mapping[str, float]) -> Solid:
-    """The solid with these faces marked as fit, each moved into it by its undersize first.
-
-    A wall between two that are 0.1 mm too near to each other gets room by an undersize of 0.05 mm per side, and play by
-    the clearance. Outlines of faces beside keep what was there.
-
-    A part that was drawn with play is made as thick as there is room by undersizes below 0: then its walls touch, and
-    the clearance makes it as thin as it was drawn.
-
-    Args:
-        undersizes_mm: Name of a face -> how far it lies inside of where the file has it, [mm].
-
-    Raises:
-        InputError: A face is the side of a box with another one, a hole cannot get wider, or nothing is left of a
-            piece.
-    """
-    pieces = solid.pieces
-    for depth_mm in sorted({*undersizes_mm.values()} - {0.0}):
-        names = {name for name, by_mm in undersizes_mm.items() if by_mm == depth_mm}
-        flats = {name: replace(face, fit=name in names) for name, face in solid.faces.items()}
-        walls = {name: replace(face, fit=name in names) for name, face in solid.rounds.items()}
-        pieces = receded_pieces(replace(solid, pieces=pieces, faces=flats, rounds=walls), 1e-3 * depth_mm)
-    fitted = replace(
-        solid,
-        pieces=pieces,
-        faces={name: _flat(face, undersizes_mm.get(name)) for name, face in solid.faces.items()},
-        rounds={name: _wall(face, undersizes_mm.get(name)) for name, face in solid.rounds.items()},
-    )
-    check_receding(fitted, Path(solid.name))
-    return fitted
-
-
-def _flat(face: Face, by_mm: float | None) -> Face:
-    if by_mm is None:
-        return face
-    off = -1e-3 * by_mm * face.normal
-    return replace(face, outline=face.outline + off, holes=tuple(hole + off for hole in face.holes), fit=True)
-
-
-def _wall(face: RoundFace, by_mm: float | None) -> RoundFace:
-    if by_mm is None:
-        return face
-    by_m = 1e-3 * by_mm * (1.0 if face.hole else -1.0)
-    return replace(face, radii=(face.radii[0] + by_m, face.radii[1] + by_m), fit=True)

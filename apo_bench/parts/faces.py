@@ -73,6 +73,8 @@ def unite(boxes: Sequence[Box], most: int | None = None) -> Union:
     Args:
         most: Stop at so many surfaces.
     """
+    from scipy.ndimage import label
+
     grid = [_planes(boxes, axis) for axis in range(3)]
     full = _full_cells(boxes, grid)
     volumes = np.einsum("i,j,k,ijk->ijk", *(np.diff(planes) for planes in grid), full)
@@ -80,21 +82,7 @@ def unite(boxes: Sequence[Box], most: int | None = None) -> Union:
     middles = [(planes[1:] + planes[:-1]) / 2 for planes in grid]
     centroid = [np.moveaxis(volumes, axis, 0).sum(axis=(1, 2)) @ middles[axis] / volume for axis in range(3)]
     surfaces = sorted(islice(_surfaces(full, grid), most), key=lambda s: (s.side, s.height, s.shape.bounds))
-    return Union(tuple(surfaces), np.array(centroid), volume, _pieces(full))
-
-
-def _pieces(full: NDArray[np.bool_]) -> int:
-    """How many solids the full cells make that share sides."""
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    cell = np.where(full, np.cumsum(full).reshape(full.shape) - 1, -1)
-    layers = [np.moveaxis(cell, axis, 0) for axis in range(3)]
-    sides = np.concatenate([np.stack([each[:-1].ravel(), each[1:].ravel()]) for each in layers], axis=1)
-    shared = sides[:, (sides >= 0).all(axis=0)]
-    n = int(full.sum())
-    graph = coo_array((np.ones(shared.shape[1]), (shared[0], shared[1])), shape=(n, n))
-    return int(connected_components(graph, directed=False)[0])
+    return Union(tuple(surfaces), np.array(centroid), volume, int(label(full)[1]))
 
 
 def _planes(boxes: Sequence[Box], axis: int) -> Array:

@@ -3,14 +3,15 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import final
+from typing import Annotated, Any, Literal, final
 
 import numpy as np
+from msgspec import Meta
 
 from apo_bench.errors import require
 from apo_bench.geometry import WHOLE_TURN, Array, Face, RoundFace, flat_area, plane_across
-from apo_bench.io import JsonNode, read_toml
-from apo_bench.parts.allowed import FACE_OR_PART_NAME, FRICTION, LARGEST_PART_BYTES, LONGEST_FACE_NAME, MOST_FACES
+from apo_bench.io import Finite, Positive, Table, Text, Triple, convert_typed, read_typed
+from apo_bench.parts.allowed import DENSITY, LARGEST_PART_BYTES, MOST_FACES, is_name
 
 PART_SCHEMA = "apo-bench/part/1"
 USUAL_DENSITY = 1000.0
@@ -20,8 +21,72 @@ _FLAT_MM = 1e-3
 """Corners of a face lie this near to its plane."""
 _SMALLEST_MM2 = 1e-6
 _THINNEST_RADIUS_MM = 0.05
+_SHORTEST_MM = 1e-3
 _UNIT = 1e-6
-KINDS = ("plane", "cylinder", "cone", "rim")
+_Length = Annotated[float, Meta(ge=-_LARGEST_MM, le=_LARGEST_MM)]
+_Point = tuple[_Length, _Length, _Length]
+_Radius = Annotated[float, Meta(ge=_THINNEST_RADIUS_MM, le=_LARGEST_MM)]
+_EndRadius = Annotated[float, Meta(ge=0.0, le=_LARGEST_MM)]
+_Ring = Annotated[list[_Point], Meta(min_length=3)]
+
+
+class PlaneTable(Table, frozen=True, kw_only=True, tag_field="kind", tag="plane"):
+    """A flat face."""
+
+    outline_mm: _Ring
+    holes_mm: tuple[_Ring, ...] = ()
+    fit: bool = False
+
+
+class RimTable(Table, frozen=True, kw_only=True, tag_field="kind", tag="rim"):
+    """The circle at the end of a hole or a shaft."""
+
+    at_mm: _Point
+    axis: Triple
+    hole: bool
+    radius_mm: _Radius
+
+
+class WallTable(Table, frozen=True, kw_only=True):
+    """A round wall."""
+
+    at_mm: _Point
+    axis: Triple
+    hole: bool
+    span_mm: tuple[_Length, _Length]
+    fit: bool = False
+    extent_deg: Annotated[float, Meta(gt=0.0, le=360.0)] | None = None
+    toward: Triple | None = None
+
+
+class CylinderTable(WallTable, frozen=True, kw_only=True, tag_field="kind", tag="cylinder"):
+    """A round wall of one radius."""
+
+    radius_mm: _Radius
+
+
+class ConeTable(WallTable, frozen=True, kw_only=True, tag_field="kind", tag="cone"):
+    """A round wall whose radius changes along its span."""
+
+    radii_mm: tuple[_EndRadius, _EndRadius]
+
+
+FaceTable = PlaneTable | CylinderTable | ConeTable | RimTable
+
+
+class MatterTable(Table, frozen=True, kw_only=True):
+    """The whole file."""
+
+    schema: Literal["apo-bench/part/1"]
+    faces: Annotated[dict[str, Any], Meta(min_length=1, max_length=MOST_FACES)]
+    volume_mm3: Positive
+    centroid_mm: _Point
+    inertia_mm5: tuple[Finite, Finite, Finite, Finite, Finite, Finite]
+    title: Text = ""
+    density: Annotated[float, Meta(ge=DENSITY[0], le=DENSITY[1])] = USUAL_DENSITY
+    friction: float | tuple[float, ...] = ()
+    source: Text = ""
+    licence: Text = ""
 
 
 @final
@@ -41,10 +106,6 @@ class StatedPart:
     """[kg/m^3]."""
     friction: tuple[float, ...]
     """Sliding, and then turning and rolling, as in MJCF; empty if unsaid."""
-    source: str
-    licence: str
-    title: str
-    """What a person calls the part; empty if unsaid."""
 
 
 def read_stated_part(path: Path) -> StatedPart:
@@ -53,75 +114,38 @@ def read_stated_part(path: Path) -> StatedPart:
     Raises:
         InputError: Anything in the file that is not as described, naming file and place.
     """
-    top = read_toml(path, "file that states the faces of a part", LARGEST_PART_BYTES).fields_of(
-        PART_SCHEMA,
-        ("faces", "volume_mm3", "centroid_mm", "inertia_mm5"),
-        ("title", "density", "friction", "source", "licence"),
-    )
-    faces = [_face(name, node) for name, node in _named(top["faces"])]
+    top = read_typed(path, MatterTable, "file that states the faces of a part", limit=LARGEST_PART_BYTES)
+    faces = [_face(name, value, f"{path}, faces, {name}") for name, value in top.faces.items()]
     return StatedPart(
         faces={face.name: face for face in faces if isinstance(face, Face)},
         rounds={face.name: face for face in faces if isinstance(face, RoundFace)},
-        volume=1e-9 * top["volume_mm3"].number(0.0, 1e15, above=True),
-        centroid=1e-3 * _within(top["centroid_mm"], 3),
-        inertia=1e-15 * _inertia(top["inertia_mm5"]),
-        density=top["density"].number(1.0, 25_000.0) if "density" in top else USUAL_DENSITY,
-        friction=_friction(top["friction"]) if "friction" in top else (),
-        source=top["source"].text() if "source" in top else "",
-        licence=top["licence"].text() if "licence" in top else "",
-        title=top["title"].text() if "title" in top else "",
+        volume=1e-9 * top.volume_mm3,
+        centroid=1e-3 * np.array(top.centroid_mm),
+        inertia=1e-15 * _inertia(top.inertia_mm5, f"{path}, inertia_mm5"),
+        density=top.density,
+        friction=_friction(top.friction, f"{path}, friction"),
     )
 
 
-def _named(node: JsonNode) -> list[tuple[str, JsonNode]]:
-    """The tables of faces, each with its name."""
-    node.require(
-        isinstance(node.value, dict) and node.value,
-        "tables of faces are needed",
-        'such as [faces.top] with kind = "plane"',
-    )
-    require(
-        len(node.value) <= MOST_FACES,
-        f"{node.file}: {len(node.value)} faces are stated; {MOST_FACES} are the most that a part has.",
-    )
-    for name in node.value:
-        node.child(name, "a name").require(
-            len(name) <= LONGEST_FACE_NAME and FACE_OR_PART_NAME.fullmatch(name),
-            f"letters, digits and underscores after a letter, {LONGEST_FACE_NAME} in all at most, are needed",
-        )
-    return [(name, node.child(value, name)) for name, value in node.value.items()]
+def _face(name: str, value: Any, place: str) -> Face | RoundFace:
+    require(is_name(name), f"{place}: letters, digits and underscores after a letter are needed as a name.")
+    table: FaceTable = convert_typed(value, FaceTable, place)  # type: ignore[arg-type]
+    return _plane(name, table, place) if isinstance(table, PlaneTable) else _round(name, table, place)
 
 
-def _face(name: str, node: JsonNode) -> Face | RoundFace:
-    kind = node.value.get("kind") if isinstance(node.value, dict) else None
-    if kind == "plane":
-        return _plane(name, node)
-    if kind in KINDS:
-        return _round(name, node, str(kind))
-    at = node if not isinstance(node.value, dict) or "kind" not in node.value else node.child(kind, "kind")
-    at.fail("kind = " + " or ".join(f'"{each}"' for each in KINDS) + " is needed")
-
-
-def _plane(name: str, node: JsonNode) -> Face:
-    keys = node.fields(("kind", "outline_mm"), ("holes_mm", "fit"))
-    outline = _ring(keys["outline_mm"])
-    holes = tuple(_ring(each) for each in keys["holes_mm"].items("hole")) if "holes_mm" in keys else ()
+def _plane(name: str, table: PlaneTable, place: str) -> Face:
+    outline = np.array(table.outline_mm)
+    holes = [np.array(hole) for hole in table.holes_mm]
     across = twice_area(outline)
-    keys["outline_mm"].require(np.linalg.norm(across) >= 2.0 * _SMALLEST_MM2, "corners around an area are needed")
+    require(np.linalg.norm(across) >= 2.0 * _SMALLEST_MM2, f"{place}, outline_mm: corners around an area are needed.")
     n = across / np.linalg.norm(across)
-    for ring in (outline, *holes):
-        node.require(
-            np.abs((ring - outline[0]) @ n).max() <= _FLAT_MM, f"corners within {_FLAT_MM:g} mm of one plane are needed"
-        )
-    node.require(
-        flat_area(outline, holes, plane_across(n)).is_valid,
-        "an outline and holes inside it that do not cross are needed",
-    )
-    for i, hole in enumerate(holes, start=1):
-        node.child(hole.tolist(), f"hole {i}").require(
-            twice_area(hole) @ n < 0.0, "corners clockwise as seen from outside are needed"
-        )
-    return Face(name, 1e-3 * outline, tuple(1e-3 * hole for hole in holes), "fit" in keys and keys["fit"].flag())
+    off = np.abs((np.concatenate([outline, *holes]) - outline[0]) @ n).max()
+    require(off <= _FLAT_MM, f"{place}: corners within {_FLAT_MM:g} mm of one plane are needed, one is {off:.3g} off.")
+    valid = flat_area(outline, holes, plane_across(n)).is_valid
+    require(valid, f"{place}: an outline and holes inside it that do not cross are needed.")
+    clockwise = all(twice_area(hole) @ n < 0.0 for hole in holes)
+    require(clockwise, f"{place}, holes_mm: corners clockwise as seen from outside are needed.")
+    return Face(name, 1e-3 * outline, tuple(1e-3 * hole for hole in holes), table.fit)
 
 
 def twice_area(ring: Array) -> Array:
@@ -130,82 +154,63 @@ def twice_area(ring: Array) -> Array:
     return np.cross(corners, np.roll(corners, -1, axis=0)).sum(axis=0)
 
 
-def _ring(node: JsonNode) -> Array:
-    corners = node.items("corner")
-    node.require(len(corners) >= 3, "three corners or more are needed")
-    return np.array([_within(corner, 3) for corner in corners])
-
-
-def _round(name: str, node: JsonNode, kind: str) -> RoundFace:
-    sizes = {"cylinder": ("radius_mm", "span_mm"), "cone": ("radii_mm", "span_mm"), "rim": ("radius_mm",)}[kind]
-    around = () if kind == "rim" else ("fit", "extent_deg", "toward")
-    keys = node.fields(("kind", "at_mm", "axis", *sizes, "hole"), around)
-    if "radius_mm" in keys:
-        radii = [keys["radius_mm"].number(_THINNEST_RADIUS_MM, _LARGEST_MM)] * 2
-    else:
-        radii = [each.number(0.0, _LARGEST_MM) for each in keys["radii_mm"].items("radius", 2)]
-        keys["radii_mm"].require(
-            abs(radii[1] - radii[0]) >= 1e-3, 'two radii that differ are needed, else kind = "cylinder"'
-        )
-    span = _within(keys["span_mm"], 2) if "span_mm" in keys else np.zeros(2)
-    keys.get("span_mm", node).require(
-        kind == "rim" or span[1] - span[0] >= 1e-3, "a start and an end that is greater are needed"
-    )
-    axis = _unit(keys["axis"])
-    extent = np.radians(keys["extent_deg"].number(0.0, 360.0, above=True)) if "extent_deg" in keys else WHOLE_TURN
-    node.require(
-        (extent < WHOLE_TURN - 1e-9) == ("toward" in keys),
-        "extent_deg below 360 and toward are needed together, or none of them",
-    )
+def _round(name: str, table: CylinderTable | ConeTable | RimTable, place: str) -> RoundFace:
+    axis = _unit(table.axis, f"{place}, axis")
+    radii = table.radii_mm if isinstance(table, ConeTable) else (table.radius_mm, table.radius_mm)
+    ends = (1e-3 * radii[0], 1e-3 * radii[1])
+    point = 1e-3 * np.array(table.at_mm)
+    if isinstance(table, RimTable):
+        return RoundFace(name, point, axis, (0.0, 0.0), ends, table.hole)
+    differ = not isinstance(table, ConeTable) or abs(radii[1] - radii[0]) >= _SHORTEST_MM
+    require(differ, f'{place}, radii_mm: two radii that differ are needed, else kind = "cylinder".')
+    low, high = table.span_mm
+    require(high - low >= _SHORTEST_MM, f"{place}, span_mm: a start and an end that is greater are needed.")
+    extent = WHOLE_TURN if table.extent_deg is None else np.radians(table.extent_deg)
+    partial = extent < WHOLE_TURN - 1e-9
+    both = partial == (table.toward is not None)
+    require(both, f"{place}: extent_deg below 360 and toward are needed together, or none of them.")
     return RoundFace(
         name=name,
-        point=1e-3 * _within(keys["at_mm"], 3),
+        point=point,
         axis=axis,
-        span=(1e-3 * float(span[0]), 1e-3 * float(span[1])),
-        radii=(1e-3 * radii[0], 1e-3 * radii[1]),
-        hole=keys["hole"].flag(),
-        fit="fit" in keys and keys["fit"].flag(),
+        span=(1e-3 * low, 1e-3 * high),
+        radii=ends,
+        hole=table.hole,
+        fit=table.fit,
         extent_rad=float(extent),
-        toward=_beside(keys["toward"], axis) if "toward" in keys else None,
+        toward=None if table.toward is None else _across(table.toward, axis, f"{place}, toward"),
     )
 
 
-def _unit(node: JsonNode) -> Array:
-    v = node.numbers(3)
+def _unit(stated: Triple, place: str) -> Array:
+    v = np.array(stated)
     length = float(np.linalg.norm(v))
-    node.require(_UNIT < length < 1.0 / _UNIT, "a direction, three numbers that are not all 0, is needed")
+    require(_UNIT < length < 1.0 / _UNIT, f"{place}: a direction, three numbers that are not all 0, is needed.")
     return np.asarray(v / length)
 
 
-def _beside(node: JsonNode, axis: Array) -> Array:
+def _across(stated: Triple, axis: Array, place: str) -> Array:
     """A unit vector across the axis."""
-    v = _unit(node)
-    node.require(abs(v @ axis) <= 1e-3, "a direction across the axis is needed")
+    v = _unit(stated, place)
+    require(abs(v @ axis) <= 1e-3, f"{place}: a direction across the axis is needed.")
     v = v - (v @ axis) * axis
     return np.asarray(v / np.linalg.norm(v))
 
 
-def _within(node: JsonNode, count: int) -> Array:
-    lengths = node.numbers(count)
-    node.require(
-        np.abs(lengths).max() <= _LARGEST_MM, f"{count} numbers of {-_LARGEST_MM:g} to {_LARGEST_MM:g} are needed"
-    )
-    return lengths
-
-
-def _inertia(node: JsonNode) -> Array:
+def _inertia(six: tuple[float, ...], place: str) -> Array:
     """xx, yy, zz, xy, xz, yz as a matrix."""
-    xx, yy, zz, xy, xz, yz = node.numbers(6)
+    xx, yy, zz, xy, xz, yz = six
     J = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    node.require(
-        np.abs(J).max() < 1e30 and np.linalg.eigvalsh(J)[0] > 0.0, "xx, yy, zz, xy, xz, yz of a solid are needed"
-    )
+    solid = np.abs(J).max() < 1e30 and np.linalg.eigvalsh(J)[0] > 0.0
+    require(solid, f"{place}: xx, yy, zz, xy, xz, yz of a solid are needed.")
     return J
 
 
-def _friction(node: JsonNode) -> tuple[float, ...]:
-    values = node.value if isinstance(node.value, list) else [node.value]
-    numbers = node.child(values, "numbers").numbers(len(values)) if 1 <= len(values) <= 3 else None
-    if numbers is None or not all(low <= x <= high for x, (low, high) in zip(numbers, FRICTION.spans, strict=False)):
-        node.fail(f"{FRICTION.words} are needed")
-    return tuple(float(x) for x in numbers)
+def _friction(stated: float | tuple[float, ...], place: str) -> tuple[float, ...]:
+    """One to three numbers; none if the file states none."""
+    numbers = stated if isinstance(stated, tuple) else (stated,)
+    most = (10.0, 0.1, 0.1)
+    least = (0.01, 0.0, 0.0)
+    holds = len(numbers) <= 3 and all(a <= x <= b for a, x, b in zip(least, numbers, most, strict=False))
+    require(holds, f"{place}: 1 to 3 numbers of 0.01 to 10, 0 to 0.1, 0 to 0.1 are needed.")
+    return tuple(map(float, numbers))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from apo_bench.errors import InputError, one_line, require, unknown
 from apo_bench.geometry import Array
 from apo_bench.io import JsonNode, read_toml
-from apo_bench.scenario.contacts import read_any_pose, refuse
+from apo_bench.scenario.values import read_any_pose
 
 MOST_POSES = 1_000_000
 LARGEST_LOG_BYTES = 200_000_000
@@ -283,7 +283,7 @@ def read_objects(path: str | Path) -> ObjectsFile:
         keys = node.fields(("id",), ("frame",))
         tracked = TrackedPart(_id(keys["id"]), read_any_pose(keys["frame"]) if "frame" in keys else np.eye(4))
         if tracked.id in owners:
-            refuse(node, f"the id '{tracked.id}' is that of '{owners[tracked.id]}' already; give each part its own")
+            raise InputError(f"{node.place}: the id '{tracked.id}' is that of '{owners[tracked.id]}' already.")
         parts[part] = tracked
         owners[tracked.id] = part
     ignored = frozenset(_id(node) for node in top["ignore"].items("ignored id")) if "ignore" in top else frozenset()

@@ -1,18 +1,12 @@
-"""A file becomes a checked scenario; where a seed puts it, and how a human errs."""
+"""Scenarios: a file becomes a checked one, a seed lays it out."""
 
-from apo_bench.scenario.checks import check_clearance
+from apo_bench.scenario.attach_lines import nominal_operations
 from apo_bench.scenario.file import is_named, load_scenario, scenario_names, scenario_path
-from apo_bench.scenario.layout import draw_layout, layout_at, nominal_operations, nominal_start
+from apo_bench.scenario.human_error import NOTHING_M, careless_covariance, spread_error
+from apo_bench.scenario.layout import draw_layout, layout_at, nominal_start
 from apo_bench.scenario.order import in_the_air
-from apo_bench.scenario.scenario import (
-    NOTHING_M,
-    Carelessness,
-    Grasp,
-    Scenario,
-    Turn,
-    careless_covariance,
-    spread_error,
-)
+from apo_bench.scenario.play import check_clearance
+from apo_bench.scenario.scenario import Carelessness, Grasp, Scenario, Turn
 
 __all__ = (
     "NOTHING_M",

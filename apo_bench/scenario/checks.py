@@ -1,47 +1,30 @@
 """Whether the numbers of a scenario fit its topology: contacts closed, parts apart, wherever the truth may vary to."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from itertools import combinations, product
 from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.assembly import (
-    Assembly,
-    Contact,
-    ContactKind,
-    Layout,
-    Poses,
-    contact_kind,
-    geometric_play,
-    height,
-    placements,
-    play_mm,
-)
-from apo_bench.errors import InputError
+from apo_bench.assembly import Contact, Layout, Poses, contact_kind, height, placements
+from apo_bench.errors import InputError, require
 from apo_bench.geometry import Face, angle_between, intrusion, mate, overlap, pose
 from apo_bench.scenario.layout import layout_at
 from apo_bench.scenario.order import check_order, in_the_air
+from apo_bench.scenario.play import without_play
 from apo_bench.scenario.scenario import Scenario
 
 _GAP_M = 1e-6
 """Faces that are said to touch are nearer than this."""
 _ANGLE_DEG = 0.01
 """Normals of faces that are said to touch are opposite within this, and axes parallel."""
-_NO_PLAY_MM = 1e-6
-"""A shaft with less play is as thick as its hole."""
-_ALONG = "vary along an axis that no contact fixes"
 DEEP_M = 2e-5
 """Parts that are deeper in each other do not only touch: pieces of an import may be so deep."""
 
-
-_APART: Mapping[ContactKind | None, str] = {
-    "shaft on plane": "the wall of the shaft is {:.4g} mm from the plane",
-    "shaft in hole": "the axes are {:.4g} mm apart",
-}
-"""How faces fail to meet."""
 _Pair = tuple[str, str, bytes]
 """Two parts, and where the second one is to the first."""
+_Faults = Iterator[tuple[str, str]]
+"""Key to blame, and what is wrong."""
 
 
 class _Case(NamedTuple):
@@ -62,16 +45,15 @@ def check_scenario(scenario: Scenario, file: str) -> None:
     Raises:
         InputError: The first thing found wrong.
     """
-    _check_play(scenario, file)
+    tight = without_play(scenario.assembly, scenario.clearance_mm)
+    require(tight is None, f"{file}, operations, contacts: {tight}; make the hole wider, or fit with a clearance.")
     apart: set[_Pair] = set()
     for case in _cases(scenario):
         stages = (case.layout.start, *placements(scenario.assembly, case.layout.start, case.layout.goals))
         if not case.key:
             check_order(scenario.assembly, stages, file)
-        _check_starts(scenario, file, case)
-        _check_turns(scenario, file, case, stages)
-        _check_contacts(scenario, file, case, stages)
-        _check_intrusions(scenario, file, case, stages, apart)
+        for key, fault in _faults(scenario, case, stages, apart):
+            raise InputError(f"{file}, {case.key or key}: {fault}{case.words}.")
 
 
 def _cases(scenario: Scenario) -> Iterator[_Case]:
@@ -98,143 +80,87 @@ def _cases(scenario: Scenario) -> Iterator[_Case]:
         yield _Case(layout_at(scenario, x, y, yaw), "site", words, site_only=True)
 
 
-def _refuse(file: str, case: _Case, key: str, sentence: str, remedy: str) -> InputError:
-    return InputError(f"{file}, {case.key or key}: {sentence}{case.words}; {remedy}.")
-
-
-def _check_starts(scenario: Scenario, file: str, case: _Case) -> None:
-    """Every movable part starts on something."""
+def _faults(scenario: Scenario, case: _Case, stages: tuple[Poses, ...], apart: set[_Pair]) -> _Faults:
+    """All that is wrong in one layout."""
     airborne = in_the_air(scenario.assembly, case.layout.start)
     if airborne is not None:
         part, sentence = airborne
-        raise _refuse(file, case, f"parts, {part}, start, at_mm", sentence, "let it start on a part, such as the table")
+        yield f"parts, {part}, start, at_mm", sentence
+    yield from _tilted_parts(scenario, stages)
+    yield from _open_contacts(scenario, case, stages)
+    yield from _intrusions(scenario, stages, apart)
 
 
-def _check_turns(scenario: Scenario, file: str, case: _Case, stages: tuple[Poses, ...]) -> None:
-    """A part turns about the vertical only: the robot does not turn parts over."""
+def _tilted_parts(scenario: Scenario, stages: tuple[Poses, ...]) -> _Faults:
+    """Parts that do not turn about the vertical only: the robot does not turn parts over."""
     for k, operation in enumerate(scenario.assembly.operations):
         before = stages[k][operation.main]
         tilt = float(np.degrees(angle_between(before[2, :3], stages[k + 1][operation.main][2, :3])))
         if tilt > _ANGLE_DEG:
-            raise _refuse(
-                file,
-                case,
+            yield (
                 f"operation {k + 1}, goal, turn_deg",
-                f"'{operation.main}' would have to be tilted by {tilt:.3g} degrees, only turns about the vertical are "
-                "possible",
-                "let it start tilted as it will lie",
+                f"'{operation.main}' would have to be tilted by {tilt:.3g} degrees, which the robot cannot do",
             )
 
 
-def _check_contacts(scenario: Scenario, file: str, case: _Case, stages: tuple[Poses, ...]) -> None:
+def _open_contacts(scenario: Scenario, case: _Case, stages: tuple[Poses, ...]) -> _Faults:
+    """Contacts that are not closed after the operation that makes them."""
+    standing = scenario.assembly.fixed - scenario.follows_site
     for k, operation in enumerate(scenario.assembly.operations):
         for number, contact in enumerate(operation.contacts, start=1):
             # When only the site moves, a contact is another one if the face below stays where it is.
-            if not case.site_only or contact.environment.part in scenario.assembly.fixed - scenario.follows_site:
-                key = f"operation {k + 1}, contacts, contact {number}"
-                _check_contact(scenario, file, case, key, contact, stages[k + 1])
+            if not case.site_only or contact.environment.part in standing:
+                fault = _find_gap(scenario, contact, stages[k + 1])
+                if fault is not None:
+                    yield f"operation {k + 1}, contacts, contact {number}", f"'{contact}': {fault}"
 
 
-def _check_contact(scenario: Scenario, file: str, case: _Case, key: str, contact: Contact, poses: Poses) -> None:
-    """Faces look at each other, meet, and cover some of each other."""
+def _find_gap(scenario: Scenario, contact: Contact, poses: Poses) -> str | None:
+    """Why a contact is not closed: faces do not look at each other, do not meet, or cover nothing of each other."""
     a, b = map(scenario.assembly.face_of, contact)
     T_a, T_b = (poses[of.part] for of in contact)
-    kind = contact_kind(a, b)
     if isinstance(a, Face) and isinstance(b, Face):
         angle = float(np.degrees(angle_between(T_a[:3, :3] @ a.normal, -T_b[:3, :3] @ b.normal)))
         above = height(a, T_a, b, T_b)
-        apart = abs(above)
-        tilted = f"the faces look {180 - angle:.4g} degrees apart"
-        straighten = "180 are needed: turn the part, or name faces that look at each other"
-        off = f"the faces are {1e3 * apart:.4g} mm {'apart' if above > 0 else 'too deep'}"
-        meet = "move a goal until they meet exactly"
-        beside = "the faces lie in one plane but do not overlap"
+        tilted = f"the faces look {180 - angle:.4g} degrees apart, 180 are needed"
+        off = f"the faces are {1e3 * abs(above):.4g} mm {'apart' if above > 0 else 'too deep'}"
         common = overlap(a, T_a, b, T_b)
     else:
         touch = mate(a, T_a, b, T_b)
-        angle = 0.0 if kind == "cone on rim" else float(np.degrees(touch.angle_rad))
-        apart = touch.gap_m
-        what = "the axis is tilted against the plane" if kind == "shaft on plane" else "the axes are turned"
-        tilted = f"{what} by {angle:.4g} degrees"
-        straighten = "0 are needed: turn the part"
-        off = _APART.get(kind, "the cone is {:.4g} mm off its seat").format(1e3 * apart)
-        meet = "move a goal until they meet"
-        beside = "the faces have no length in common"
+        angle = 0.0 if contact_kind(a, b) == "cone on rim" else float(np.degrees(touch.angle_rad))
+        above = touch.gap_m
+        tilted = f"the axes are turned by {angle:.4g} degrees, 0 are needed"
+        off = f"the faces are {1e3 * above:.4g} mm off each other"
         common = touch.common
-    varied = "vary" in case.key
     if angle > _ANGLE_DEG:
-        raise _refuse(file, case, key, f"'{contact}': {tilted}", straighten)
-    if apart > _GAP_M:
-        raise _refuse(file, case, key, f"'{contact}': {off}", _ALONG if varied else meet)
-    if not common:
-        remedy = "vary by less" if varied else "move a goal until they do, or take the contact out"
-        raise _refuse(file, case, key, f"'{contact}': {beside}", remedy)
+        return tilted
+    if abs(above) > _GAP_M:
+        return off
+    return None if common else "the faces do not overlap"
 
 
-def without_play(assembly: Assembly, clearance_mm: float) -> tuple[Contact, str] | None:
-    """The first shaft that is as thick as its hole or thicker, and why: radii and clearance leave it no play."""
-    for contact in (contact for operation in assembly.operations for contact in operation.contacts):
-        a, b = map(assembly.face_of, contact)
-        play = play_mm(a, b, clearance_mm) if contact_kind(a, b) == "shaft in hole" else None
-        if play is not None and play <= _NO_PLAY_MM:
-            why = f"{1e3 * geometric_play(a, b):.4g} mm per side by their sizes"
-            fit = f" and {clearance_mm:g} mm of clearance" if assembly.is_fit(contact) else ", and neither is fit"
-            return contact, f"'{contact}': the shaft has no play in the hole, {why}{fit}"
-    return None
-
-
-def check_clearance(scenario: Scenario, clearance_mm: float) -> None:
-    """Check a clearance that is asked for in place of the scenario's.
-
-    Raises:
-        InputError: It leaves a shaft no play in its hole.
-    """
-    tight = without_play(scenario.assembly, clearance_mm)
-    if tight is not None:
-        raise InputError(f"a clearance of {clearance_mm:g} mm was given, with which {tight[1]}; give more.")
-
-
-def _check_play(scenario: Scenario, file: str) -> None:
-    """A shaft goes into a hole only if that is wider, by its size or by the clearance."""
-    tight = without_play(scenario.assembly, scenario.clearance_mm)
-    if tight is not None:
-        contact, sentence = tight
-        k = next(k for k, operation in enumerate(scenario.assembly.operations) if contact in operation.contacts)
-        number = scenario.assembly.operations[k].contacts.index(contact) + 1
-        raise InputError(
-            f"{file}, operation {k + 1}, contacts, contact {number}: {sentence}; make the hole wider, or mark it as "
-            "fit and give a clearance."
-        )
-
-
-def _check_intrusions(scenario: Scenario, file: str, case: _Case, stages: tuple[Poses, ...], apart: set[_Pair]) -> None:
-    for a, b in combinations(scenario.assembly.solids, 2):
-        _check_pair(scenario, file, case, f"parts, {b}, start", "at the start", (a, b), stages[0], apart)
+def _intrusions(scenario: Scenario, stages: tuple[Poses, ...], apart: set[_Pair]) -> _Faults:
+    """Parts that are inside each other, at the start or after an operation."""
+    solids = scenario.assembly.solids
+    for a, b in combinations(solids, 2):
+        depth = _depth(scenario, (a, b), stages[0], apart)
+        if depth > DEEP_M:
+            yield f"parts, {b}, start", f"'{a}' and '{b}' are {1e3 * depth:.4g} mm inside each other at the start"
     for k, operation in enumerate(scenario.assembly.operations):
-        for pair in product(
-            operation.moves, [part for part in scenario.assembly.solids if part not in operation.moves]
-        ):
-            place = f"after operation {k + 1}"
-            _check_pair(scenario, file, case, f"operation {k + 1}, goal", place, pair, stages[k + 1], apart)
+        for a, b in product(operation.moves, [part for part in solids if part not in operation.moves]):
+            depth = _depth(scenario, (a, b), stages[k + 1], apart)
+            if depth > DEEP_M:
+                sentence = f"'{a}' and '{b}' are {1e3 * depth:.4g} mm inside each other after operation {k + 1}"
+                yield f"operation {k + 1}, goal", sentence
 
 
-def _check_pair(
-    scenario: Scenario,
-    file: str,
-    case: _Case,
-    key: str,
-    place: str,
-    pair: tuple[str, str],
-    poses: Poses,
-    apart: set[_Pair],
-) -> None:
-    """Look at two parts, unless they were found apart before where they are to each other now."""
+def _depth(scenario: Scenario, pair: tuple[str, str], poses: Poses, apart: set[_Pair]) -> float:
+    """How deep two parts are in each other, [m]; 0 if they were found apart before where they are to each other now."""
     a, b = pair
     known = (a, b, (np.round(pose.inverse(poses[a]) @ poses[b], 9) + 0.0).tobytes())
     if known in apart:
-        return
+        return 0.0
     depth = intrusion(scenario.assembly.solids[a], poses[a], scenario.assembly.solids[b], poses[b])
-    if depth > DEEP_M:
-        sentence = f"'{a}' and '{b}' are {1e3 * depth:.4g} mm inside each other {place}"
-        raise _refuse(file, case, key, sentence, "move one of them away")
-    apart.add(known)
+    if depth <= DEEP_M:
+        apart.add(known)
+    return depth

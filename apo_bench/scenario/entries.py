@@ -1,41 +1,28 @@
-"""The tables [parts] and [[operations]] of a scenario file."""
+"""The tables [parts] and [[operations]] of a scenario file become parts and operations."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, final
+from typing import Any, NamedTuple, final
 
 import numpy as np
 
 from apo_bench.assembly import Operation
-from apo_bench.errors import InputError
+from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Array, Solid, pose
 from apo_bench.insertion.arrival import Preference
-from apo_bench.io import JsonNode
+from apo_bench.io import convert_typed
 from apo_bench.parts import load_part, part_path
-from apo_bench.parts.agreement import with_fit
 from apo_bench.parts.allowed import FACE_OR_PART_NAME
-from apo_bench.scenario.contacts import (
-    LARGEST_LENGTH_MM,
-    ContactGaps,
-    check_kinds,
-    read_contacts,
-    read_point,
-    read_pose,
-    read_span,
-    read_unit_axis,
-    refuse_name,
-    refuse_unless,
-)
+from apo_bench.parts.fit import with_fit
+from apo_bench.scenario.contacts import ContactGaps, check_kinds, read_contacts
 from apo_bench.scenario.grasps import read_grasp
 from apo_bench.scenario.scenario import Grasp, Shift, Turn
+from apo_bench.scenario.tables import AttachTable, OperationTable, PartTable, VaryTable
+from apo_bench.scenario.values import check_span, normalize_axis
 
-_MOST_PARTS = 50
-_MOST_OPERATIONS = 100
-_MOST_CONTACTS = 50
 _MOST_SHIFTS = 20
-"""In a scenario, in a scenario, of an operation, in a scenario: what is checked in a moment."""
-_MOST_UNDERSIZE_MM = 1.0
+"""In a scenario: each is checked at both ends."""
 _ARM = "arm"
 """What the robot is called in a scene."""
 
@@ -66,182 +53,113 @@ class OperationEntry(NamedTuple):
     varies: tuple[Shift | Turn, ...]
 
 
-def read_parts(node: JsonNode, folder: Path, checked: bool = True) -> Mapping[str, PartEntry]:
-    """Every part; a file that several parts share is loaded once, `checked` as in `load_part`. Paths are relative to
-    `folder`."""
-    node.require(isinstance(node.value, dict) and node.value, "at least one table [parts.NAME] is needed")
-    refuse_unless(
-        len(node.value) <= _MOST_PARTS, node, f"at most {_MOST_PARTS} parts are allowed, {len(node.value)} were given"
-    )
+def read_parts(tables: Mapping[str, Any], file: Path, checked: bool = True) -> Mapping[str, PartEntry]:
+    """Every part; a file that several parts share is loaded once, `checked` as in `load_part`.
+
+    Args:
+        file: The scenario file; paths are relative to its folder.
+    """
     solids: dict[Path, Solid] = {}
-    return {name: _part(node.child(value, name), name, folder, solids, checked) for name, value in node.value.items()}
+    parts = {}
+    for name, value in tables.items():
+        place = f"{file}, parts, {name}"
+        require(
+            FACE_OR_PART_NAME.fullmatch(name) and name != _ARM,
+            f"{place}: a part cannot be called '{name}'; use a letter, then letters, digits and underscores, and not "
+            f"'{_ARM}', as the robot is called.",
+        )
+        table = convert_typed(value, PartTable, place)
+        require(table.fixed or not table.follows_site, f"{place}, follows_site: only a fixed part can follow the site.")
+        require(table.fixed or table.start, f"{place}: the key 'start' is missing; say where the part stands.")
+        parts[name] = _part(table, place, file.parent, solids, checked)
+    return parts
 
 
-def _part(node: JsonNode, name: str, folder: Path, solids: dict[Path, Solid], checked: bool) -> PartEntry:
-    refuse_unless(
-        FACE_OR_PART_NAME.fullmatch(name),
-        node,
-        f"a part cannot be called '{name}'; use a letter, then letters, digits and underscores",
-    )
-    refuse_unless(name != _ARM, node, f"a part cannot be called '{_ARM}', as the robot is; give it another name")
-    keys = node.fields(("file",), ("fixed", "follows_site", "start", "color", "fit"))
-    fixed = "fixed" in keys and keys["fixed"].flag()
-    follows = "follows_site" in keys and keys["follows_site"].flag()
-    refuse_unless(
-        fixed or not follows,
-        keys.get("follows_site", node),
-        "only a fixed part can follow the site; say fixed = true, or leave this key out",
-    )
-    refuse_unless(
-        fixed or "start" in keys,
-        node,
-        "the key 'start' is missing; say where the part stands, such as start = { at_mm = [0, 260, 0] }",
-    )
-    path, solid = _solid(keys["file"], folder, solids, checked)
-    if "fit" in keys:
-        solid = _with_fit(keys["fit"], solid)
-    start = read_pose(keys["start"]) if "start" in keys else np.eye(4)
-    return PartEntry(path, solid, fixed, follows, start, _color(keys["color"]) if "color" in keys else None)
-
-
-def _solid(node: JsonNode, folder: Path, solids: dict[Path, Solid], checked: bool) -> tuple[Path, Solid]:
+def _part(table: PartTable, place: str, folder: Path, solids: dict[Path, Solid], checked: bool) -> PartEntry:
     try:
-        path = part_path(node.text())
-        path = path if path.is_absolute() else folder / path
+        path = folder / part_path(table.file)
         if path not in solids:
             solids[path] = load_part(path, checked)
+        solid = solids[path]
     except InputError as error:
-        if str(error).startswith(f"{node.file}, "):
-            raise
-        raise InputError(f"{node.file}, {node.key}: {error}") from error
-    return path, solids[path]
-
-
-def _with_fit(node: JsonNode, solid: Solid) -> Solid:
-    """A part with faces that recede here: face -> by how much it lies deeper in the part than its file says, mm."""
-    keys = node.fields((), (*solid.faces, *solid.rounds))
-    undersizes = {name: key.number(-_MOST_UNDERSIZE_MM, _MOST_UNDERSIZE_MM) for name, key in keys.items()}
+        raise InputError(f"{place}, file: {error}") from error
+    for face in table.fit:
+        require_known("face", face, (*solid.faces, *solid.rounds), place=f"{place}, fit")
     try:
-        return with_fit(solid, undersizes)
+        solid = with_fit(solid, table.fit) if table.fit else solid
     except InputError as error:
-        raise InputError(f"{node.file}, {node.key}: {error}") from error
+        raise InputError(f"{place}, fit: {error}") from error
+    start = np.eye(4) if table.start is None else table.start.matrix
+    return PartEntry(path, solid, table.fixed, table.follows_site, start, table.color)
 
 
-def _color(node: JsonNode) -> tuple[float, float, float]:
-    r, g, b = node.numbers(3)
-    node.require(min(r, g, b) >= 0 and max(r, g, b) <= 1, "red, green and blue from 0 to 1 are needed")
-    return float(r), float(g), float(b)
-
-
-def read_operations(node: JsonNode, parts: Mapping[str, PartEntry]) -> tuple[OperationEntry, ...]:
+def read_operations(
+    tables: Sequence[OperationTable], file: Path, parts: Mapping[str, PartEntry]
+) -> tuple[OperationEntry, ...]:
     """Every operation in order, with defaults filled in."""
-    nodes = node.items("operation")
-    refuse_unless(nodes, node, "the list is empty; give at least one [[operations]]")
-    refuse_unless(
-        len(nodes) <= _MOST_OPERATIONS,
-        node,
-        f"at most {_MOST_OPERATIONS} operations are allowed, {len(nodes)} were given",
-    )
     poses = {name: part.start for name, part in parts.items()}
     there = {name for name, part in parts.items() if part.fixed}
-    entries = []
-    for k, each in enumerate(nodes):
-        entry = _entry(each, k, parts, poses, there)
+    entries: list[OperationEntry] = []
+    for k, table in enumerate(tables):
+        place = f"{file}, operation {k + 1}"
+        entry = _entry(table, k, place, parts, poses, there)
         entries.append(entry)
-        check_kinds(each.child(None, "contacts"), [earlier.gaps for earlier in entries])
+        check_kinds(place, [earlier.gaps for earlier in entries])
         T = entry.goal @ pose.inverse(poses[entry.operation.main])
         poses |= {name: T @ poses[name] for name in entry.operation.carries} | {entry.operation.main: entry.goal}
         there |= set(entry.operation.moves)
-    refuse_unless(
-        sum(len(entry.varies) for entry in entries) <= _MOST_SHIFTS,
-        node,
-        f"at most {_MOST_SHIFTS} 'vary' are allowed in all; each is checked at both ends",
-    )
+    count = sum(len(entry.varies) for entry in entries)
+    require(count <= _MOST_SHIFTS, f"{file}, operations: at most {_MOST_SHIFTS} 'vary' are allowed, not {count}.")
     return tuple(entries)
 
 
 def _entry(
-    node: JsonNode, k: int, parts: Mapping[str, PartEntry], poses: Mapping[str, Array], there: set[str]
+    table: OperationTable,
+    k: int,
+    place: str,
+    parts: Mapping[str, PartEntry],
+    poses: Mapping[str, Array],
+    there: set[str],
 ) -> OperationEntry:
-    keys = node.fields(("move", "goal", "contacts"), ("carries", "attach", "grasp", "vary"))
-    main = _movable(keys["move"], parts)
-    carries = tuple(_movable(n, parts) for n in _items(keys["carries"], "entry")) if "carries" in keys else ()
-    for name in carries:
-        refuse_unless(
-            name != main,
-            keys["carries"],
-            f"'{name}' would carry itself, it is the moved part; leave it out of this list",
-        )
-        refuse_unless(carries.count(name) <= 1, keys["carries"], f"'{name}' stands here twice; name it once")
-        refuse_unless(
-            name in there, keys["carries"], f"'{name}' is carried before any operation has moved it; move it first"
-        )
-    goal = read_pose(keys["goal"])
+    main = table.move
+    _check_movable(main, f"{place}, move", parts)
+    for name in table.carries:
+        at = f"{place}, carries"
+        _check_movable(name, at, parts)
+        require(name != main, f"{at}: '{name}' would carry itself, it is the moved part.")
+        require(table.carries.count(name) == 1, f"{at}: '{name}' stands here twice; name it once.")
+        require(name in there, f"{at}: '{name}' is carried before any operation has moved it; move it first.")
     solids = {name: part.solid for name, part in parts.items()}
-    contacts = _items(keys["contacts"], "contact")
-    refuse_unless(
-        len(contacts) <= _MOST_CONTACTS,
-        keys["contacts"],
-        f"at most {_MOST_CONTACTS} contacts are allowed, {len(contacts)} were given",
-    )
-    gaps = read_contacts(contacts, main, carries, solids, there)
-    refuse_unless(
-        gaps, keys["contacts"], 'no contact was given; say what the part touches, such as [["bottom", "table.top"]]'
-    )
+    gaps = read_contacts(table.contacts, place, (main, *table.carries), solids, there)
+    varies = table.vary if isinstance(table.vary, tuple) else (table.vary,)
     return OperationEntry(
-        Operation(main, tuple(gaps), carries),
-        gaps,
-        goal,
-        _attach(keys["attach"]) if "attach" in keys else Preference(),
-        read_grasp(keys.get("grasp"), node, parts[main].solid, poses[main]),
-        _varies(keys["vary"], k) if "vary" in keys else (),
+        operation=Operation(main, tuple(gaps), table.carries),
+        gaps=gaps,
+        goal=table.goal.matrix,
+        attach=_attach(table.attach, f"{place}, attach"),
+        grasp=read_grasp(table.grasp, f"{place}, grasp", main, solids[main], poses[main]),
+        varies=tuple(_vary(each, k, f"{place}, vary") for each in varies),
     )
 
 
-def _items(node: JsonNode, name: str) -> tuple[JsonNode, ...]:
-    """The entries of a list within an operation, with the operation in their key."""
-    return tuple(JsonNode(each.value, each.file, f"{node.key}, {each.key}") for each in node.items(name))
+def _check_movable(name: str, place: str, parts: Mapping[str, PartEntry]) -> None:
+    require_known("part", name, parts, place=place)
+    require(not parts[name].fixed, f"{place}: '{name}' is fixed and cannot be moved; move another part.")
 
 
-def _movable(node: JsonNode, parts: Mapping[str, PartEntry]) -> str:
-    name = node.text()
-    if name not in parts:
-        refuse_name(node, "part", name, parts)
-    refuse_unless(
-        not parts[name].fixed,
-        node,
-        f"'{name}' is fixed and cannot be moved; move another part, or take fixed = true away",
-    )
-    return name
-
-
-def _attach(node: JsonNode) -> Preference:
+def _attach(table: AttachTable, place: str) -> Preference:
     """What is stated of the line to the goal."""
-    keys = node.fields((), ("along", "travel_mm"))
-    direction = read_unit_axis(keys["along"]) if "along" in keys else None
-    travel_m = 1e-3 * keys["travel_mm"].number(0.0, above=True) if "travel_mm" in keys else None
-    keys.get("travel_mm", node).require(
-        travel_m is None or travel_m <= 1e-3 * LARGEST_LENGTH_MM,
-        f"a length of at most {LARGEST_LENGTH_MM:g} mm is needed",
-    )
-    return Preference(direction, travel_m)
+    direction = None if table.along is None else normalize_axis(table.along, f"{place}, along")
+    return Preference(direction, None if table.travel_mm is None else 1e-3 * table.travel_mm)
 
 
-def _varies(node: JsonNode, operation: int) -> tuple[Shift | Turn, ...]:
-    many = node.items(node.key) if isinstance(node.value, list) else (node,)
-    return tuple(_vary(each, operation) for each in many)
-
-
-def _vary(node: JsonNode, operation: int) -> Shift | Turn:
-    if isinstance(node.value, dict) and "about" in node.value:
-        return _turn(node, operation)
-    keys = node.fields(("along", "mm"))
-    low, high = read_span(keys["mm"], -LARGEST_LENGTH_MM, LARGEST_LENGTH_MM)
-    return Shift(operation, read_unit_axis(keys["along"]), 1e-3 * low, 1e-3 * high)
-
-
-def _turn(node: JsonNode, operation: int) -> Turn:
-    keys = node.fields(("about", "deg"), ("at_mm",))
-    low, high = np.radians(read_span(keys["deg"], -360.0, 360.0))
-    point = read_point(keys["at_mm"]) if "at_mm" in keys else np.zeros(3)
-    return Turn(operation, read_unit_axis(keys["about"]), point, float(low), float(high))
+def _vary(table: VaryTable, operation: int, place: str) -> Shift | Turn:
+    """A shift or a turn that each trial draws."""
+    if table.along is not None and table.mm is not None and table.about is None and table.deg is None:
+        low, high = check_span(table.mm, f"{place}, mm")
+        return Shift(operation, normalize_axis(table.along, f"{place}, along"), 1e-3 * low, 1e-3 * high)
+    if table.about is None or table.deg is None or table.along is not None or table.mm is not None:
+        raise InputError(f"{place}: 'along' with 'mm', or 'about' with 'deg' and 'at_mm', are needed.")
+    low, high = np.radians(check_span(table.deg, f"{place}, deg"))
+    axis = normalize_axis(table.about, f"{place}, about")
+    return Turn(operation, axis, 1e-3 * np.array(table.at_mm), float(low), float(high))

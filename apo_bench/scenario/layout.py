@@ -1,21 +1,12 @@
-"""The truth of a trial: where a seed puts the assembly, and how far it shifts and turns what no contact fixes; and the
-nominal one, in macros, with the line on which each part comes to its goal.
-
-Many layouts of a scenario at once.
-"""
+"""The truth of a trial: where a seed puts the assembly, and how far it shifts and turns what no contact fixes."""
 
 from collections.abc import Sequence
-from dataclasses import replace
-from functools import lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Layout, Poses
-from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array, extent, physical_pieces, pose
-from apo_bench.insertion.arrival import Arrival, OperationMacros, Preference, understand
 from apo_bench.scenario.scenario import Scenario
 
 
@@ -87,102 +78,9 @@ def _between(low: float, high: float, unit: float) -> float:
     return 0.5 * (low + high) + 0.5 * (high - low) * unit
 
 
-@lru_cache(maxsize=32)
-def nominal_operations(scenario: Scenario) -> tuple[OperationMacros, ...]:
-    """The operations of a scenario at its nominal goals."""
-    lines = [attach.stated for attach in scenario.attach]
-    return understand(scenario.assembly, nominal_start(scenario), scenario.goals, lines)
-
-
 def nominal_start(scenario: Scenario) -> Poses:
     """Where every part starts, in the frame of the assembly, for the site in the middle of where it may be."""
     x, y = scenario.site.center_m
     low, high = scenario.site.yaw_rad
     back = pose.inverse(pose.at((x, y, 0.0)) @ pose.exp([0.0, 0.0, 0.0, 0.0, 0.0, (low + high) / 2]))
     return {part: T if part in scenario.follows_site else back @ T for part, T in scenario.start.items()}
-
-
-_THROUGH = 1e-3
-"""Cosine to the normal of a face above which a direction leads through it."""
-
-
-def with_attach_lines(scenario: Scenario, stated: Sequence[Preference], file: str) -> Scenario:
-    """The scenario with the line of attach of every operation.
-
-    Args:
-        stated: What the file says of them.
-
-    Raises:
-        InputError: A stated direction leads through what the part shall touch, or a stated line begins inside of it.
-    """
-    operations = understand(scenario.assembly, nominal_start(scenario), scenario.goals, stated)
-    for each, preference in zip(operations, stated, strict=True):
-        _check(each.after, preference, f"{file}, operation {each.operation + 1}, attach", each.main)
-    return replace(scenario, attach=tuple(each.after.line for each in operations))
-
-
-def _check(after: Arrival, stated: Preference, key: str, main: str) -> None:
-    """Whether a stated line can be one at all."""
-    if stated.direction is not None:
-        way = after.T[:3, :3] @ stated.direction
-        through = max(after.touched, key=lambda each: float(each.normal @ way), default=None)
-        if through is not None and through.normal @ way > _THROUGH:
-            face = next(of for of in through.contact if of.part == through.rests)
-            raise InputError(
-                f"{key}, along: '{main}' would come through '{face}', which it shall touch; "
-                f"give a direction that leads onto that face or along it, or leave 'along' out."
-            )
-    if stated.travel_m is not None and after.chain.way is not None:
-        least = after.chain.way.length_m
-        level = abs(after.chain.way.direction[2]) < 0.5
-        require(
-            not level or stated.travel_m >= least - 1e-6,
-            f"{key}, travel_mm: {1e3 * stated.travel_m:g} mm before its goal '{main}' would still be inside of "
-            f"what it is put into; give at least {np.ceil(1e3 * least - 1e-6):g}, or leave 'travel_mm' out.",
-        )
-
-
-class Layouts(NamedTuple):
-    """The truth of many trials."""
-
-    goals: Array
-    """(n, k, 4, 4): of k operations, world frame, [m]."""
-    start: Poses
-    """Part -> (n, 4, 4)."""
-
-
-def draw_layouts(scenario: Scenario, rng: np.random.Generator, n: int, clearance_mm: float | None = None) -> Layouts:
-    """Layouts, drawn as `draw_layout` draws them one after the other: equal up to rounding.
-
-    Args:
-        clearance_mm: As in `draw_layout`.
-    """
-    site = scenario.site
-    low, high = np.transpose(
-        [
-            *[(c - half, c + half) for c, half in zip(site.center_m, site.spread_m, strict=True)],
-            site.yaw_rad,
-            *[(shift.low_m, shift.high_m) for shift in scenario.shifts],
-            *[(turn.low_rad, turn.high_rad) for turn in scenario.turns],
-        ]
-    )
-    drawn = (low + high) / 2 + (high - low) / 2 * rng.uniform(-1.0, 1.0, (n, len(low)))
-    place = np.zeros((n, 6))
-    place[:, [0, 1, 5]] = drawn[:, :3]
-    T_world_assembly = pose.exp(place * [0, 0, 0, 1, 1, 1])
-    T_world_assembly[:, :3, 3] = place[:, :3]
-    fit = scenario.clearance_mm if clearance_mm is None else clearance_mm
-    nominal = layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=fit)
-    goals = T_world_assembly[:, None] @ nominal.goals
-    lengths, angles = np.split(drawn[:, 3:], [len(scenario.shifts)], axis=1)
-    for shift, length in zip(scenario.shifts, lengths.T, strict=True):
-        goals[:, shift.operation] = goals[:, shift.operation] @ pose.exp(np.outer(length, [*shift.axis, 0.0, 0.0, 0.0]))
-    for turn, angle in zip(scenario.turns, angles.T, strict=True):
-        there = pose.at(turn.point)
-        by = there @ pose.exp(np.outer(angle, [0.0, 0.0, 0.0, *turn.axis])) @ pose.inverse(there)
-        goals[:, turn.operation] = goals[:, turn.operation] @ by
-    still = np.broadcast_to(np.eye(4), (n, 4, 4))
-    return Layouts(
-        goals,
-        {part: (T_world_assembly if part in scenario.follows_site else still) @ T for part, T in nominal.start.items()},
-    )

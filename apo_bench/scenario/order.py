@@ -4,8 +4,8 @@ together, nothing goes twice, nothing is left in the air.
 
 import numpy as np
 
-from apo_bench.assembly import Assembly, Contact, Operation, Poses
-from apo_bench.errors import InputError, require
+from apo_bench.assembly import Assembly, Contact, Poses
+from apo_bench.errors import require
 from apo_bench.geometry import TOUCH_M, drop, drop_depths
 
 _SAME = 1e-9
@@ -34,12 +34,6 @@ def check_order(assembly: Assembly, stages: tuple[Poses, ...], file: str) -> Non
             f"{file}, operation {k + 1}, goal: '{operation.main}' stands there already; give another goal, or take "
             "this operation out.",
         )
-        earlier = _put_aside_before(assembly, k)
-        if earlier is not None:
-            raise InputError(
-                f"{file}, operation {k + 1}, move: operation {earlier + 1} has already taken '{operation.main}' away, "
-                "and nothing is put against it after that; take one of the two operations out."
-            )
         left = _left_in_the_air(assembly, k)
         require(
             left is None,
@@ -68,28 +62,6 @@ def _loose(assembly: Assembly, k: int) -> str | None:
 
 def _ends(contact: Contact) -> set[str]:
     return {contact.manipulated.part, contact.environment.part}
-
-
-def _put_aside_before(assembly: Assembly, k: int) -> int | None:
-    """The operation that had already put aside what operation k puts aside."""
-    main = assembly.operations[k].main
-    last = max((j for j in range(k) if main in assembly.operations[j].moves), default=None)
-    if last is None or not (_puts_aside(assembly, last, main) and _puts_aside(assembly, k, main)):
-        return None
-    return last
-
-
-def _puts_aside(assembly: Assembly, k: int, part: str) -> bool:
-    """Whether operation k only moves a part away: not for the first time, alone, and nothing meets it afterwards."""
-    operation = assembly.operations[k]
-    again = any(part in earlier.moves for earlier in assembly.operations[:k])
-    alone = operation.moves == (part,) and _met(operation) <= assembly.fixed
-    return again and alone and not any(part in _met(later) for later in assembly.operations[k + 1 :])
-
-
-def _met(operation: Operation) -> set[str]:
-    """The parts that are touched or taken along."""
-    return {contact.environment.part for contact in operation.contacts} | {*operation.carries}
 
 
 AIR_M = 1e-4

@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly import Plan
-from apo_bench.files.json_forms import TO_MM_DEG, RobotFrames
+from apo_bench.files.json_forms import TO_MM_DEG
+from apo_bench.files.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
 from apo_bench.records import WrenchNoise, wrench_noise
 from apo_bench.show.robot_form import pose_form, tip_form

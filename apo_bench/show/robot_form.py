@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from apo_bench.assembly import Plan, placements
-from apo_bench.files.json_forms import RobotFrames
+from apo_bench.files.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
 from apo_bench.insertion.macros import UP
 from apo_bench.scenario.scenario import Grasp, Scenario

@@ -246,8 +246,8 @@ def test_a_corrector_is_not_believed(capsys: pytest.CaptureFixture[str]) -> None
 
 
 def test_no_simulator_is_needed() -> None:
-    """Nor what draws; the commands read, correct and print in a process that has none."""
-    missing = ("mujoco", "mink", "dm_control", "matplotlib", "apo_bench.simulation")
+    """Nor what draws; the commands read, correct and print without them. Part files alone are read by MuJoCo."""
+    missing = ("mink", "dm_control", "matplotlib", "apo_bench.simulation")
     every = (asked(SEEN), asked(SEEN, "--json"), ("explain", "stick_in_tower", "--observation", str(SEEN)))
     code = f"import sys\nfor name in {missing!r}: sys.modules[name] = None\nfrom apo_bench.cli.app import main\n"
     done = _python(f"{code}for asked in {[list(one) for one in every]!r}: print('ended with', main(asked))")

@@ -14,8 +14,9 @@ from apo_bench.assembly import Step, placements
 from apo_bench.cli import app as cli
 from apo_bench.geometry import pose
 from apo_bench.insertion.arrival import turning_state, understand
+from apo_bench.scenario.attach_lines import nominal_operations
 from apo_bench.scenario.file import scenario_names
-from apo_bench.scenario.layout import nominal_operations, nominal_start
+from apo_bench.scenario.layout import nominal_start
 from apo_bench.show.plan_text import direction, plan_lines, plan_lines_form, plan_text
 from apo_bench.simulation.execution.prepare import moves
 from tests import scenes

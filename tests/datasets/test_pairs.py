@@ -18,7 +18,7 @@ from apo_bench.observation.models.symmetric import AnyTurn
 from apo_bench.observation.noise import NOISES, Level, make_noise
 from apo_bench.observation.noise_file import presets
 from apo_bench.scenario import careless_covariance, scenario_names, spread_error
-from apo_bench.scenario.layout import draw_layouts
+from apo_bench.scenario.layouts import draw_layouts
 from apo_bench.scoring.track import read_tracks
 from apo_bench.trial.stages import stream
 

@@ -15,7 +15,7 @@ from apo_bench.drafting.upright import drafted
 from apo_bench.drafting.writing import scenario_text, write_scenario
 from apo_bench.geometry import Solid, intrusion, physical_pieces
 from apo_bench.parts import load_part
-from apo_bench.parts.agreement import with_fit
+from apo_bench.parts.fit import with_fit
 from apo_bench.parts.making import bore, extrude, join, polygon, rectangle, shaft, write_part
 from apo_bench.scenario.file import load_scenario
 from tests.drafting.test_blocked import FLOOR, made

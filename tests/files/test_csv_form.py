@@ -80,53 +80,22 @@ def test_json_and_csv_say_the_same(tmp_path: Path) -> None:
     assert all(again.start[part] == pytest.approx(T, abs=1e-15) for part, T in seen.start.items())
 
 
-def test_json_far_beyond_everything_is_refused(tmp_path: Path) -> None:
-    form = files.observation_form(
-        read_observation_file(written(tmp_path, *ROWS), "stick_in_tower").observation, "stick_in_tower"
-    )
-    form["operations"][1]["position_mm"][2] = 1e200
-    path = tmp_path / "far.json"
-    files.write_form(form, path)
-    with pytest.raises(
-        InputError, match=r"operation 2, position_mm: numbers of at most 1e\+07 are needed, 1e\+200 was"
-    ):
-        apo_bench.read_observation(path, SCENARIO)
-
-
-@pytest.mark.parametrize("play", ["0.4", "0"])
-def test_play_is_one_number(tmp_path: Path, play: str) -> None:
-    stated = [f"{HEADER},play_mm", *(f"{row},{play if i else ''}" for i, row in enumerate(ROWS[1:]))]
-    assert read_table(written(tmp_path, *stated), SCENARIO)[0].play_m == pytest.approx(float(play) * 1e-3)
-    two = [f"{HEADER},play_mm", *(f"{row},0.{i}" for i, row in enumerate(ROWS[1:]))]
-    with pytest.raises(InputError, match="line 3, column play_mm: one length for all rows is needed, line 2 says"):
-        read_table(written(tmp_path, *two), SCENARIO)
-
-
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({0: ""}, "unknown column '1'"),
-        ({0: HEADER.replace("x_mm", "x")}, "line 1: unknown column 'x'; did you mean 'x_m"),
-        ({0: HEADER.replace("qw", "w")}, "unknown column 'w'; did you mean 'qw'"),
+        ({0: HEADER.replace("x_mm", "x")}, "line 1: unknown column 'x'; did you mean"),
         ({0: HEADER.replace(",z_mm", "")}, "line 1: the column 'z_mm' is missing"),
-        ({0: HEADER.replace("y_mm", "x_m")}, "line 1: the columns 'x_mm' and 'x_m' say the same; keep one."),
+        ({0: HEADER.replace("y_mm", "x_m")}, "line 1: another column says the same as 'x_mm'; keep one."),
         ({0: HEADER.replace(",", ";")}, "line 1: columns are separated by commas; this file uses ';', so save it with"),
-        ({0: HEADER.replace(",", "\t")}, "columns are separated by commas; this file uses tabs"),
-        ({0: HEADER.replace("y_mm", "y_m")}, "the columns 'x_mm' and 'y_m' are of different units; give all three"),
-        ({2: "2,castle2,121,20,80,0,1,0"}, "line 3: 9 cells are needed, one for each column, 8 were given."),
-        ({2: "2,castle2,121,20,80,0,1,0,0,9"}, "line 3: 9 cells are needed, one for each column, 10 were given."),
+        ({0: HEADER.replace("y_mm", "y_m")}, "the columns of a position are of different units"),
+        ({2: "2,castle2,121,20,80,0,1,0"}, "line 3: 9 cells are needed, 8 were given."),
         ({2: "2,castle2,nan,20,80,0,1,0,0"}, "line 3, column x_mm: a number of at most 1e+07 is needed, 'nan'"),
-        ({2: "2,castle2,1,20,inf,0,1,0,0"}, "line 3, column z_mm: a number of at most 1e+07 is needed, 'inf'"),
-        ({2: "2,castle2,1,20,1e300,0,1,0,0"}, "line 3, column z_mm: a number of at most 1e+07 is needed, '1e300'"),
         ({2: "2,castle2,1,,80,0,1,0,0"}, "line 3, column y_mm: a number of at most 1e+07 is needed, nothing was given"),
         ({2: "2,castle2,1,2,80,0,0,0,0"}, "line 3, columns qw to qz: a quaternion of length 1 (within 0.001)"),
-        ({2: "2,castle2,1,2,80,0,1.1,0,0"}, "one of length 1.1 was given; divide it by its length."),
         ({2: "2,stick,121,20,80,0,1,0,0"}, "line 3, column part: 'castle2' is needed, the part that operation 2 moves"),
         ({2: "4,castle2,121,20,80,0,1,0,0"}, "line 3, column operation: a whole number from 1 to 3 is needed, '4'"),
-        ({2: "-2,castle2,121,20,80,0,1,0,0"}, "column operation: a whole number from 1 to 3 is needed, '-2'"),
-        ({2: "\u00b2,castle2,121,20,80,0,1,0,0"}, "column operation: a whole number from 1 to 3 is needed"),
-        ({2: ROWS[1]}, "line 3, column operation: every operation stands once, this one is in line 2 already, '1'"),
-        ({2: ""}, "the row of operation 2 (castle2) is missing; give one row for each of the 3 operations."),
+        ({2: ROWS[1]}, "line 3, column operation: every operation once is needed, '1'"),
+        ({2: ""}, "the row of operation 2 (castle2) is missing."),
         ({2: '2,"castle2,121'}, "this is not a CSV file"),
         ({0: "", 1: "", 2: "", 3: ""}, "the file is empty; its first line names the columns: operation, part, x_mm"),
     ],
@@ -146,14 +115,10 @@ def test_what_is_wrong_is_said_in_one_sentence(tmp_path: Path, change: dict[int,
     ("column", "cell", "message"),
     [
         ("deviation_mm", "0", "column deviation_mm: a standard deviation from 0.0001 to 10000 is needed, '0' was"),
-        ("deviation_mm", "-1", "column deviation_mm: a standard deviation from 0.0001 to 10000 is needed"),
-        ("deviation_mm", "0.00009", "column deviation_mm: a standard deviation from 0.0001 to 10000 is needed"),
         ("deviation_m", "11", "column deviation_m: a standard deviation from 1e-07 to 10 is needed, '11' was given."),
-        ("deviation_mm", "inf", "column deviation_mm: a standard deviation from 0.0001 to 10000 is needed"),
-        ("deviation_mm", "١٢", "column deviation_mm: a number is needed, '١٢' was given."),
         ("deviation_mm", "nan", "column deviation_mm: a number is needed, 'nan' was given."),
-        ("deviation_deg", "181", "column deviation_deg: a standard deviation from 0.0001 to 180 is needed"),
         ("seen", "maybe", "column seen: true or false is needed, 'maybe' was given."),
+        ("play_mm", "-0.3", "column play_mm: one length from 0 for all rows is needed, '-0.3' was given"),
     ],
 )
 def test_what_may_be_left_out_is_checked_if_it_is_not(tmp_path: Path, column: str, cell: str, message: str) -> None:
@@ -161,21 +126,6 @@ def test_what_may_be_left_out_is_checked_if_it_is_not(tmp_path: Path, column: st
     with pytest.raises(InputError) as raised:
         read_table(path, SCENARIO)
     assert f"line 2, {message}" in str(raised.value)
-
-
-def test_files_that_are_none(tmp_path: Path) -> None:
-    for make, message in (
-        (lambda p: None, "cannot be read"),
-        (lambda p: p.mkdir(), "a folder was given"),
-        (lambda p: p.write_bytes(b"\xff\xfe1"), "is not UTF-8 text"),
-        (lambda p: p.write_bytes(b"x" * 1_000_001), "larger than 1 MB"),
-        (lambda p: p.write_bytes(b"\x00" * 10), "unknown column"),
-        (lambda p: p.write_bytes(b""), "the file is empty"),
-    ):
-        path = tmp_path / f"{len(list(tmp_path.iterdir()))}.csv"
-        make(path)
-        with pytest.raises(InputError, match=message):
-            read_table(path, SCENARIO)
 
 
 @pytest.mark.parametrize(

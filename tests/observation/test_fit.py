@@ -14,7 +14,8 @@ from scipy.stats import kstest
 
 from apo_bench import InputError
 from apo_bench.cli.app import main
-from apo_bench.files.bop import read_results, read_truth
+from apo_bench.files.bop import read_results
+from apo_bench.files.bop_truth import read_truth
 from apo_bench.observation.fitting.fit import fit_noise, fit_split, goodness_of_fit, outliers_by_score
 from apo_bench.observation.fitting.quantiles import LOWER_QUARTILE_OF_THREE, round_split, split_of_quantiles
 from apo_bench.observation.models.empirical import residuals_text

@@ -15,7 +15,8 @@ from scipy.stats import chi2
 from apo_bench import InputError, Observation, TrialSettings, observe
 from apo_bench.cli.app import main
 from apo_bench.envs.spaces import LARGEST_DEVIATION
-from apo_bench.files.bop import read_results, read_truth
+from apo_bench.files.bop import read_results
+from apo_bench.files.bop_truth import read_truth
 from apo_bench.geometry import Array, pose
 from apo_bench.observation.models.camera import Camera
 from apo_bench.observation.models.displaced import COVARIANCE_FLOOR
@@ -302,6 +303,9 @@ GOOD = noise_text(read_noise(presets()["megapose-lmo"])[0])
         ("missed_rate = 0.16609", "mised_rate = 0.1", "unknown key 'mised_rate'; did you mean 'missed_rate'"),
         ("along_scale_mm = 10.972", "along_scale_mm = 51", "along_scale_mm: a number from 0.0045 to 50 is needed"),
         ("along_scale_mm = 10.972\n", "", "the key 'along_scale_mm' is missing"),
+        ("along_degrees_of_freedom = 0.96916", "along_degrees_of_freedom = 0.1", "from 0.5 on, or inf, is needed"),
+        ("limit_mm = 50", "limit_mm = inf", "limit_mm: a number from 0.001 to 1000 is needed"),
+        ("[turn]", "[turns]", "unknown key 'turns'; did you mean 'turn'"),
         ("[turn]", "[turn", "this is not TOML: .*line"),
     ],
 )

@@ -1,4 +1,4 @@
-"""200 random solids of convex pieces with holes: free radius, volume and parameters of faces against formulas."""
+"""Random solids of convex pieces with holes: free radius, volume and parameters of faces against formulas."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import Solid
 from apo_bench.parts import load_part
-from apo_bench.parts.load import check_matter
+from apo_bench.parts.checking import check_matter
 from apo_bench.parts.making import (
     Body,
     Edge,
@@ -170,11 +170,11 @@ def check_walls(solid: Solid, wanted: Wanted) -> None:
         assert face.outline @ n == pytest.approx(np.full(len(face.outline), 1e-3 * distance + n @ t), abs=1e-10)
 
 
-@pytest.mark.parametrize("seed", range(100))
+@pytest.mark.parametrize("seed", range(45))
 def test_random_solids_are_as_their_formulas_say(seed: int, tmp_path: Path):
     wanted = random_solid(seed)
     solid = solid_of("thing", wanted.body)
-    if seed % 50 < 1:
+    if seed % 15 < 1:
         solid = load_part(write_part("thing", wanted.body, tmp_path, source="a test", licence="Apache-2.0"))
     assert 1e9 * solid.volume == pytest.approx(wanted.volume, rel=1e-9)
     check_walls(solid, wanted)

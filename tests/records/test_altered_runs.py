@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError
-from apo_bench.io.words import clean
+from apo_bench.io import clean
 from apo_bench.records.run.run_file import read_run
 from apo_bench.records.run.run_folder import report_rows
 from apo_bench.report import report as reports

@@ -17,7 +17,7 @@ from pyarrow import parquet
 from apo_bench import InputError
 from apo_bench.cli import app as cli
 from apo_bench.cli.terminal import print_cells, print_report
-from apo_bench.io.words import clean
+from apo_bench.io import clean
 from apo_bench.records.run.replay_command import own_code, replay_command
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.report import report as reports

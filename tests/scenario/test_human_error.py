@@ -13,7 +13,8 @@ from apo_bench import Layout, Scenario, draw_layout, load_scenario
 from apo_bench.assembly import placements
 from apo_bench.geometry import pose
 from apo_bench.scenario.file import scenario_names
-from apo_bench.scenario.scenario import NOTHING_M, Carelessness, _displaced, careless_covariance, spread_error
+from apo_bench.scenario.human_error import NOTHING_M, _displaced, careless_covariance, spread_error
+from apo_bench.scenario.scenario import Carelessness
 from tests import rounds
 from tests.scenes import Scene
 

@@ -65,26 +65,6 @@ def test_the_scenes_of_the_paper_are_those_of_the_paper(name: str):
     assert scenario.goals == pytest.approx(example.goals, abs=1e-12)
 
 
-def test_all_of_the_paper_are_shipped():
-    assert set(NAMES) == {*EXAMPLES, "block_on_block", "fixture_alignment"}
-
-
-def test_who_is_careless_and_how():
-    """Along y at operation 2, along x where two pockets decide; nobody in the first figures."""
-    axes = {name: s.careless and (s.careless.operation, s.careless.axis.tolist()) for name, s in SCENARIOS.items()}
-    along_y = (1, [0.0, 1.0, 0.0])
-    assert axes == {
-        "block_on_block": None,
-        "bridge_cycle": None,
-        "fixture_alignment": None,
-        "stick_in_tower": along_y,
-        "stick_on_castles": along_y,
-        "carried_bridge": along_y,
-        "vanished_fixture": along_y,
-        "pocket_table": (1, [1.0, 0.0, 0.0]),
-    }
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_contacts_are_closed_at_the_goals_of_the_file(name: str):
     scenario = SCENARIOS[name]
@@ -118,18 +98,6 @@ def test_whatever_is_drawn_contacts_stay_closed_and_parts_apart(name: str):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_the_overlap_at_the_ends_of_every_shift(name: str):
-    scenario = SCENARIOS[name]
-    assembly = scenario.assembly
-    nominal = placements(assembly, scenario.start, scenario.goals)
-    for shifts in product(*[(s.low_m, s.high_m) for s in scenario.shifts]):
-        stages = placements(assembly, scenario.start, layout_at(scenario, 0, 0, 0, shifts).goals)
-        for k, operation in enumerate(assembly.operations):
-            for contact in operation.contacts:
-                assert overlap_m2(assembly, contact, stages[k]) >= 0.6 * overlap_m2(assembly, contact, nominal[k])
-
-
-@pytest.mark.parametrize("name", NAMES)
 def test_draws_fill_their_ranges_and_stay_inside(name: str):
     scenario = SCENARIOS[name]
     site = scenario.site
@@ -148,14 +116,6 @@ def test_draws_fill_their_ranges_and_stay_inside(name: str):
         assert np.ptp(values) > 1.8 * width, "200 uniform draws come near both ends"
         assert abs(values.mean()) < 4 * width / np.sqrt(3 * len(values))
     assert np.abs(np.corrcoef(drawn) - np.eye(len(drawn))).max() < 0.3, "draws are independent"
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_the_goals_of_the_file_are_not_the_truth(name: str):
-    scenario = SCENARIOS[name]
-    for seed in GENERATOR_SEEDS:
-        goals = draw_layout(scenario, np.random.default_rng([seed, 0])).goals
-        assert np.linalg.norm(goals[0] - scenario.goals[0]) > 5e-3
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -184,12 +144,6 @@ def test_only_fixed_parts_that_follow_the_site_start_elsewhere():
     layout = draw_layout(scenario, np.random.default_rng([3, 0]), clearance_mm=0.0)
     assert np.allclose(layout.start["table"] @ scenario.goals[0], layout.goals[0], atol=1e-15)
     assert (layout.start["stick"] == scenario.start["stick"]).all()
-
-
-def test_a_scenario_without_a_site_stays_where_its_file_says():
-    scenario = replace(SCENARIOS["stick_in_tower"], site=Site(), shifts=())
-    layout = draw_layout(scenario, np.random.default_rng([3, 0]))
-    assert (layout.goals == scenario.goals).all()
 
 
 def footprint(solid: Solid, T: Array):

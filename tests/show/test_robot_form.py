@@ -10,7 +10,7 @@ import pytest
 
 from apo_bench import Plan, load_scenario
 from apo_bench.assembly import Step
-from apo_bench.files.json_forms import RobotFrames
+from apo_bench.files.robot_frames import RobotFrames
 from apo_bench.geometry import Array, pose
 from apo_bench.scenario.layout import layout_at
 from apo_bench.show.plan_text import plan_lines

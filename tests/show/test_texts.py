@@ -146,7 +146,8 @@ def test_infinite_numbers_of_a_correction_are_null() -> None:
 
 
 def test_estimates_left_over_are_counted_per_image(tmp_path: Path) -> None:
-    from apo_bench.files.bop import read_results, read_truth
+    from apo_bench.files.bop import read_results
+    from apo_bench.files.bop_truth import read_truth
     from apo_bench.observation.models.residuals import match_residuals
 
     drawn = bop_made.draw(600, bop_made.Known(), np.random.default_rng(5))

@@ -8,7 +8,7 @@ import pytest
 from apo_bench import Plan, Scenario, build_scene, draw_layout, load_scenario
 from apo_bench.assembly import Step
 from apo_bench.geometry import pose
-from apo_bench.scenario.layout import nominal_operations
+from apo_bench.scenario.attach_lines import nominal_operations
 from apo_bench.trial.stages import Attempt, replay_and_judge
 
 CUBE = (Path(__file__).parents[2] / "assets" / "parts" / "cube.xml").read_text(encoding="utf-8")

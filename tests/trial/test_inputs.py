@@ -34,6 +34,15 @@ def note(event, arguments):
 import mujoco
 import apo_bench.resources
 apo_bench.resources.__file__ = str(home / "apo_bench" / "resources.py")  # assets and scenarios are those of the copy
+from apo_bench.mjcf import part_file
+
+add_picture = part_file.add_picture
+
+def add_and_note(spec, body, picture):
+    opened.add(os.path.realpath(picture.file))
+    add_picture(spec, body, picture)
+
+part_file.add_picture = add_and_note
 from apo_bench import TrialSettings
 from apo_bench.trial import inputs
 from apo_bench.trial.fingerprint import content_hash, spec_hash

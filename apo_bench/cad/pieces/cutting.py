@@ -15,7 +15,7 @@ from apo_bench.cad.solids.raw_solid import RawSolid, Region
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Hull
 from apo_bench.parts.allowed import MOST_PIECES
-from apo_bench.parts.load import touching_groups
+from apo_bench.parts.checking import touching_groups
 
 _MOST_TRIANGLES = 20_000
 _MOUTH_MM = 1.0
@@ -114,7 +114,7 @@ def _without_crumbs(pieces: list[Hull], most: float) -> tuple[list[Hull], list[f
     whether nothing else hangs on nothing."""
     from scipy.spatial import ConvexHull
 
-    groups = sorted(touching_groups(pieces) or (), key=len)
+    groups = sorted(touching_groups(pieces), key=len)
     lost = [(group, sum(ConvexHull(1e3 * pieces[k].corners).volume for k in group)) for group in groups[:-1]]
     crumbs = [(group, volume) for group, volume in lost if volume < most]
     gone = {k for group, _ in crumbs for k in group}

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from shapely import Polygon, box, unary_union
+from shapely import Point, Polygon, box, unary_union
 
 from apo_bench.geometry import Array, polygons_of, rings_of, straightened
 
@@ -88,16 +88,9 @@ def bore_cell(free: Any, at: Array, radius: float, others: list[tuple[Array, flo
         if cell.geom_type != "Polygon" or cell.interiors:
             continue
         corners = straightened(rings_of(cell, 1.0)[0])
-        if is_convex(corners) and _holds(corners, at, radius):
+        if is_convex(corners) and cell.contains(Point(at)) and cell.exterior.distance(Point(at)) > radius + _SAME_MM:
             return corners
     return None
-
-
-def _holds(cell: Array, at: Array, radius: float) -> bool:
-    """Whether a circle lies inside of a convex area."""
-    along = np.roll(cell, -1, axis=0) - cell
-    n = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
-    return bool((((cell - at) * n).sum(axis=1) > radius + _SAME_MM).all())
 
 
 def clipped(ring: Array, n: Array, d: float) -> Array:

@@ -10,9 +10,10 @@ from shapely import Polygon, unary_union
 
 from apo_bench.arguments import check_arguments
 from apo_bench.geometry import WHOLE_TURN, Array, Face, Hull, RoundFace, straightened
-from apo_bench.parts.making.body import Body, extruded, summed
+from apo_bench.parts.making.body import Body
 from apo_bench.parts.making.cells import bands, bore_cell, clipped, convex_cells, wedges
 from apo_bench.parts.making.frustums import Frustum, at_height, chamfered, heights_of, prism, raised, tangent, without
+from apo_bench.parts.making.moments import extruded, summed
 from apo_bench.parts.making.outline import Outline, arc_of, circle, goes_on, outline_moments, receding, ring
 
 _NARROW_MM = 6e-3

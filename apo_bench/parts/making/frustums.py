@@ -7,7 +7,7 @@ from typing import final
 import numpy as np
 
 from apo_bench.geometry import Array, RoundFace
-from apo_bench.parts.making.body import Moments, frustum_moments, summed
+from apo_bench.parts.making.moments import Moments, frustum_moments, summed
 from apo_bench.parts.making.outline import needed_sides
 
 _SAME_MM = 1e-6

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from apo_bench.arguments import check_arguments
 from apo_bench.geometry import Array, sides_of
-from apo_bench.parts.making.body import Moments, polygon_moments, segment_moments
+from apo_bench.parts.making.moments import Moments, polygon_moments, segment_moments
 
 COARSE_SIDES = 12
 """Of a whole turn of a round wall without a name, which no contact uses."""

@@ -8,7 +8,7 @@ from shapely import Polygon
 
 from apo_bench.arguments import check_arguments
 from apo_bench.geometry import Array, Cylinder, Face, Hull, cylinder_hull, polygons_of, rings_of
-from apo_bench.parts.making.body import Body, summed
+from apo_bench.parts.making.body import Body
 from apo_bench.parts.making.cells import clipped, wedges
 from apo_bench.parts.making.extrude import flat_face
 from apo_bench.parts.making.frustums import (
@@ -21,6 +21,7 @@ from apo_bench.parts.making.frustums import (
     tangent,
     without,
 )
+from apo_bench.parts.making.moments import summed
 
 _SAME_MM = 1e-6
 _NARROW_MM = 6e-3

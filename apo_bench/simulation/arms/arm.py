@@ -15,7 +15,7 @@ from apo_bench.arguments import check_arguments
 from apo_bench.errors import require
 from apo_bench.geometry import Array, copyable, freeze, frozen, pose
 from apo_bench.io import JsonNode, named_files, read_toml
-from apo_bench.scenario.contacts import read_pose
+from apo_bench.scenario.values import read_pose
 
 _GRADED = 0.6
 """A gripper of which one step of the command makes this part of its opening knows open and closed only."""

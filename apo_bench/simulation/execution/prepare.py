@@ -18,7 +18,7 @@ from apo_bench.insertion.surroundings import (
     slide_directions,
     slow_before,
 )
-from apo_bench.scenario.layout import nominal_operations
+from apo_bench.scenario.attach_lines import nominal_operations
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.execution.beside import beside_places, flush_pose
 from apo_bench.simulation.execution.grips import centring_grips, squaring_grips, transfer_grips

@@ -27,7 +27,7 @@ from apo_bench.scenario import (
     nominal_operations,
     spread_error,
 )
-from apo_bench.scenario.scenario import ErrorSpread
+from apo_bench.scenario.human_error import ErrorSpread
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.human.hands import Hands, PartLost
 from apo_bench.simulation.robot import Trajectory, minimum_jerk, shifted, smooth, with_height

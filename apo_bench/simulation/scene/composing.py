@@ -11,6 +11,7 @@ import mujoco
 
 from apo_bench.errors import require
 from apo_bench.geometry import Array, all_boxes
+from apo_bench.mjcf.part_file import PartModel, add_picture
 from apo_bench.parts import PartFile, read_part
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario, layout_at
@@ -38,6 +39,8 @@ _NET_FORCE = (1 << int(mujoco.mjtConDataField.mjCONDATA_FORCE), 3, 1)
 """Of a contact sensor: its data field, how contacts are put together (3: one net force), how many it gives."""
 
 _WRIST_SITE = "wrist"
+_BEHIND_PICTURE = 3
+"""Of MuJoCo's groups of geoms, 0 to 2 are shown."""
 _HIDDEN_GROUP = 5
 """The site of the wrist's sensors, in a group that no picture shows; names of arms and parts have a slash."""
 
@@ -114,7 +117,7 @@ def _add_part(
         [piece.name for piece in file.pieces] == [piece.name for piece in solid.pieces],
         f"{file.path}: the pieces are others than those of part '{part}'; load the scenario again.",
     )
-    own = mujoco.MjSpec.from_string(file.xml)
+    own = _bare_part(file.model)
     dress(own, solid, simulated_pieces(solid, clearance_mm * 1e-3), file.density, bits)
     set_contact(own.geoms, settings)
     if part in scenario.colors:
@@ -126,6 +129,20 @@ def _add_part(
     if part not in scenario.assembly.fixed:
         body.add_freejoint(name=f"{part}/")
     spec.attach(own, frame=body.add_frame(), prefix=f"{part}/")
+
+
+def _bare_part(model: PartModel) -> Any:
+    """A part whose geoms have no shape yet, with its sites and its picture; with a picture its pieces are hidden."""
+    spec = mujoco.MjSpec()
+    body = spec.worldbody.add_body(name=model.body)
+    group = 0 if model.picture is None else _BEHIND_PICTURE
+    for geom in model.geoms:
+        body.add_geom(name=geom.name, density=geom.density, friction=geom.friction, rgba=geom.rgba, group=group)
+    for site in model.sites:
+        body.add_site(name=site.name, pos=site.pos, size=site.size, group=site.group, rgba=site.rgba)
+    if model.picture is not None:
+        add_picture(spec, body, model.picture)
+    return spec
 
 
 def movable_parts(scenario: Scenario) -> tuple[str, ...]:

@@ -173,7 +173,7 @@ def dress(
             spec.delete(mesh)
     for name, several in pieces.items():
         geom = spec.geom(name)
-        surface = {key: np.array(getattr(geom, key)) for key in _SURFACE}
+        surface = {key: np.array(getattr(geom, key)) for key in _SURFACE} | {"group": geom.group}
         own = [piece for piece in several if piece.name == name and not is_lining(bits[name])]
         for piece in own:
             set_shape(spec, geom, piece)

@@ -1,0 +1,1 @@
+"""Files in MuJoCo's own format, read by MuJoCo, as plain data."""

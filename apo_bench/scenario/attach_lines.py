@@ -1,0 +1,58 @@
+"""The operations of a scenario at its nominal goals, with the line on which each part comes there."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from apo_bench.errors import InputError, require
+from apo_bench.insertion.arrival import Arrival, OperationMacros, Preference, understand
+from apo_bench.scenario.layout import nominal_start
+from apo_bench.scenario.scenario import Scenario
+
+_THROUGH = 1e-3
+"""Cosine to the normal of a face above which a direction leads through it."""
+
+
+@lru_cache(maxsize=32)
+def nominal_operations(scenario: Scenario) -> tuple[OperationMacros, ...]:
+    """The operations of a scenario at its nominal goals."""
+    lines = [attach.stated for attach in scenario.attach]
+    return understand(scenario.assembly, nominal_start(scenario), scenario.goals, lines)
+
+
+def with_attach_lines(scenario: Scenario, stated: Sequence[Preference], file: str) -> Scenario:
+    """The scenario with the line of attach of every operation.
+
+    Args:
+        stated: What the file says of them.
+
+    Raises:
+        InputError: A stated direction leads through what the part shall touch, or a stated line begins inside of it.
+    """
+    operations = understand(scenario.assembly, nominal_start(scenario), scenario.goals, stated)
+    for each, preference in zip(operations, stated, strict=True):
+        _check(each.after, preference, f"{file}, operation {each.operation + 1}, attach", each.main)
+    return replace(scenario, attach=tuple(each.after.line for each in operations))
+
+
+def _check(after: Arrival, stated: Preference, key: str, main: str) -> None:
+    """Whether a stated line can be one at all."""
+    if stated.direction is not None:
+        way = after.T[:3, :3] @ stated.direction
+        through = max(after.touched, key=lambda each: float(each.normal @ way), default=None)
+        if through is not None and through.normal @ way > _THROUGH:
+            face = next(of for of in through.contact if of.part == through.rests)
+            raise InputError(
+                f"{key}, along: '{main}' would come through '{face}', which it shall touch; "
+                f"give a direction that leads onto that face or along it, or leave 'along' out."
+            )
+    if stated.travel_m is not None and after.chain.way is not None:
+        least = after.chain.way.length_m
+        level = abs(after.chain.way.direction[2]) < 0.5
+        require(
+            not level or stated.travel_m >= least - 1e-6,
+            f"{key}, travel_mm: {1e3 * stated.travel_m:g} mm before its goal '{main}' would still be inside of "
+            f"what it is put into; give at least {np.ceil(1e3 * least - 1e-6):g}, or leave 'travel_mm' out.",
+        )

@@ -1,0 +1,86 @@
+"""How a human's error spreads: what is put against a displaced part is displaced alike, until someone sees it."""
+
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.assembly import Assembly, Layout, Operation, Poses, placements, touched_contacts
+from apo_bench.geometry import Array
+from apo_bench.scenario.scenario import Scenario
+
+NOTHING_M = 1e-9
+"""A part that is displaced by less is where it should be."""
+_SWEEPS = 40
+_AGREED_M = 1e-12
+"""Walls that are not at right angles to each other are followed in turn, so often, until all agree to within this."""
+
+_Displaced = dict[str, Array]
+"""Part -> how far it lies from its true place, (3,), world, [m]."""
+
+
+class ErrorSpread(NamedTuple):
+    """The error that each operation inherits from a careless one."""
+
+    offsets: Array
+    """(n, 3): how far each operation puts its main part from its goal, in the frame of that part, [m]."""
+    left: tuple[str, ...]
+    """Parts that the last operation would leave displaced, in the order in which they were put down."""
+
+
+def spread_error(scenario: Scenario, layout: Layout, offset: Array) -> ErrorSpread:
+    """Follow an error of the careless operation through the demonstration.
+
+    A later part whose contact with a displaced one has a normal along the displacement goes along with it, by that
+    component: it is guided by the face. Where no contact says otherwise a part goes to its true place. The last
+    operation shows what is wrong, so it follows nothing.
+
+    Args:
+        offset: (3,), [m], in the frame of the main part of the careless operation.
+    """
+    assembly = scenario.assembly
+    offsets = np.zeros((len(assembly), 3))
+    displaced = _Displaced()
+    left = ()
+    if scenario.careless is None or not offset.any():
+        return ErrorSpread(offsets, left)
+    stages = (layout.start, *placements(assembly, layout.start, layout.goals))
+    for k, operation in enumerate(assembly.operations):
+        R = layout.goals[k][:3, :3]
+        if k == scenario.careless.operation:
+            offsets[k] = offset
+        elif k < len(assembly) - 1:
+            offsets[k] = R.T @ _guided(assembly, operation, stages[k + 1], displaced)
+        displaced = _displaced(operation, R @ stages[k][operation.main][:3, :3].T, R @ offsets[k], displaced)
+    return ErrorSpread(offsets, tuple(part for part in displaced if part != assembly.operations[-1].main))
+
+
+def careless_covariance(scenario: Scenario, careless: float) -> Array:
+    """(n, 6, 6) [m^2]: the mean square of each operation's error along its own direction, zero where there is none."""
+    covariance = np.zeros((len(scenario.assembly), 6, 6))
+    if scenario.careless is not None:
+        rms = careless * scenario.careless.rms_m
+        way = spread_error(scenario, Layout(scenario.goals, scenario.start), scenario.careless.axis).offsets
+        covariance[:, :3, :3] = rms**2 * np.einsum("ni,nj->nij", way, way)
+    return covariance
+
+
+def _guided(assembly: Assembly, operation: Operation, poses: Poses, displaced: _Displaced) -> Array:
+    """How far the faces of displaced parts lead a part astray, (3,), world, [m]."""
+    led = np.zeros(3)
+    touched = touched_contacts(assembly, operation.contacts, operation.moves, poses)
+    guides = [each for each in touched if each.rests in displaced]
+    for _ in range(_SWEEPS):
+        for each in guides:
+            led += each.normal * (each.normal @ (displaced[each.rests] - led))
+        if all(abs(each.normal @ (displaced[each.rests] - led)) < _AGREED_M for each in guides):
+            break
+    return led
+
+
+def _displaced(operation: Operation, turn: Array, error: Array, before: _Displaced) -> _Displaced:
+    """What is displaced after an operation that turned its parts and put the main one `error` from its goal."""
+    main = before.get(operation.main, np.zeros(3))
+    after = {**before, operation.main: error}
+    for part in operation.carries:
+        after[part] = turn @ (before.get(part, np.zeros(3)) - main) + error
+    return {part: by for part, by in after.items() if np.linalg.norm(by) > NOTHING_M}

@@ -1,0 +1,35 @@
+"""Whether shafts have play in their holes: by their sizes, or by the clearance."""
+
+from apo_bench.assembly import Assembly, Contact, contact_kind, geometric_play, play_mm
+from apo_bench.errors import require
+from apo_bench.scenario.scenario import Scenario
+
+_NO_PLAY_MM = 1e-6
+"""A shaft with less play is as thick as its hole."""
+
+
+def without_play(assembly: Assembly, clearance_mm: float) -> str | None:
+    """Why the first shaft that is as thick as its hole, or thicker, has no play there; None if all have some."""
+    for contact in (contact for operation in assembly.operations for contact in operation.contacts):
+        if not _is_loose(assembly, contact, clearance_mm):
+            a, b = map(assembly.face_of, contact)
+            why = f"{1e3 * geometric_play(a, b):.4g} mm per side by their sizes"
+            fit = f" and {clearance_mm:g} mm of clearance" if assembly.is_fit(contact) else ", and neither is fit"
+            return f"'{contact}': the shaft has no play in the hole, {why}{fit}"
+    return None
+
+
+def _is_loose(assembly: Assembly, contact: Contact, clearance_mm: float) -> bool:
+    a, b = map(assembly.face_of, contact)
+    play = play_mm(a, b, clearance_mm) if contact_kind(a, b) == "shaft in hole" else None
+    return play is None or play > _NO_PLAY_MM
+
+
+def check_clearance(scenario: Scenario, clearance_mm: float) -> None:
+    """Check a clearance that is asked for in place of the scenario's.
+
+    Raises:
+        InputError: It leaves a shaft no play in its hole.
+    """
+    tight = without_play(scenario.assembly, clearance_mm)
+    require(tight is None, f"a clearance of {clearance_mm:g} mm was given, with which {tight}; give more.")

@@ -1,0 +1,123 @@
+"""The tables of a scenario file: which keys each may have, and which values."""
+
+from dataclasses import fields
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta
+
+from apo_bench.assembly import GapKind
+from apo_bench.io import Table, Text, Triple
+from apo_bench.records import MEANINGS, Meaning, Thresholds
+from apo_bench.scenario.values import LARGEST_LENGTH_MM, Angle, Axis, Length, Point, Pose
+
+_LARGEST_CLEARANCE_MM = 5.0
+_MOST_UNDERSIZE_MM = 1.0
+_LARGEST_ERROR_MM = 100.0
+_Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+_HalfWidth = Annotated[float, Meta(ge=0.0, le=LARGEST_LENGTH_MM)]
+_Error = Annotated[float, Meta(ge=0.0, le=_LARGEST_ERROR_MM)]
+_Undersize = Annotated[float, Meta(ge=-_MOST_UNDERSIZE_MM, le=_MOST_UNDERSIZE_MM)]
+_LARGEST_THRESHOLDS = {"overlap_fraction": 1.0, "loose_angle_deg": 180.0}
+
+
+class PartTable(Table, frozen=True, kw_only=True):
+    """`[parts.NAME]`."""
+
+    file: Text
+    fixed: bool = False
+    follows_site: bool = False
+    start: Pose | None = None
+    color: tuple[_Share, _Share, _Share] | None = None
+    fit: dict[str, _Undersize] = msgspec.field(default_factory=dict)
+    """Face -> by how much it lies deeper in the part than its file says, [mm]."""
+
+
+class ContactTable(Table, frozen=True, kw_only=True):
+    """An entry of `contacts`."""
+
+    faces: tuple[Text, Text]
+    kind: GapKind = "centred"
+    gap_mm: tuple[Length, Length] | None = None
+
+
+class AttachTable(Table, frozen=True, kw_only=True):
+    """`attach`: what is stated of the line to the goal."""
+
+    along: Axis | None = None
+    travel_mm: Annotated[float, Meta(gt=0.0, le=LARGEST_LENGTH_MM)] | None = None
+
+
+class GraspTable(Table, frozen=True, kw_only=True):
+    """`grasp`: what is stated of the place where the gripper holds the part."""
+
+    at_mm: Triple | None = None
+    across: Axis | None = None
+    ahead: Axis | None = None
+
+
+class VaryTable(Table, frozen=True, kw_only=True):
+    """An entry of `vary`: a shift, `along` with `mm`, or a turn, `about` with `deg`."""
+
+    along: Axis | None = None
+    mm: tuple[Length, Length] | None = None
+    about: Axis | None = None
+    deg: tuple[Angle, Angle] | None = None
+    at_mm: Point = (0.0, 0.0, 0.0)
+
+
+class OperationTable(Table, frozen=True, kw_only=True):
+    """An entry of `[[operations]]`."""
+
+    move: Text
+    goal: Pose
+    contacts: Annotated[list[tuple[Text, Text] | ContactTable], Meta(min_length=1, max_length=50)]
+    carries: tuple[Text, ...] = ()
+    attach: AttachTable = AttachTable()
+    grasp: GraspTable = GraspTable()
+    vary: VaryTable | tuple[VaryTable, ...] = ()
+
+
+class SiteTable(Table, frozen=True, kw_only=True):
+    """`[site]`."""
+
+    center_mm: tuple[Length, Length] = (0.0, 0.0)
+    spread_mm: tuple[_HalfWidth, _HalfWidth] = (0.0, 0.0)
+    yaw_deg: tuple[Angle, Angle] = (0.0, 0.0)
+
+
+class CarelessTable(Table, frozen=True, kw_only=True):
+    """`[careless]`."""
+
+    operation: int
+    along: Axis
+    size_mm: tuple[_Error, _Error]
+
+
+JudgeTable = msgspec.defstruct(
+    "JudgeTable",
+    [("success", Meaning, MEANINGS[0])]
+    + [
+        (field.name, Annotated[float, Meta(ge=0.0, le=_LARGEST_THRESHOLDS.get(field.name, 1e4))], field.default)
+        for field in fields(Thresholds)
+    ],
+    bases=(Table,),
+)
+"""`[judge]`: what counts as success, and thresholds."""
+
+
+class ScenarioTable(Table, frozen=True, kw_only=True):
+    """A whole file."""
+
+    schema: Literal[1]
+    title: Text
+    parts: Annotated[dict[str, Any], Meta(min_length=1, max_length=50)]
+    operations: Annotated[list[OperationTable], Meta(min_length=1, max_length=100)]
+    paper: Text = ""
+    human: Text = ""
+    success: Text = ""
+    clearance_mm: Annotated[float, Meta(ge=0.0, le=_LARGEST_CLEARANCE_MM)] = 0.25
+    gap_mm: Annotated[float, Meta(gt=0.0, le=_LARGEST_CLEARANCE_MM)] = 0.1
+    site: SiteTable = SiteTable()
+    careless: CarelessTable | None = None
+    judge: dict[str, Any] = msgspec.field(default_factory=dict)
