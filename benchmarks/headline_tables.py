@@ -131,7 +131,7 @@ def agreed(full: Path, contact: Path) -> list[str]:
         low, high = a.same.interval
         lines.append(
             f"| {a.scenario} | {a.same.trials} | {a.same.successes} ({100 * (a.same.rate or 0):.1f} %) "
-            f"| {100 * low:.1f} to {100 * high:.1f} % | {a.same_ending.successes} | {a.only_first} | {a.only_second} "
+            f"| {100 * low:.1f} to {100 * high:.1f} % | {a.same_ending.successes} | {only_full} | {only_contact} "
             f"| {a.same_everywhere.successes} of {a.same_everywhere.trials} |"
         )
     return lines

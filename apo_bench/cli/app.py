@@ -18,7 +18,6 @@ from apo_bench.cli import (
     noise,
     part,
     plan,
-    power,
     recording,
     scenario,
     score,
@@ -117,7 +116,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
 }
 for _name, _command in _COMMANDS.items():
     app.command(_name, cls=GroupedOptions if _name in _LONG else None)(_command)
-for _group in (sweep.dataset, noise.noise, part.arm, part.part, power.power, scenario.scenario, recording.recording):
+for _group in (sweep.dataset, noise.noise, part.arm, part.part, scenario.scenario, recording.recording):
     app.add_typer(_group)
 
 if __name__ == "__main__":

@@ -1,8 +1,6 @@
 """Comma-separated values read strictly: every complaint is one sentence that names the line and the column.
 
 Tables as CSV and, where the package pyarrow is installed, as Parquet.
-
-A spreadsheet shows a CSV file and does not obey it: a text that it would take for a formula has ' in front.
 """
 
 import csv
@@ -131,10 +129,6 @@ def _shown(columns: Columns, meanings: Sequence[str] = ()) -> str:
     )
 
 
-_OBEYED = "=+-@\t\r"
-"""What a formula begins with."""
-
-
 def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
     """Write a table; None is an empty field, and numbers stay numbers.
 
@@ -143,24 +137,9 @@ def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[object]])
     """
     table = io.StringIO(newline="")
     writer = csv.writer(table)
-    writer.writerow(map(_cell, head))
-    writer.writerows(map(_cell, row) for row in rows)
+    writer.writerow(head)
+    writer.writerows(rows)
     write_file(path, table.getvalue())
-
-
-def _cell(x: object) -> object:
-    """Texts that have ' in front already get another one, so that a reader can take one away."""
-    if not isinstance(x, str) or not x.lstrip("'").startswith(tuple(_OBEYED)) or _number(x):
-        return x
-    return f"'{x}"
-
-
-def _number(text: str) -> bool:
-    try:
-        float(text)
-    except ValueError:
-        return False
-    return "_" not in text
 
 
 def has_parquet() -> bool:

@@ -20,7 +20,7 @@ from apo_bench.io import each_line
 from apo_bench.records import Row, Salt, TrialSettings, row_key, settings_of
 from apo_bench.records.run.replay_command import Files, left_out, own_code
 from apo_bench.records.run.validation import row_of
-from apo_bench.report.run.trials import FailurePicture
+from apo_bench.report.pictures import FailurePicture
 from apo_bench.show.axes import axis_marks
 
 _WIDTH = 640

@@ -10,9 +10,8 @@ from apo_bench.errors import InputError, require
 from apo_bench.io import each_line
 from apo_bench.records import Row, read_salt, settings_of
 from apo_bench.records.run.replay_command import own_code
-from apo_bench.records.run.run_file import read_run
+from apo_bench.records.run.run_file import read_run, scenario_files
 from apo_bench.records.run.validation import row_of
-from apo_bench.report.run.trials import scenario_files
 from apo_bench.show.browser import PORT, no_browser, serve_story
 from apo_bench.show.stepping import Cursor
 from apo_bench.simulation.film.still import FilmTrack

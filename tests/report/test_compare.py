@@ -70,12 +70,12 @@ def test_the_same_trials_are_met_whatever_the_fidelity(folders: tuple[Path, Path
     assert (found.shared, found.alone) == (49, (2, 1))
     other, tower, every = found.agreements
     assert (tower.scenario, tower.same) == ("stick_in_tower", (37, 39))
-    assert (tower.only_first, tower.only_second, tower.excluded_in_one) == (1, 1, 0)
+    assert (tower.verdicts, tower.excluded_in_one) == ((39, 1, 1), 0)
     assert (other.same, every.same) == ((9, 9), (46, 48))
     assert every.same.interval == wilson(46, 48)
     assert every.same_ending == (46, 48)
     assert every.same_everywhere == (37, 39)
-    assert [a["seed"] for a, _ in found.changed] == [0, 1]
+    assert [changed.first["seed"] for changed in found.changed] == [0, 1]
     (gap,) = (a for a in found.numbers if a.name == "worst_gap_mm")
     assert (gap.both, gap.differ, gap.alone) == (48, 1, 0)
     assert gap.most == pytest.approx(0.5)
@@ -146,10 +146,9 @@ def test_the_sides_change_places(folders: tuple[Path, Path]) -> None:
     there = compare(*folders)
     back = compare(*folders[::-1])
     assert [a.same for a in there.agreements] == [a.same for a in back.agreements]
-    assert [(a.only_first, a.only_second) for a in there.agreements] == [
-        (a.only_second, a.only_first) for a in back.agreements
-    ]
-    assert [-(p.difference or 0.0) for p in there.cells] == [p.difference or 0.0 for p in back.cells]
+    turned = [(shared, second, first) for shared, first, second in (a.verdicts for a in back.agreements)]
+    assert [a.verdicts for a in there.agreements] == turned
+    assert [-(p.verdicts.difference or 0.0) for p in there.cells] == [p.verdicts.difference or 0.0 for p in back.cells]
 
 
 def test_the_command_writes_a_page_and_exits_with_0(

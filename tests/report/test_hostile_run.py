@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 import os
@@ -12,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from pyarrow import parquet
 
 from apo_bench import InputError
 from apo_bench.cli import app as cli
@@ -21,9 +19,8 @@ from apo_bench.io.words import clean
 from apo_bench.records.run.replay_command import own_code, replay_command
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.report import report as reports
+from apo_bench.report.pictures import sample
 from apo_bench.report.report import report
-from apo_bench.report.run.trials import sample
-from apo_bench.report.tables.table import Column, Table
 from apo_bench.show.failure_pictures import failure_pictures
 from apo_bench.statistics import tally
 from apo_bench.sweeps.progress import Rates
@@ -249,24 +246,3 @@ def test_what_is_no_file_is_refused_at_once(kind: str, name: str, tmp_path: Path
         (folder / name).symlink_to("/dev/zero")
     with pytest.raises(InputError, match=f"{name}: {kind} was given; give a"):
         report(folder)
-
-
-def test_cells_of_a_table_are_no_formulas(tmp_path: Path) -> None:
-    lines = [("=1+1", -0.5, "-0.5"), ("+1.0 (2)", 1.0, "-1e3"), ("@a", 2.0, "1"), ("-x", None, "2"), ("\tq", 3.0, "+3")]
-    lines += [("'=x", 4.0, "4"), ("'plain", 5.0, "5"), ("\r=", 6.0, "6")]
-    names = ("text", "number", "said")
-    table = Table(lines, [Column(name, value=lambda line, i=i: line[i]) for i, name in enumerate(names)])
-    with table.write(tmp_path / "table.csv").open(newline="", encoding="utf-8") as file:
-        head, *read = csv.reader(file)
-    assert tuple(head) == names
-    assert [cells[0] for cells in read] == ["'=1+1", "'+1.0 (2)", "'@a", "'-x", "'\tq", "''=x", "'plain", "'\r="]
-    assert [cells[1] for cells in read] == ["-0.5", "1.0", "2.0", "", "3.0", "4.0", "5.0", "6.0"]
-    assert [cells[2] for cells in read] == [said for _, _, said in lines]
-    kept = parquet.read_table(table.write(tmp_path / "table.parquet"))
-    assert [tuple(line.values()) for line in kept.to_pylist()] == lines
-
-
-def test_a_report_of_formulas(tmp_path: Path) -> None:
-    made = report(write(tmp_path / "run", [row("=cmd|calc", scenario="@SUM(A1)")]))
-    (line,) = csv.DictReader(made.tables["cells"].open(newline="", encoding="utf-8"))
-    assert (line["scenario"], line["method"]) == ("'@SUM(A1)", "'=cmd|calc")

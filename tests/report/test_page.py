@@ -87,26 +87,13 @@ def test_a_folder_that_is_called_sweep_is_called_so_once(tmp_path: Path) -> None
         assert f"<title>{title}</title>" in report(write(tmp_path / name, [row()])).page.read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("panels", [1, 2, 3, 7])
-def test_plots_use_the_width_of_the_page(panels: int, tmp_path: Path, chromium: Any) -> None:
-    """A line of two where there are several, however many; one alone is not taller than the window."""
-    rows = [
-        row(scenario=f"s{i}", seed=seed, level=x, level_deg=x)
-        for i in range(panels)
-        for x in (1.0, 2.0)
-        for seed in (0, 1)
-    ]
-    made = report(write(tmp_path / "run", rows))
-    for width in (1280, 390):
+def test_figures_use_the_width_of_the_page(made: Report, chromium: Any) -> None:
+    """Those of several panels scroll on a phone."""
+    for width, least in ((1280, 0.9), (390, 1.5)):
         with opened(chromium, made.page, width) as (page, _, _):
-            boxes = page.evaluate(
-                "[...document.querySelector('#levels').parentElement.querySelectorAll('.panel')]"
-                ".map(e => e.getBoundingClientRect()).map(r => [r.left, r.right, r.height])"
-            )
+            box = page.locator("img.figure.wide").first.bounding_box()
             inner = page.evaluate("document.querySelector('main').clientWidth")
-            used = max(right for _, right, _ in boxes) - min(left for left, _, _ in boxes)
-            assert used > (0.95 if panels > 1 or width == 390 else 0.65) * inner
-            assert max(height for _, _, height in boxes) < 600
+            assert box["width"] > least * inner
             assert overflow(page) <= 0
 
 
@@ -174,26 +161,6 @@ def test_tables_that_go_on_to_the_right_fade_there(made: Report, chromium: Any) 
         assert overflow(page) <= 0
 
 
-def test_names_of_methods_and_levels_do_not_lie_on_each_other(tmp_path: Path, chromium: Any) -> None:
-    """Where both are long, the name stands above its bars."""
-    long = [row(m, i, level=0.5, level_deg=1.25) for m in ("none", "mine:corrector_of_mine") for i in range(3)]
-    short = [row(m, i) for m in ("none", "paper-track") for i in range(3)]
-    for name, some in (("long", long), ("short", short)):
-        page = report(write(tmp_path / name, some)).page
-        with opened(chromium, page) as (tab, _, _):
-            boxes = tab.evaluate(
-                "[...document.querySelectorAll('#stages ~ * svg.chart text')]"
-                ".map((t) => { const b = t.getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; })"
-            )
-        assert boxes
-        assert not [
-            (a, b)
-            for i, a in enumerate(boxes)
-            for b in boxes[:i]
-            if a[0] < b[2] - 0.5 and b[0] < a[2] - 0.5 and a[1] < b[3] - 4 and b[1] < a[3] - 4
-        ]
-
-
 def test_only_what_was_lost_is_replayed_in_a_process_of_its_own(tmp_path: Path) -> None:
     lost = {"failure_stage": "worker", "failure_code": "worker_died", "success": False}
     some = [row("paper", i, i not in (1, 2)) | (lost if i in (1, 2) else {}) for i in range(4)]
@@ -234,12 +201,12 @@ def test_what_is_packed_is_what_the_rows_say(made: Report) -> None:
 def test_what_is_not_measured_is_said(tmp_path: Path) -> None:
     page = pages.words(report(write(tmp_path / "one", [row("contact", i) for i in range(3)])).page)
     for sentence in (
-        "No level varied: every trial was at level 1",
+        "No level varied, so nothing is known",
         "No method shares a cell with none or paper",
         "contact succeeds in 3 of 3 trials (100.0 %). 3 seeds are too few",
         "No picture: None was asked for",
         "No method that corrects had a plan",
-        "No method was told contacts that were recognised.",
+        "No method was told relations that were recognised.",
         "There is no timing.jsonl",
         "There is no run.json",
     ):
@@ -372,7 +339,6 @@ def test_trials_whose_worker_died_are_failures_of_a_stage_of_their_own(tmp_path:
     page = pages.lines(made.page)
     assert "50.0 % 9.5 to 90.5 % n 2 executed: 100.0 %, n 1" in page
     assert "worker: time_limit" in pages.trials(made.page)["words"]["why"]
-    assert "worker 1 of 2 (50.0 %)" in made.page.read_text(encoding="utf-8")
 
 
 def test_commands_are_split_by_a_shell_as_they_were_meant(made: Report) -> None:

@@ -14,8 +14,8 @@ from apo_bench import TrialSettings, build_scene, load_scenario, run_trial
 from apo_bench.cli import app as cli
 from apo_bench.records import settings_of
 from apo_bench.records.run.replay_command import milli, number, replay_command
+from apo_bench.report.pictures import sample
 from apo_bench.report.report import report
-from apo_bench.report.run.trials import sample
 from apo_bench.show.failure_pictures import failure_pictures
 from tests import pages
 from tests.statistics.test_rates import row, write

@@ -23,9 +23,8 @@ from apo_bench import InputError, SweepSettings, TrialSettings, load_scenario, r
 from apo_bench.cli.app import main
 from apo_bench.records import USUAL_LIMITS, Limits
 from apo_bench.records.run.replay_command import replay_command
-from apo_bench.records.run.run_file import read_run
+from apo_bench.records.run.run_file import limits_of, read_run
 from apo_bench.report.report import report
-from apo_bench.report.run.trials import limits_of
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.sweeps.grid import load_all, units
 from apo_bench.sweeps.local import pool
