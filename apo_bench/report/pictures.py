@@ -9,10 +9,9 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from apo_bench.geometry import Array
 from apo_bench.records import Row, Salt
 from apo_bench.records.run.replay_command import DATA_PREFIXES, Files, is_own_code, left_out
-from apo_bench.records.run.trials import Trials, trials_of
+from apo_bench.records.run.trials import Mask, Trials, trials_of
 from apo_bench.statistics import Records, rank
 from apo_bench.statistics.rates import was_executed
 
@@ -72,7 +71,7 @@ def sample(records: Records, most: int, *, trust_code: bool = False) -> list[Row
     return chosen
 
 
-def _names_code(trials: Trials) -> Array:
+def _names_code(trials: Trials) -> Mask:
     """(n,) whether a trial names code of somebody's own."""
     named = (trials.holds(column, partial(is_own_code, data=prefixes)) for column, prefixes in DATA_PREFIXES.items())
     return reduce(or_, named)

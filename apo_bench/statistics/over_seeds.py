@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.geometry import Array
+from apo_bench.records.run.trials import Index
 from apo_bench.statistics.paired import mcnemar, tango
 from apo_bench.statistics.rates import CONFIDENCE, Interval, wilson
 
@@ -35,7 +36,7 @@ _EDGE = 1e-9
 class Results(NamedTuple):
     """The trials of one method that count."""
 
-    trial: Array
+    trial: Index
     """(n,) a number for all that a trial is of but the method."""
     seed: Array
     """(n,)"""

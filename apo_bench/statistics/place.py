@@ -11,7 +11,6 @@ from apo_bench.records import (
     NO_ROBOT_ERROR,
     RANGE,
     USUAL,
-    Row,
     TrialSettings,
     feels,
     knows_relations,
@@ -90,18 +89,11 @@ class Place:
 
     @property
     def conditions(self) -> str:
-        """All but scenario, method and level, as a person says it."""
-        return ", ".join([self.human, f"{self.clearance_mm:g} mm clearance", *self.unusual])
-
-    @property
-    def human(self) -> str:
-        """`careful human`."""
-        return {0.0: "careful human", 1.0: "careless human"}.get(self.careless, f"carelessness {self.careless:g}")
-
-    @property
-    def unusual(self) -> list[str]:
-        """Conditions that are not as usual, in words."""
-        unusual = {
+        """All but scenario, method and level, as a person says it; whatever is as usual is left out."""
+        human = {0.0: "careful human", 1.0: "careless human"}.get(self.careless, f"carelessness {self.careless:g}")
+        said = {
+            human: True,
+            f"{self.clearance_mm:g} mm clearance": True,
             "range finder" if self.noise == RANGE else f"{self.noise} noise": self.noise != USUAL,
             f"relations {self.relations}": self.relations != "given",
             f"{self.grasp} grasp": self.grasp != TrialSettings.grasp,
@@ -112,7 +104,7 @@ class Place:
             f"stated error {self.stated_error}": self.stated_error != TrialSettings.stated_error,
             f"abstaining below {self.abstain:g}": self.abstain > 0,
         }
-        return [words for words, here in unusual.items() if here]
+        return ", ".join(words for words, here in said.items() if here)
 
 
 PLACE_FIELDS = tuple(field.name for field in fields(Place))
@@ -147,12 +139,11 @@ def order(k: Place) -> tuple[Any, ...]:
     )
 
 
-def place_of(row: Row) -> Place | None:
+def place_of(row: Mapping[str, Any]) -> Place | None:
     """The cell of a row; None for a measured demonstration, which has no level."""
     if row["level"] is None:
         return None
-    known: Mapping[str, Any] = row
-    return Place(**{name: known[name] for name in PLACE_FIELDS if name in known})
+    return Place(**{name: row[name] for name in PLACE_FIELDS if name in row})
 
 
 def by_place(trials: Trials) -> dict[Place, Trials]:
@@ -179,4 +170,4 @@ def by_place(trials: Trials) -> dict[Place, Trials]:
 def by_method(trials: Trials) -> dict[tuple[str, str], Trials]:
     """Scenario and method -> trials, sorted as cells are."""
     groups = trials.parts(("scenario", "method"))
-    return {key: groups[key] for key in sorted(groups, key=lambda key: (key[0], rank(key[1]), key[1]))}  # type: ignore[misc]
+    return {key: groups[key] for key in sorted(groups, key=lambda key: (key[0], rank(key[1]), key[1]))}

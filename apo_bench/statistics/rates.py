@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, final
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.records.run.trials import Trials, trials_of
+from apo_bench.records.run.trials import Mask, Trials, trials_of
 from apo_bench.statistics.place import Place, by_place
 
 CONFIDENCE = 0.95
@@ -142,7 +142,7 @@ def root_mean_square(x: Array) -> float | None:
     return math.sqrt(float(np.mean(x**2))) if len(x) else None
 
 
-def was_executed(trials: Trials) -> Array:
+def was_executed(trials: Trials) -> Mask:
     """(n,) whether a plan was carried out to its end, or to where something failed."""
     return ~trials.holds("failure_stage", NOT_EXECUTED.__contains__)
 

@@ -7,7 +7,8 @@ from apo_bench.io import grouped
 from apo_bench.records import RANGE, USUAL, feels, knows_relations, knows_truth, may_look
 from apo_bench.statistics.place import Place, level_label, rank_relations
 
-_Item = TypeVar("_Item")
+_Item = TypeVar("_Item", bound=Any)
+"""Whatever has a place."""
 
 
 def settings(items: Iterable[Any]) -> list[Place]:
@@ -22,8 +23,8 @@ def settings(items: Iterable[Any]) -> list[Place]:
 
 def members(settings: Sequence[Place], items: Iterable[_Item]) -> dict[Place, list[_Item]]:
     """The cells, or whatever has a place, of every setting, in their order; of several oracles the one most tried."""
-    near = grouped((_site(_place(item)), item) for item in items)
-    return {s: _one_ceiling([x for x in near.get(_site(s), ()) if holds(s, _place(x))]) for s in settings}
+    near = grouped((_site(item.place), item) for item in items)
+    return {s: _one_ceiling([x for x in near.get(_site(s), ()) if holds(s, x.place)]) for s in settings}
 
 
 def holds(setting: Place, place: Place) -> bool:
@@ -62,11 +63,6 @@ def level_unit(noise: str) -> str:
     return "level: mm per ray" if noise == RANGE else "level: mm and degrees per axis"
 
 
-def _place(item: Any) -> Place:
-    place: Place = item.place
-    return place
-
-
 def _meets(method: str) -> tuple[bool, ...]:
     """What of a setting a method meets: noise, relations, what a robot that feels is given, looks."""
     return not knows_truth(method), knows_relations(method), feels(method), may_look(method)
@@ -82,6 +78,6 @@ def _order(s: Place) -> tuple[Any, ...]:
 
 
 def _one_ceiling(inside: list[_Item]) -> list[_Item]:
-    ceilings = [item for item in inside if _place(item).method == "oracle"]
+    ceilings = [item for item in inside if item.place.method == "oracle"]
     best = max(ceilings, key=lambda item: getattr(item, "trials", 0), default=None)
-    return [item for item in inside if item is best or _place(item).method != "oracle"]
+    return [item for item in inside if item is best or item.place.method != "oracle"]

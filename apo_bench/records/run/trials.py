@@ -14,6 +14,7 @@ from typing import Any, NamedTuple, final
 
 import msgspec
 import numpy as np
+from numpy.typing import NDArray
 
 from apo_bench.geometry import Array
 from apo_bench.records.row import ROW_FIELDS
@@ -21,6 +22,10 @@ from apo_bench.records.run.run_folder import each_row
 from apo_bench.records.salt import one_salt
 from apo_bench.records.settings import SETTINGS
 
+Mask = NDArray[np.bool_]
+"""(n,) which trials."""
+Index = NDArray[np.integer[Any]]
+"""(n,) numbers of trials, or of what they have."""
 _NOT_KEPT = (
     *("env_id", "thresholds", "as_demonstrated_code", "conditions", "tried", "free_moved", "moved_in_hand", "reached"),
     "predicted",  # has columns of its own
@@ -48,7 +53,7 @@ COLUMNS: Mapping[str, type | None] = {
 class Coded(NamedTuple):
     """A column of texts, or of tuples."""
 
-    codes: Array
+    codes: Index
     """(n,) the number of the value of each trial."""
     names: Sequence[Any]
     """Every value, at its number."""
@@ -59,7 +64,7 @@ class Groups(NamedTuple):
 
     keys: list[tuple[Any, ...]]
     """What each group has in these columns."""
-    of: Array
+    of: Index
     """(n,) the number of the group of each trial."""
 
 
@@ -103,7 +108,7 @@ class Trials:
         """The values that a column has, in the order in which they first come."""
         return list(dict.fromkeys(self.values(name)))
 
-    def holds(self, name: str, condition: Callable[[Any], object]) -> Array:
+    def holds(self, name: str, condition: Callable[[Any], object]) -> Mask:
         """(n,) whether a condition holds for the value of a column that is no number."""
         codes, names = self.coded[name]
         return np.array([bool(condition(each)) for each in names], dtype=bool)[codes]
@@ -113,7 +118,7 @@ class Trials:
         columns = [self.values(name) for name in COLUMNS]
         return [dict(zip(COLUMNS, values, strict=True)) for values in zip(*columns, strict=True)]
 
-    def where(self, which: Array | slice) -> Trials:
+    def where(self, which: Mask | Index | slice) -> Trials:
         """Some of the trials, by a mask, by their numbers in this order, or by a slice."""
         return Trials(
             {name: column[which] for name, column in self.numbers.items()},
@@ -145,18 +150,18 @@ def trials_of(records: Trials | Iterable[Mapping[str, Any]]) -> Trials:
     """The columns of records; settings that a record does not say are as usual."""
     if isinstance(records, Trials):
         return records
-    numbers = {name: array("d") for name, kind in COLUMNS.items() if kind is not None}
-    codes = {name: array("i") for name, kind in COLUMNS.items() if kind is None}
+    numbers: dict[str, array[float]] = {name: array("d") for name, kind in COLUMNS.items() if kind is not None}
+    codes: dict[str, array[int]] = {name: array("i") for name, kind in COLUMNS.items() if kind is None}
     names: dict[str, dict[Any, int]] = {name: {} for name in codes}
     for record in records:
         said = _USUAL | dict(record) | {f"predicted_{key}": x for key, x in (record.get("predicted") or {}).items()}
-        for name, column in numbers.items():
+        for name, numbered in numbers.items():
             number = said.get(name)
-            column.append(math.nan if number is None else number)
-        for name, column in codes.items():
+            numbered.append(math.nan if number is None else number)
+        for name, coded in codes.items():
             value = said.get(name)
             known = names[name]
-            column.append(known.setdefault(tuple(value) if isinstance(value, list) else value, len(known)))
+            coded.append(known.setdefault(tuple(value) if isinstance(value, list) else value, len(known)))
     return Trials(
         {name: np.array(column, dtype=float) for name, column in numbers.items()},
         {name: Coded(np.array(column, dtype=np.int32), list(names[name])) for name, column in codes.items()},

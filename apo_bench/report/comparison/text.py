@@ -1,20 +1,17 @@
 """A comparison in words: tables for the terminal and the page, the page itself, and one JSON object."""
 
-from collections.abc import Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 from apo_bench.errors import InputError
 from apo_bench.io import check_folders, write_file
-from apo_bench.records import KEY, row_key
-from apo_bench.records.run.replay_command import replay_command
-from apo_bench.records.run.run_file import limits_of, scenario_files
-from apo_bench.report.comparison.compare import Agreement, Changed, Comparison, Side
+from apo_bench.report.comparison.compare import Comparison
 from apo_bench.report.facts import value_words
 from apo_bench.report.page.page import Section, page
 from apo_bench.report.tables.table import Column, Table, fill
-from apo_bench.report.trials import NUMBERS, verdict, why
-from apo_bench.statistics import FEWEST_SEEDS, percent, percents
+from apo_bench.report.trials import NUMBERS
+from apo_bench.statistics import FEWEST_SEEDS, Interval, Line, percent, percents
 
 _AGREEMENT = (
     "The same trials in both: how often success is the same, with Wilson's interval, and how often stage and code of "
@@ -30,7 +27,7 @@ _CELLS = (
 )
 _MOST_LISTED = 2000
 """Changed trials that are listed."""
-_DIFFERENCE = fill("{verdicts.difference:points} ({verdicts.interval:points})")
+_DIFFERENCE = fill("{difference:points} ({difference_low_95:points} to {difference_high_95:points})")
 _WHERE = (
     Column("scenario", "scenario", "place.scenario", words=True),
     Column("conditions", "conditions", "place.conditions", words=True),
@@ -45,17 +42,15 @@ def comparison_tables(comparison: Comparison) -> dict[str, Table]:
     same in both."""
     agreement = (
         Column("scenario", "scenario", words=True),
-        Column("trials", "trials", "same.trials"),
-        Column("same verdict", "same verdict", fill("{same.successes} ({same.rate:percent2})")),
-        Column("95 %", "95 %", fill("{same.interval:percents2}")),
-        Column("seeds", "seeds", "same_everywhere.trials"),
-        Column("same in all", "same in all", fill("{same_everywhere.successes} ({same_everywhere.rate:percent2})")),
-        Column("95 % 2", "95 %", fill("{same_everywhere.interval:percents2}")),
-        Column(
-            "same stage and code", "same stage and code", fill("{same_ending.successes} ({same_ending.rate:percent2})")
-        ),
-        Column("right in the first alone", "right in the first alone", "verdicts.only_first"),
-        Column("right in the second alone", "right in the second alone", "verdicts.only_second"),
+        Column("trials", "trials"),
+        Column("same verdict", "same verdict", fill("{same_verdict} ({same_verdict_rate:percent2})")),
+        Column("95 %", "95 %", fill(_between("same_verdict"))),
+        Column("seeds", "seeds"),
+        Column("same in all", "same in all", fill("{same_verdicts_in_all} ({same_verdicts_in_all_rate:percent2})")),
+        Column("95 % 2", "95 %", fill(_between("same_verdicts_in_all"))),
+        Column("same stage and code", "same stage and code", "same_stage_and_code"),
+        Column("right in the first alone", "right in the first alone", "right_in_first_alone"),
+        Column("right in the second alone", "right in the second alone", "right_in_second_alone"),
         Column("difference of success [points]", "difference of success [points]", _DIFFERENCE),
     )
     numbers = (
@@ -69,9 +64,9 @@ def comparison_tables(comparison: Comparison) -> dict[str, Table]:
         *_WHERE,
         Column("first", "first", fill("{first.rate:percent}, n {first.trials}")),
         Column("second", "second", fill("{second.rate:percent}, n {second.trials}")),
-        Column("shared", "shared", "verdicts.shared"),
-        Column("first alone", "first alone", "verdicts.only_first"),
-        Column("second alone", "second alone", "verdicts.only_second"),
+        Column("shared", "shared"),
+        Column("first alone", "first alone", "right_in_first_alone"),
+        Column("second alone", "second alone", "right_in_second_alone"),
         Column("difference [points]", "difference [points]", _DIFFERENCE),
     )
     changed = (
@@ -87,17 +82,15 @@ def comparison_tables(comparison: Comparison) -> dict[str, Table]:
     first, second = (str(side.folder) for side in (comparison.first, comparison.second))
     differences = (
         Column("what", "what", words=True),
-        Column(first, first, "first", words=True),
-        Column(second, second, "second", words=True),
+        Column(first, first, _side("first"), words=True),
+        Column(second, second, _side("second"), words=True),
     )
-    listed = [_listed(each, comparison) for each in comparison.changed[:_MOST_LISTED]]
-    unlike = [{"what": d.what, "first": _value(d.first), "second": _value(d.second)} for d in comparison.differences]
     return {
         "agreement": Table(comparison.agreements, agreement, note=_AGREEMENT),
         "numbers": Table(comparison.numbers, numbers, note=_NUMBERS),
         "cells": Table(comparison.cells, cells, note=_CELLS),
-        "changed": Table(listed, changed, "No verdict differs."),
-        "differences": Table(unlike, differences, "Nothing that is said of them differs."),
+        "changed": Table(comparison.changed[:_MOST_LISTED], changed, "No verdict differs."),
+        "differences": Table(comparison.differences, differences, "Nothing that is said of them differs."),
     }
 
 
@@ -109,21 +102,21 @@ def in_words(comparison: Comparison) -> str:
     return f"{shared} {_agreed(comparison.agreements[-1])} {identical}"
 
 
-def _agreed(total: Agreement) -> str:
+def _agreed(total: Line) -> str:
     """How many verdicts agree, and at how many seeds all of them do; seeds are independent, trials are not."""
-    same = total.same
-    seeds = total.same_everywhere
-    if not same.trials:
+    if not total["trials"]:
         return "None of them counts: no demonstration was right itself."
-    _, only_first, only_second = total.verdicts
-    counted = f", {total.excluded_in_one:,} counted in one of the two alone" * bool(total.excluded_in_one)
-    sure = f"95 % interval {percents(seeds.interval)} of seeds"
-    if seeds.trials < FEWEST_SEEDS:
+    counted = f", {total['excluded_in_one']:,} counted in one of the two alone" * bool(total["excluded_in_one"])
+    seeds = Interval(total["same_verdicts_in_all_low_95"], total["same_verdicts_in_all_high_95"])
+    sure = f"95 % interval {percents(seeds)} of seeds"
+    if total["seeds"] < FEWEST_SEEDS:
         sure = f"too few for an interval: from {FEWEST_SEEDS} on there is one"
+    rate = percent(total["same_verdict_rate"], 2)
     return (
-        f"Verdicts agree in {same.successes:,} of {same.trials:,} ({percent(same.rate, 2)}): {only_first:,} right in "
-        f"the first alone, {only_second:,} in the second alone{counted}. All of them agree at {seeds.successes:,} of "
-        f"{seeds.trials:,} seed{'s' * (seeds.trials != 1)} ({sure})."
+        f"Verdicts agree in {total['same_verdict']:,} of {total['trials']:,} ({rate}): "
+        f"{total['right_in_first_alone']:,} right in the first alone, {total['right_in_second_alone']:,} in the second "
+        f"alone{counted}. All of them agree at {total['same_verdicts_in_all']:,} of {total['seeds']:,} "
+        f"seed{'s' * (total['seeds'] != 1)} ({sure})."
     )
 
 
@@ -169,69 +162,26 @@ def comparison_form(comparison: Comparison) -> dict[str, Any]:
         "first_alone": comparison.alone[0],
         "second_alone": comparison.alone[1],
         "identical": comparison.identical,
-        "agreements": [_agreement_form(a) for a in comparison.agreements],
-        "numbers": [a._asdict() for a in comparison.numbers],
-        "differences": [d._asdict() for d in comparison.differences],
-        "changed": [_changed_form(each, comparison) for each in comparison.changed],
+        "agreements": comparison.agreements,
+        "numbers": comparison.numbers,
+        "differences": comparison.differences,
+        "changed": [{name: x for name, x in line.items() if name != "place"} for line in comparison.changed],
     }
 
 
-def _agreement_form(a: Agreement) -> dict[str, Any]:
-    return {
-        "scenario": a.scenario,
-        "trials": a.same.trials,
-        "same_verdict": a.same.successes,
-        "same_verdict_rate": a.same.rate,
-        "same_verdict_low_95": a.same.interval.low,
-        "same_verdict_high_95": a.same.interval.high,
-        "seeds": a.same_everywhere.trials,
-        "same_verdicts_in_all": a.same_everywhere.successes,
-        "same_verdicts_in_all_low_95": a.same_everywhere.interval.low,
-        "same_verdicts_in_all_high_95": a.same_everywhere.interval.high,
-        "same_stage_and_code": a.same_ending.successes,
-        "right_in_first_alone": a.verdicts.only_first,
-        "right_in_second_alone": a.verdicts.only_second,
-        "excluded_in_one": a.excluded_in_one,
-        "difference": a.verdicts.difference,
-        "difference_low_95": a.verdicts.interval.low,
-        "difference_high_95": a.verdicts.interval.high,
-    }
+def _between(name: str) -> str:
+    """A template of both ends of an interval."""
+    return f"{{{name}_low_95:hundredths}} to {{{name}_high_95:hundredths}} %"
 
 
-def _changed_form(changed: Changed, comparison: Comparison) -> dict[str, Any]:
-    listed = _listed(changed, comparison)
-    names = ("verdict", "stage", "code", "sentence", "command")
-    sides = {side: {name: listed[side][name] for name in names} for side in ("first", "second")}
-    return dict(zip(KEY, row_key(changed.first), strict=True)) | sides
-
-
-def _listed(changed: Changed, comparison: Comparison) -> dict[str, Any]:
-    """What a table, and JSON, say of a trial."""
-    sides = {
-        "first": _ended(changed.first, comparison.first),
-        "second": _ended(changed.second, comparison.second),
-    }
-    return {"place": changed.place, "seed": changed.first["seed"]} | sides
-
-
-def _ended(row: Mapping[str, Any], side: Side) -> dict[str, Any]:
-    return {
-        "verdict": verdict(row),
-        "why": why(row),
-        "stage": row["failure_stage"],
-        "code": row["failure_code"],
-        "sentence": row["sentence"],
-        "command": replay_command(row, scenario_files(side.run), limits_of(side.run)),
-    }
-
-
-def _label(change: Any) -> str:
-    return NUMBERS[change.name]
+def _label(line: Line) -> str:
+    return NUMBERS[line["name"]]
 
 
 def _trials(n: int) -> str:
     return "1 trial is" if n == 1 else f"{n:,} trials are"
 
 
-def _value(x: Any) -> str:
-    return "not said" if x is None else value_words(x)
+def _side(name: str) -> Callable[[Line], str]:
+    """What a side says of something that is not the same in both."""
+    return lambda line: "not said" if line[name] is None else value_words(line[name])

@@ -82,8 +82,8 @@ def pack_trials(trials: Trials, files: Files, limits: Limits, pictures: Mapping[
         for name in NUMBERS:
             columns[name] += [_rounded(x, _DECIMALS.get(name, 3)) for x in own.values(name)]
         for row in own.rows():
-            for name, text in words.items():
-                columns[name].append(known[name].setdefault(text(row), len(known[name])))
+            for name, say in words.items():
+                columns[name].append(known[name].setdefault(say(row), len(known[name])))
     values = {
         "ends": np.cumsum([len(own) for own in cells]).tolist(),
         "words": {name: list(texts) for name, texts in known.items()},

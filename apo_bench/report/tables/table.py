@@ -24,11 +24,15 @@ def endings(failures: Mapping[str, int], most: int | None = 3) -> str:
     return ", ".join(f"{why} {count}" for why, count in list(failures.items())[:most])
 
 
+def _hundredths(share: float) -> str:
+    return f"{100 * share:.2f}"
+
+
 _SPELLED: Mapping[str, Callable[[Any], str]] = {
     "percent": percent,
     "percent2": partial(percent, digits=2),
     "percents": percents,
-    "percents2": partial(percents, digits=2),
+    "hundredths": _hundredths,
     "points": points,
     "signed": partial(signed, digits=3),
     "p": _p_value,
