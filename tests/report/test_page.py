@@ -205,6 +205,7 @@ def test_figures_are_files_that_stand_alone(made: Report) -> None:
     for path in drawn:
         root = ElementTree.parse(path).getroot()
         assert root.tag == "{http://www.w3.org/2000/svg}svg"
+        assert not re.search(r">[^<]*mathdefault", path.read_text(encoding="utf-8"))
         assert not re.search(r"https?://(?!www\.w3\.org)", path.read_text(encoding="utf-8"))
 
 

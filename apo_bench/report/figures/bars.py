@@ -40,7 +40,7 @@ def _panel(title: str, bars: Shares, ordered: Sequence[str]) -> Panel:
             axis.text(1.01, i, f"n {total}", va="center", fontsize=8, color=SOFT)
         axis.set_yticks(range(len(bars)), names)
         axis.set_xticks((0.0, 0.5, 1.0), ("0 %", "50 %", "100 %"))
-        axis.set(xlim=(0, 1.12), ylim=(len(bars) - 0.5, -0.5), xlabel="share of trials")
+        axis.set(xlim=(0, 1.2), ylim=(len(bars) - 0.5, -0.5), xlabel="share of trials")
         axis.grid(False)
 
     return Panel(title, draw_bars, _AROUND + _BAR * len(bars), 0.3 + _LETTER * max(map(len, names)))

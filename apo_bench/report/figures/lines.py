@@ -83,6 +83,9 @@ def _scale(axis: Any, kind: str) -> None:
         axis.yaxis.set_major_formatter(lambda y, _: f"{100 * y:+.0f}")
     elif kind == "log":
         axis.set_yscale("log")
+        # matplotlib's own labels are formulas, which are not parsed here
+        axis.yaxis.set_major_formatter("{x:g}")
+        axis.yaxis.set_minor_formatter("")
 
 
 def _legend(looks: dict[str, Style]) -> dict[str, Any]:
