@@ -179,7 +179,7 @@ def _end(values: Array, counts: Array, low: float, high: float, inside: float, o
     edge = _EDGE * (outside - inside)
     if edge == 0.0 or beyond(outside - edge) <= 0.0:
         return outside
-    return float(brentq(beyond, inside + edge, outside - edge))
+    return float(brentq(beyond, inside + edge, outside - edge, xtol=1e-9))
 
 
 def _by_seed(seeds: Array, results: Array) -> tuple[Array, float]:

@@ -147,10 +147,10 @@ class Table:
     def write(self, path: Path) -> list[Path]:
         """Write a CSV file, where None is an empty field, and the same as Parquet where pyarrow is installed."""
         columns = {c.name: [c.of(item) for item in self.items] for c in self.columns if c.name}
-        return write_table(columns, path)
+        return save_columns(columns, path)
 
 
-def write_table(columns: Mapping[str, Sequence[Any]], path: Path) -> list[Path]:
+def save_columns(columns: Mapping[str, Sequence[Any]], path: Path) -> list[Path]:
     """Write columns as CSV and, where the package pyarrow is installed, as Parquet beside it; which files."""
     write_csv(path, list(columns), zip(*columns.values(), strict=True))
     if not has_parquet():
