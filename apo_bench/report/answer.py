@@ -114,7 +114,8 @@ def _reach(half: Sequence[HalfLevel]) -> str:
     if not half:
         return ""
     worst = min(half, key=lambda h: (h.beyond == "above", h.level or 0.0, h.largest))
-    where = f"In the worst of {len(half)} settings its" if len(half) > 1 else "Its"
+    which = "each" if worst.beyond == "above" else "the worst"
+    where = f"In {which} of {len(half)} settings its" if len(half) > 1 else "Its"
     if worst.beyond == "above":
         return f"{where} curve over the level stays above one half up to level {worst.largest:g}, the largest tried."
     if worst.beyond == "below":

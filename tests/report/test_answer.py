@@ -103,7 +103,7 @@ def test_of_several_settings_the_worst_curve_is_told() -> None:
     def at(scenario: str, h: float) -> list[dict[str, Any]]:
         return [row("contact", i, x < h, level=x, level_deg=x, scenario=scenario) for x in (1.0, 4.0) for i in range(9)]
 
-    assert "In the worst of 2 settings its curve over the level stays above one half up" in said(
+    assert "In each of 2 settings its curve over the level stays above one half up" in said(
         at("a", 9.0) + at("b", 9.0)
     )
     worst = "In the worst of 2 settings its curve over the level falls to one half at level 2 (surely: 1 to 4)."
