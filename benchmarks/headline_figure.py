@@ -12,7 +12,7 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
 
-from apo_bench.report.figures.sheet import INK, RULE, SOFT
+from apo_bench.report.figures.style import INK, RULE, SOFT
 from apo_bench.statistics import Rate
 from benchmarks.headline_look import NOISES, TOLD_LEVEL, WORDS, Look, pooled, robot_rate, robot_scenarios
 

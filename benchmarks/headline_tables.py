@@ -128,10 +128,10 @@ def agreed(full: Path, contact: Path) -> list[str]:
         "|---|---|---|---|---|---|---|---|",
     ]
     for a in found.agreements:
-        low, high = a.same.interval
+        low, high = a["same_verdict_low_95"], a["same_verdict_high_95"]
         lines.append(
-            f"| {a.scenario} | {a.same.trials} | {a.same.successes} ({100 * (a.same.rate or 0):.1f} %) "
-            f"| {100 * low:.1f} to {100 * high:.1f} % | {a.same_ending.successes} | {a.only_first} | {a.only_second} "
-            f"| {a.same_everywhere.successes} of {a.same_everywhere.trials} |"
+            f"| {a['scenario']} | {a['trials']} | {a['same_verdict']} ({100 * (a['same_verdict_rate'] or 0):.1f} %) "
+            f"| {100 * low:.1f} to {100 * high:.1f} % | {a['same_stage_and_code']} | {a['right_in_first_alone']} "
+            f"| {a['right_in_second_alone']} | {a['same_verdicts_in_all']} of {a['seeds']} |"
         )
     return lines

@@ -27,14 +27,14 @@ from scipy.optimize import brentq
 from scipy.special import expit, ndtr, ndtri
 
 from apo_bench.statistics import mean_surprise, tango, threshold, wilson
-from apo_bench.statistics.levels.curves import reach, weights
-from apo_bench.statistics.levels.falling import profile
-from apo_bench.statistics.levels.half_level import sure
+from apo_bench.statistics.half_level import sure
 
-LONG = ("area", "area difference", "half level", "sure bounds")
+LONG = ("mean over seeds", "sure bounds")
 SEEDS = (50, 100, 200)
 RATES = tuple(round(0.05 * i, 2) for i in range(1, 20))
 LEVELS = np.array([0.1, 0.25, 0.5, 1.0, 2.0, 4.0])
+WEIGHTS = np.convolve(np.diff(np.log(LEVELS)), (0.5, 0.5)) / np.log(LEVELS[-1] / LEVELS[0])
+"""Of trapezoids over the logarithm of the level: the mean over levels that a seed gives."""
 PLACES = (0.05, 0.25, 0.5, 0.75, 0.95)
 """Of the half level between the second level and the last but one."""
 ALIKE = (0.0, 0.5, 0.9)
@@ -49,14 +49,13 @@ END = "<!-- end of tables -->"
 
 
 class Setting(NamedTuple):
-    """What is drawn; `rate` is the true rate, the method's, the method's area, or the place of the half level."""
+    """What is drawn; `rate` is the true rate, the method's, the mean, or the place of the half level."""
 
     interval: str
     seeds: int
     rate: float
     other: float
-    """Rate of the reference, share of the seeds, steepness, what the reference withstands, number of the shape: as the
-    interval has it."""
+    """Rate of the reference, share of the seeds, steepness, number of the shape: as the interval has it."""
     alike: float
 
 
@@ -69,11 +68,8 @@ def settings() -> Iterator[Setting]:
         for reference, alike in product(PLACES, ALIKE):
             yield Setting("difference", n, rate, reference, alike)
         for steep in (1.0, 3.0):
-            yield Setting("area", n, rate, steep, 0.8)
-        for noise in (0.5, 0.9):
-            yield Setting("area difference", n, rate, noise, 0.8)
+            yield Setting("mean over seeds", n, rate, steep, 0.8)
         for shape in range(len(SHAPES)) if rate in PLACES[::2] else ():
-            yield Setting("half level", n, rate, shape, 0.8)
             yield Setting("sure bounds", n, rate, shape, 0.8)
 
 
@@ -108,45 +104,24 @@ def difference(s: Setting, count: int, rng: np.random.Generator) -> np.ndarray:
     return (ends[:, 0] <= s.rate - s.other) & (s.rate - s.other <= ends[:, 1])
 
 
-def area(s: Setting, count: int, rng: np.random.Generator) -> np.ndarray:
+def mean_over_seeds(s: Setting, count: int, rng: np.random.Generator) -> np.ndarray:
     p = falling(s.rate, s.other)
-    right = np.round(drawn([p], s, count, rng)[0] @ weights(LEVELS), 12)
-    return mean_surprise(right, np.ones_like(right), np.full(count, p @ weights(LEVELS))) <= threshold(s.seeds)
-
-
-def area_difference(s: Setting, count: int, rng: np.random.Generator) -> np.ndarray:
-    """Against a reference that withstands less."""
-    p = falling(s.rate, 2.0)
-    q = falling(s.rate, 2.0, s.other)
-    ours, theirs = (np.round(right @ weights(LEVELS), 12) for right in drawn([p, q], s, count, rng))
-    apart = ours - theirs
-    truth = np.full(count, (p - q) @ weights(LEVELS))
-    most = reach(apart, LEVELS)
-    return mean_surprise(apart, np.ones_like(apart), truth, -most, most) <= threshold(s.seeds)
-
-
-def half_level(s: Setting, count: int, rng: np.random.Generator) -> np.ndarray:
-    """The interval holds every half level whose surprise is below the threshold."""
-    (right,) = drawn([shaped(s)], s, count, rng)
-    found = []
-    for part in np.array_split(right.astype(float), max(1, count // 100)):
-        profiled = profile(np.log(LEVELS), part)
-        found += [np.interp(np.log(middle(s)), profiled.log_half, surprising) for surprising in profiled.surprise]
-    return np.array(found) <= threshold(s.seeds)
+    right = np.round(drawn(p, s, count, rng) @ WEIGHTS, 12)
+    return mean_surprise(right, np.ones_like(right), np.full(count, p @ WEIGHTS)) <= threshold(s.seeds)
 
 
 def sure_bounds(s: Setting, count: int, rng: np.random.Generator) -> np.ndarray:
-    (right,) = drawn([shaped(s)], s, count, rng)
+    right = drawn(shaped(s), s, count, rng)
     level = middle(s)
     over, under = sure(right.sum(axis=1), np.full((count, len(LEVELS)), s.seeds))
     return (np.r_[0.0, LEVELS][over] <= level) & (level <= np.r_[LEVELS, np.inf][len(LEVELS) - under])
 
 
-def drawn(curves: list[np.ndarray], s: Setting, count: int, rng: np.random.Generator) -> list[np.ndarray]:
-    """(count, seeds, levels) successes of each method: a seed has its own luck, alike at all levels and for all."""
+def drawn(curve: np.ndarray, s: Setting, count: int, rng: np.random.Generator) -> np.ndarray:
+    """(count, seeds, levels) successes: a seed has its own luck, alike at all levels."""
     luck = rng.standard_normal((count, s.seeds, 1))
     mixed = np.sqrt(s.alike) * luck + np.sqrt(1 - s.alike) * rng.standard_normal((count, s.seeds, len(LEVELS)))
-    return [mixed < ndtri(p) for p in curves]
+    return np.asarray(mixed < ndtri(curve))
 
 
 def four(p: float, q: float, alike: float) -> list[float]:
@@ -156,14 +131,14 @@ def four(p: float, q: float, alike: float) -> list[float]:
 
 
 @cache
-def falling(area: float, steep: float, times: float = 1.0) -> np.ndarray:
-    """Success at the levels, logistic over the logarithm of the level, of a given area, then moved along the levels."""
-    at = brentq(lambda x: expit(steep * (x - np.log(LEVELS))) @ weights(LEVELS) - area, -60.0, 60.0)
-    return np.asarray(expit(steep * (at + np.log(times) - np.log(LEVELS))))
+def falling(mean: float, steep: float) -> np.ndarray:
+    """Success at the levels, logistic over the logarithm of the level, of a given mean."""
+    at = brentq(lambda x: expit(steep * (x - np.log(LEVELS))) @ WEIGHTS - mean, -60.0, 60.0)
+    return np.asarray(expit(steep * (at - np.log(LEVELS))))
 
 
 def shaped(s: Setting) -> np.ndarray:
-    """Success at the levels, by a curve of a known half level: none of them is lopsided as `falling.py` has it."""
+    """Success at the levels, by a curve of a known half level."""
     name, steep = SHAPES[int(s.other)]
     z = steep * np.log(middle(s) / LEVELS)
     if name == "logistic":
@@ -184,9 +159,7 @@ STUDIES = {
     "rate": rate,
     "share": share,
     "difference": difference,
-    "area": area,
-    "area difference": area_difference,
-    "half level": half_level,
+    "mean over seeds": mean_over_seeds,
     "sure bounds": sure_bounds,
 }
 known_wilson = cache(wilson)

@@ -73,13 +73,13 @@ BREACHES = {
     "report": [
         ("apo_bench.report.page.report_page", "apo_bench.report.comparison.text"),
         ("apo_bench.report.page.report_page", "apo_bench.report.answer"),
-        ("apo_bench.report.tables.cells", "apo_bench.report.run.trials"),
-        ("apo_bench.report.figures.levels", "apo_bench.report.page.report_page"),
+        ("apo_bench.report.tables.cells", "apo_bench.report.facts"),
+        ("apo_bench.report.figures.figures", "apo_bench.report.page.report_page"),
     ],
     "statistics": [
-        ("apo_bench.statistics.rates", "apo_bench.statistics.levels.curves"),
-        ("apo_bench.statistics.settings", "apo_bench.statistics.levels.half_level"),
-        ("apo_bench.statistics.paired", "apo_bench.statistics.power"),
+        ("apo_bench.statistics.rates", "apo_bench.statistics.half_level"),
+        ("apo_bench.statistics.settings", "apo_bench.statistics.summary"),
+        ("apo_bench.statistics.paired", "apo_bench.statistics.over_seeds"),
     ],
     "sweeps": [
         ("apo_bench.sweeps.grid", "apo_bench.sweeps.worker"),

@@ -13,7 +13,7 @@ from typing import Annotated
 import typer
 
 from apo_bench import __version__
-from apo_bench.cli import noise, part, power, recording, scenario, score, sweep
+from apo_bench.cli import noise, part, recording, scenario, score, sweep
 from apo_bench.cli.arguments import NO_RESULT
 from apo_bench.cli.correct import correct_command
 from apo_bench.cli.explain import explain_command
@@ -116,7 +116,7 @@ _COMMANDS: dict[str, Callable[..., None]] = {
 }
 for _name, _command in _COMMANDS.items():
     app.command(_name, cls=GroupedOptions if _name in _LONG else None)(_command)
-for _group in (sweep.dataset, noise.noise, part.arm, part.part, power.power, scenario.scenario, recording.recording):
+for _group in (sweep.dataset, noise.noise, part.arm, part.part, scenario.scenario, recording.recording):
     app.add_typer(_group)
 
 if __name__ == "__main__":

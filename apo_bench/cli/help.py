@@ -13,7 +13,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "One plan, looked into": ("graph", "explain", "plan", "scene"),
         "Your own poses and cameras": ("correct", "recognise", "recording", "eye", "noise"),
         "Your own tasks and arms": ("scenario", "part", "arm"),
-        "Many trials": ("sweep", "report", "compare", "power", "score", "leaderboard", "dataset"),
+        "Many trials": ("sweep", "report", "compare", "score", "leaderboard", "dataset"),
     }
 )
 """Heading -> commands of `apo-bench`, in this order."""

@@ -77,7 +77,7 @@ def print_comparison(comparison: Comparison) -> None:
 
     console().print(clean(in_words(comparison)))
     print_table(comparison_tables(comparison)["agreement"])
-    names = [d.what for d in comparison.differences]
+    names = [line["what"] for line in comparison.differences]
     more = f" and {len(names) - _MOST_NAMES} more" * (len(names) > _MOST_NAMES)
     differ = clean(f"Not the same: {', '.join(names[:_MOST_NAMES])}{more}")
     console().print(differ if names else "Made with the same.")

@@ -39,7 +39,6 @@ from apo_bench.records.setting_info import SettingInfo
 from apo_bench.records.settings import (
     ENV_ID,
     LEVEL,
-    OLDER_ROWS,
     RANGE,
     ROW,
     SETTINGS,
@@ -102,7 +101,6 @@ __all__ = (
     "MEANINGS",
     "METHODS",
     "NO_ROBOT_ERROR",
-    "OLDER_ROWS",
     "RANGE",
     "RECOGNISED",
     "REQUIRED",

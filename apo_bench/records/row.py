@@ -257,9 +257,7 @@ _CLOSED = dict.fromkeys(("demonstration", "failure_code", "as_demonstrated_code"
 _CLOSED["failure_stage"] = _ENDS[STAGES] | None
 ROW_FIELDS: Mapping[str, Any] = MappingProxyType(get_type_hints(Row, include_extras=True) | _CLOSED)
 """Column -> its type, with the range that it may have."""
-LATER = ("wrench", "stated_error", "abstain")
-"""Settings that older rows do not have."""
-_SETTING_COLUMNS = (info.column for info in SETTINGS.values() if info.name not in ("salt", *LATER))
+_SETTING_COLUMNS = (info.column for info in SETTINGS.values() if info.name != "salt")
 REQUIRED = (
     *("schema", "env_id", "spec_hash", *_SETTING_COLUMNS),
     *("demonstration", "success", "loose_success", "failure_stage", "failure_code"),

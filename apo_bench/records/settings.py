@@ -28,9 +28,6 @@ from apo_bench.records.short_names import CORRECTOR, checked_method, checked_rel
 
 ENV_ID = "APOReplay-v0"
 ROW = "apo-bench/row/9"
-OLDER_ROWS = ("apo-bench/row/7", "apo-bench/row/8")
-"""The same without what a robot felt and its settings; 7 is also without `abstain`, which is 0 there, and `promised`.
-"""
 Eye = Literal["noise", "range"]
 """Poses with noise that is drawn, or a simulated range finder that measures them."""
 RANGE = "range"

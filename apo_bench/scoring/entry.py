@@ -10,12 +10,13 @@ from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import msgspec
+import numpy as np
 from msgspec import Meta
 
 from apo_bench.errors import InputError, require
 from apo_bench.geometry import Array
 from apo_bench.io import HALF_LETTER, UNSHOWN, WHOLE_LETTERS, half_letter, parse_json, read_text, write_file
-from apo_bench.statistics import pooled_rate
+from apo_bench.statistics import Results, pooled_rate
 
 SCHEMA: Final = "apo-bench/entry/1"
 _LARGEST_BYTES = 4_000_000
@@ -125,8 +126,6 @@ class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     def overall(self) -> tuple[float, float, float] | None:
         """Mean over the tracks that count, in percent, and its 95 % interval, tracks taken for independent; None where
         there is none."""
-        import numpy as np
-
         those = [track for track in self.tracks.values() if track.overall]
         if not those:
             return None
@@ -185,12 +184,9 @@ def score_of(cells: Mapping[str, str]) -> tuple[float, float, float]:
     if not rates:
         return 0.0, 0.0, 100.0
     score = 100.0 * sum(rates) / len(rates)
-    results = {
-        (cell, place): letter == RIGHT
-        for cell, trials in cells.items()
-        for place, letter in enumerate(trials)
-        if letter != EXCLUDED
-    }
+    seeds = np.array([k for trials in cells.values() for k, letter in enumerate(trials) if letter != EXCLUDED])
+    success = np.array([letter == RIGHT for trials in cells.values() for letter in trials if letter != EXCLUDED])
+    results = Results(np.arange(len(seeds)), seeds, success.astype(float))
     low, high = pooled_rate(results).interval
     return score, min(100.0 * low, score), max(100.0 * high, score)
 

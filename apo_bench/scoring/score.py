@@ -16,11 +16,11 @@ from apo_bench.records import SETTINGS, Row
 from apo_bench.records.run.run_file import read_run
 from apo_bench.scoring.entry import EXCLUDED, RIGHT, SCHEMA, WRONG, Entry, TrackScore, check_name, score_of
 from apo_bench.scoring.track import Track
-from apo_bench.statistics import NOT_EXECUTED, Place, place_of
+from apo_bench.statistics import NOT_EXECUTED, PLACE_FIELDS, place_of
 from apo_bench.sweeps.sweep import run_sweep
 
 _HEX = 16
-_CELL = tuple(name for name in Place.__match_args__ if name != "method")
+_CELL = tuple(name for name in PLACE_FIELDS if name != "method")
 
 
 @check_arguments

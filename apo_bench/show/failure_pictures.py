@@ -19,7 +19,7 @@ from apo_bench.io import each_line
 from apo_bench.records import Row, Salt, TrialSettings, row_key, settings_of
 from apo_bench.records.run.replay_command import Files, left_out, own_code
 from apo_bench.records.run.validation import row_of
-from apo_bench.report.run.trials import FailurePicture
+from apo_bench.report.pictures import FailurePicture
 
 _SIZE = (640, 480)
 _QUALITY = 82

@@ -7,9 +7,8 @@ from apo_bench.errors import InputError
 from apo_bench.io import each_line
 from apo_bench.records import Row, read_salt, settings_of
 from apo_bench.records.run.replay_command import own_code
-from apo_bench.records.run.run_file import read_run
+from apo_bench.records.run.run_file import read_run, scenario_files
 from apo_bench.records.run.validation import row_of
-from apo_bench.report.run.trials import scenario_files
 from apo_bench.show.again import run_again, why_not_again
 from apo_bench.trial.story import Story
 

@@ -1,28 +1,10 @@
-"""Rates, paired comparisons, curves, power: numbers out of rows."""
+"""Rates, paired comparisons, curves: numbers out of trial records."""
 
-from apo_bench.statistics.effort import (
-    Effort,
-    FeltSummary,
-    TrialTimes,
-    Work,
-    efforts,
-    felt,
-    read_timing,
-    trial_times,
-    work,
-)
-from apo_bench.statistics.forecasts import (
-    ALL,
-    Calibration,
-    Confusion,
-    GapSummary,
-    Quantiles,
-    Recognition,
-    calibrations,
-    confusions,
-    gaps,
-    recognitions,
-)
+from apo_bench.statistics.calibration import calibrations
+from apo_bench.statistics.effort import efforts
+from apo_bench.statistics.gaps import gaps
+from apo_bench.statistics.half_level import HalfLevel
+from apo_bench.statistics.line import ALL, Line
 from apo_bench.statistics.over_seeds import (
     FEWEST_SEEDS,
     Contrast,
@@ -33,112 +15,62 @@ from apo_bench.statistics.over_seeds import (
     threshold,
 )
 from apo_bench.statistics.paired import Paired, tango
-from apo_bench.statistics.power import (
-    ERROR,
-    evidence,
-    least_discordant,
-    margin_power,
-    margin_trials,
-    paired_power,
-    paired_trials,
-    rate_trials,
-    shares,
-    wilson_half_width,
-)
-from apo_bench.statistics.rates import (
-    NOT_EXECUTED,
-    Cell,
-    Interval,
-    Place,
-    Rate,
-    by_place,
-    order,
-    place_of,
-    rank,
-    tally,
-    wilson,
-)
-from apo_bench.statistics.settings import (
-    Setting,
-    cell_place,
-    failures,
-    level_label,
-    level_of,
-    level_unit,
-    level_words,
-    levels_of,
-    members,
-    percent,
-    percents,
-    points,
-    setting_of,
-    share,
-    signed,
-)
+from apo_bench.statistics.place import PLACE_FIELDS, Place, by_place, level_label, order, place_of, rank
+from apo_bench.statistics.prediction import confusions
+from apo_bench.statistics.probing import felt
+from apo_bench.statistics.rates import NOT_EXECUTED, Cell, Interval, Rate, Records, tally, wilson
+from apo_bench.statistics.recognition import recognitions
+from apo_bench.statistics.settings import level_of, level_unit, level_words, levels_of, members, settings
+from apo_bench.statistics.summary import Summary, summary
+from apo_bench.statistics.timing import read_timing, trial_times, work
+from apo_bench.statistics.words import percent, percents, points, signed
 
 __all__ = (
     "ALL",
-    "ERROR",
     "FEWEST_SEEDS",
     "NOT_EXECUTED",
-    "Calibration",
+    "PLACE_FIELDS",
     "Cell",
-    "Confusion",
     "Contrast",
-    "Effort",
-    "FeltSummary",
-    "GapSummary",
+    "HalfLevel",
     "Interval",
+    "Line",
     "Paired",
     "Place",
-    "Quantiles",
     "Rate",
-    "Recognition",
+    "Records",
     "Results",
-    "Setting",
-    "TrialTimes",
-    "Work",
+    "Summary",
     "by_place",
     "calibrations",
-    "cell_place",
     "confusions",
     "contrast",
     "efforts",
-    "evidence",
-    "failures",
     "felt",
     "gaps",
-    "least_discordant",
     "level_label",
     "level_of",
     "level_unit",
     "level_words",
     "levels_of",
-    "margin_power",
-    "margin_trials",
     "mean_surprise",
     "members",
     "order",
-    "paired_power",
-    "paired_trials",
     "percent",
     "percents",
     "place_of",
     "points",
     "pooled_rate",
     "rank",
-    "rate_trials",
     "read_timing",
     "recognitions",
-    "setting_of",
-    "share",
-    "shares",
+    "settings",
     "signed",
+    "summary",
     "tally",
     "tango",
     "threshold",
     "trial_times",
     "wilson",
-    "wilson_half_width",
     "work",
 )

@@ -12,26 +12,36 @@ held against Fisher's F with 1 and n - 1 degrees of freedom, which for many seed
 and for few is what Student's t would ask for (Owen's advice).
 """
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.errors import InputError
 from apo_bench.geometry import Array
-from apo_bench.io import grouped
+from apo_bench.records.run.trials import Index
 from apo_bench.statistics.paired import mcnemar, tango
-from apo_bench.statistics.power import ERROR, least_discordant, paired_trials
 from apo_bench.statistics.rates import CONFIDENCE, Interval, wilson
 
-FEWEST_SEEDS = least_discordant(ERROR)
+ERROR = 0.05
+"""Of a two-sided test."""
+FEWEST_SEEDS = 6
 """With fewer, not even a difference at every seed is beyond chance: 2 / 2^n is then over 5 % (sign test)."""
 _DIGITS = 12
 """Sums of the same numbers in another order are the same value to so many digits."""
 _HALVINGS = 48
 """What is left is less than 1e-14 of the range."""
-Results = Mapping[tuple[Any, ...], bool]
-"""All that a trial is of but the method, its seed last -> success."""
+_EDGE = 1e-9
+"""A mean is not sought closer to a bound than this part of the way."""
+
+
+class Results(NamedTuple):
+    """The trials of one method that count."""
+
+    trial: Index
+    """(n,) a number for all that a trial is of but the method."""
+    seed: Array
+    """(n,)"""
+    success: Array
+    """(n,) 1 or 0."""
 
 
 class PooledRate(NamedTuple):
@@ -70,43 +80,34 @@ class Contrast(NamedTuple):
         differ = not by_chance if self.trials == self.seeds else self.better + self.worse >= FEWEST_SEEDS
         return differ and not self.interval.low <= 0.0 <= self.interval.high
 
-    @property
-    def enough(self) -> int | None:
-        """Seeds at which a sign test would show who is better, if as many of them differ as here; None: not known."""
-        win = self.better / self.seeds
-        lose = self.worse / self.seeds
-        if (win - lose) * self.difference <= 0.0:
-            return None
-        try:
-            return paired_trials(win, lose)
-        except InputError:  # more than can be sought
-            return None
-
 
 def pooled_rate(results: Results) -> PooledRate:
     """The rate of one method over all its trials, of which there is one at least."""
-    values, most = _by_seed({key: float(value) for key, value in results.items()})
-    right = sum(results.values())
-    interval = wilson(right, len(results)) if len(values) == len(results) else mean_interval(values, 0.0, most)
-    return PooledRate(right, len(results), len(values), Interval(interval.low, min(1.0, interval.high)))
+    values, most = _by_seed(results.seed, results.success)
+    right = int(results.success.sum())
+    trials = len(results.seed)
+    low, high = wilson(right, trials) if len(values) == trials else mean_interval(values, 0.0, most)
+    return PooledRate(right, trials, len(values), Interval(low, min(1.0, high)))
 
 
 def contrast(first: Results, second: Results) -> Contrast | None:
     """One method against another; None where they have no trial in common."""
-    both = {key: float(first[key]) - float(second[key]) for key in first if key in second}
-    if not both:
+    _, i, j = np.intersect1d(first.trial, second.trial, return_indices=True)
+    if not len(i):
         return None
-    values, most = _by_seed(both)
-    apart = list(both.values())
-    if len(values) == len(both):
-        interval = tango(apart.count(1.0), apart.count(-1.0), len(both))
+    ours = first.success[i]
+    theirs = second.success[j]
+    apart = ours - theirs
+    values, most = _by_seed(first.seed[i], apart)
+    if len(values) == len(apart):
+        interval = tango(int((apart > 0).sum()), int((apart < 0).sum()), len(apart))
     else:
         # a seed that was not seen may differ in all of its trials
         interval = Interval(*np.clip(mean_interval(values, -most, most), -1.0, 1.0).tolist())
     return Contrast(
-        ours=sum(first[key] for key in both),
-        theirs=sum(second[key] for key in both),
-        trials=len(both),
+        ours=int(ours.sum()),
+        theirs=int(theirs.sum()),
+        trials=len(apart),
         seeds=len(values),
         interval=interval,
         better=int((values > 0.0).sum()),
@@ -168,23 +169,24 @@ def mean_interval(values: Array, low: float = 0.0, high: float = 1.0) -> Interva
 
 def _end(values: Array, counts: Array, low: float, high: float, inside: float, outside: float) -> float:
     """Where between the mean of the sample and a bound the surprise reaches its threshold."""
-    if inside == outside:
-        return outside
+    from scipy.optimize import brentq
+
     most = threshold(int(counts.sum()))
-    parts = np.linspace(0.0, 1.0, 34)[1:-1]
-    # six times one of 33 pieces is kept: 33^-6 of the way, 1e-9
-    for _ in range(6):
-        means = inside + parts * (outside - inside)
-        believed = int((mean_surprise(values, counts, means, low, high) <= most).sum())
-        inside, outside = ((inside, *means, outside)[i] for i in (believed, believed + 1))
-    return float(inside)
+
+    def beyond(mean: float) -> float:
+        return float(mean_surprise(values, counts, mean, low, high)) - most
+
+    edge = _EDGE * (outside - inside)
+    if edge == 0.0 or beyond(outside - edge) <= 0.0:
+        return outside
+    return float(brentq(beyond, inside + edge, outside - edge, xtol=1e-9))
 
 
-def _by_seed(values: Mapping[tuple[Any, ...], float]) -> tuple[Array, float]:
-    """(seeds,) the sum over the trials of a seed, over the mean number of trials of a seed, so that their mean is that
-    of all trials; and the largest such value that a seed could have."""
-    seeds = grouped((key[-1], value) for key, value in values.items())
-    usual = len(values) / len(seeds)
-    return np.round(np.array([sum(seeds[seed]) / usual for seed in sorted(seeds)]), _DIGITS), max(
-        map(len, seeds.values())
-    ) / usual
+def _by_seed(seeds: Array, results: Array) -> tuple[Array, float]:
+    """The sum over the trials of each seed, (seeds,), and the largest that one could have.
+
+    Both over the mean number of trials of a seed, so that the mean over seeds is that over trials.
+    """
+    _, of, trials = np.unique(seeds, return_inverse=True, return_counts=True)
+    usual = len(seeds) / len(trials)
+    return np.round(np.bincount(of, results) / usual, _DIGITS), float(trials.max() / usual)

@@ -1,22 +1,19 @@
 """Paired comparison: two methods over the same seeds, so that layout, hand and noise cancel."""
 
-from collections import Counter
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any, TypeVar, final
+from typing import TypeVar, final
 
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.records import Row, TrialSettings, feels, knows_relations, knows_truth, may_look
-from apo_bench.statistics.rates import CONFIDENCE, Interval, Place, Rate, by_place, order
+from apo_bench.records import TrialSettings, feels, knows_relations, knows_truth, may_look
+from apo_bench.records.run.trials import Trials, trials_of
+from apo_bench.statistics.place import Place, by_place
+from apo_bench.statistics.rates import CONFIDENCE, Interval, Rate, Records, mean
 
 K = TypeVar("K", bound=Hashable)
-_Where = TypeVar("_Where", bound=Any)
-"""`Place` of a cell, or the setting of a curve."""
-_Counts = Array | int
-
 REFERENCES = ("paper", "none")
 _EDGE = 1e-9
 """Limits are sought this far from -1, 1 and the estimate, where the statistic is not defined."""
@@ -74,7 +71,7 @@ class Paired:
         return Rate(self.only_reference, self.only_reference + self.both)
 
 
-def paired(rows: Iterable[Row], references: Sequence[str] = REFERENCES) -> tuple[Paired, ...]:
+def paired(records: Records, references: Sequence[str] = REFERENCES) -> tuple[Paired, ...]:
     """Every method but the oracle against every reference, cell by cell, sorted as `tally` sorts.
 
     `none` asks for no relations, so its rows with the right ones are the reference of those with wrong ones too.
@@ -83,16 +80,15 @@ def paired(rows: Iterable[Row], references: Sequence[str] = REFERENCES) -> tuple
     Raises:
         InputError: A trial is there twice.
     """
-    counted = {
-        place: {seed: row for seed, row in seeds.items() if row["success"] is not None}
-        for place, seeds in by_place(rows).items()
-    }
-    cells = {place: counted[place] for place in sorted(counted, key=order) if counted[place]}
+    places = by_place(trials_of(records)).items()
+    counted = {place: own.where(~np.isnan(own.number("success"))) for place, own in places}
+    cells = {place: own for place, own in counted.items() if len(own)}
     pairs = [
-        _paired(place, reference, cells[place], cells[place_of_reference(place, reference)])
+        _paired(place, reference, cells[place], cells[other])
         for place in cells
         for reference in references
-        if place.method != reference and not knows_truth(place.method) and place_of_reference(place, reference) in cells
+        if not knows_truth(place.method) and (other := place_of_reference(place, reference)) in cells
+        if place.method != reference
     ]
     raised = holm({_comparison(pair): pair.p for pair in pairs if pair.p is not None})
     return tuple(replace(pair, p_adjusted=raised.get(_comparison(pair))) for pair in pairs)
@@ -111,7 +107,7 @@ def holm(p: Mapping[K, float]) -> dict[K, float]:
     return {test: adjusted[test] for test in p}
 
 
-def place_of_reference(place: _Where, reference: str) -> _Where:
+def place_of_reference(place: Place, reference: str) -> Place:
     """What a cell, or a curve, is compared with: `none` asks for no relations, few for looks, few robots feel."""
     other = place._replace(method=reference, looks=place.looks if may_look(reference) else 0)
     if not feels(reference):
@@ -153,55 +149,52 @@ def tango(b: int, c: int, n: int) -> Interval:
         n: All pairs; without one nothing is known: -1 to 1.
     """
     from scipy.optimize import brentq
+    from scipy.special import ndtri
 
     if n == 0:
         return Interval(-1.0, 1.0)
-    z = normal_quantile()
+    z = float(ndtri((1 + CONFIDENCE) / 2))
     d = (b - c) / n
     # the statistic falls from far above z at delta = -1 through 0 at the estimate d to far below -z at delta = 1
-    low = -1.0 if c == n else brentq(lambda x: float(score(b, c, n, x)) - z, -1 + _EDGE, d - _EDGE)
-    high = 1.0 if b == n else brentq(lambda x: float(score(b, c, n, x)) + z, d + _EDGE, 1 - _EDGE)
+    low = -1.0 if c == n else brentq(lambda x: _score(b, c, n, x) - z, -1 + _EDGE, d - _EDGE)
+    high = 1.0 if b == n else brentq(lambda x: _score(b, c, n, x) + z, d + _EDGE, 1 - _EDGE)
     return Interval(float(low), float(high))
 
 
-def normal_quantile() -> float:
-    """Of a two-sided 95 % interval: 1.96."""
-    from scipy.special import ndtri
-
-    return float(ndtri((1 + CONFIDENCE) / 2))
-
-
-def score(b: _Counts, c: _Counts, n: _Counts, delta: Array | float) -> Array:
+def _score(b: int, c: int, n: int, delta: float) -> float:
     """Tango's score statistic of a difference delta; q is the likeliest share of c if that is the difference."""
     # q is the larger root of 2 n q^2 + B q - c delta (1 - delta) = 0, where the likelihood is flat along delta
     B = -b - c + (2 * n - b + c) * delta
-    q = (np.sqrt(np.maximum(B * B + 8 * n * c * delta * (1 - delta), 0.0)) - B) / (4 * n)
-    return np.asarray((b - c - n * delta) / np.sqrt(n * (2 * q + delta * (1 - delta))))
+    q = (np.sqrt(max(B * B + 8 * n * c * delta * (1 - delta), 0.0)) - B) / (4 * n)
+    return float((b - c - n * delta) / np.sqrt(n * (2 * q + delta * (1 - delta))))
 
 
-def _paired(
-    place: Place, reference: str, ours: Mapping[int, Mapping[str, Any]], theirs: Mapping[int, Mapping[str, Any]]
-) -> Paired:
-    pairs = [(ours[seed], theirs[seed]) for seed in sorted(set(ours) & set(theirs))]
-    free = [(a["planned_error_free_mm"], b["planned_error_free_mm"]) for a, b in pairs]
-    apart = [a - b for a, b in free if a is not None and b is not None]
-    ends = Counter((bool(a["success"]), bool(b["success"])) for a, b in pairs)
+def _paired(place: Place, reference: str, ours: Trials, theirs: Trials) -> Paired:
+    _, i, j = np.intersect1d(ours.number("seed"), theirs.number("seed"), assume_unique=True, return_indices=True)
+    ours = ours.where(i)
+    theirs = theirs.where(j)
+    right = ours.number("success") == 1
+    other_right = theirs.number("success") == 1
+    only_method = int((right & ~other_right).sum())
+    only_reference = int((~right & other_right).sum())
+    apart = ours.number("planned_error_free_mm") - theirs.number("planned_error_free_mm")
+    apart = apart[~np.isnan(apart)]
     return Paired(
         place=place,
         reference=reference,
-        pairs=len(pairs),
-        only_method=ends[True, False],
-        only_reference=ends[False, True],
-        both=ends[True, True],
-        p=mcnemar(ends[True, False], ends[False, True]) if pairs else None,
+        pairs=len(right),
+        only_method=only_method,
+        only_reference=only_reference,
+        both=int((right & other_right).sum()),
+        p=mcnemar(only_method, only_reference) if len(right) else None,
         p_adjusted=None,
         planned=len(apart),
-        free_mm=sum(apart) / len(apart) if apart else None,
+        free_mm=mean(apart),
         free_interval=_student(apart),
     )
 
 
-def _student(x: Sequence[float]) -> Interval | None:
+def _student(x: Array) -> Interval | None:
     """Student's t interval of a mean at 95 %: mean -+ t(n - 1) s / sqrt(n), s with n - 1 degrees of freedom."""
     from scipy.stats import sem, t
 

@@ -34,7 +34,6 @@ recognise block_on_block
 plan block_on_block
 scene block_on_block --out scene.xml
 scenario card block_on_block
-power --help
 arm list
 part import a.step --out parts
 eye block_on_block

@@ -25,7 +25,7 @@ from apo_bench.cli.app import app, main
 from apo_bench.parts.load import load_part
 
 ROOT = Path(__file__).parents[2]
-SWEEP = ROOT / "tests" / "kept" / "row7"
+SWEEP = ROOT / "tests" / "kept" / "sweep"
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
 BLOCK = re.compile(
     r"^```(?P<language>\w+)(?: title=\"(?P<title>[^\"]+)\")?\n(?P<text>.*?)^```$"

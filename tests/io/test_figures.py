@@ -13,13 +13,13 @@ DRAW = """
 import hashlib
 from pathlib import Path
 from apo_bench.assembly.graph import relation_graph
-from apo_bench.report.figures.sheet import Figure, Panel, draw
+from apo_bench.report.figures.sheet import Panel, draw
 from apo_bench.scenario.file import load_scenario
 from apo_bench.show.graph.picture import draw_graph
 
-drawing = draw(Figure("rates", [Panel("one", lambda axis, tips: axis.plot([0, 1], [0, 1]))]))
+drawing = draw("rates", [Panel("one", lambda axis: axis.plot([0, 1], [0, 1]))], {})
 draw_graph(relation_graph(load_scenario("block_on_block").assembly), Path("graph.svg"), title="graph")
-written = (drawing.sheet.encode(), drawing.write(Path("a.png")).read_bytes(), Path("graph.svg").read_bytes())
+written = (drawing.svg.encode(), drawing.write(Path("a.png")).read_bytes(), Path("graph.svg").read_bytes())
 print(*(hashlib.sha256(each).hexdigest() for each in written))
 """
 SETTINGS = b"""

@@ -13,14 +13,14 @@ import pytest
 from apo_bench import InputError
 from apo_bench.io import clean
 from apo_bench.records.run.run_file import read_run
-from apo_bench.records.run.run_folder import report_rows
+from apo_bench.records.run.trials import read_trials
 from apo_bench.report import report as reports
 from apo_bench.report.comparison.compare import compare
 from apo_bench.report.comparison.text import comparison_form
 from apo_bench.statistics import read_timing
 from tests.altered import FILES, altered
 
-KEPT = Path(__file__).parents[1] / "kept" / "row7"
+KEPT = Path(__file__).parents[1] / "kept" / "sweep"
 """2 scenarios, 2 levels, 3 methods, 2 seeds."""
 CASES = 300
 WHOLE = 5
@@ -29,7 +29,7 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="makes FIFOs")
 
 def read(folder: Path) -> None:
     """All that `compare` does without writing, and the files that only `report` reads."""
-    report_rows(folder)
+    read_trials(folder)
     read_run(folder)
     read_timing(folder)
     json.dumps(comparison_form(compare(folder, KEPT)), allow_nan=False)
@@ -153,7 +153,7 @@ def test_a_key_that_nobody_knows_is_left_out(tmp_path: Path) -> None:
     line = (KEPT / "trials.jsonl").read_text(encoding="utf-8").splitlines()[0]
     noted = json.dumps(json.loads(line) | {"note": {"a": [1]}})
     (folder / "trials.jsonl").write_text(f"{noted}\n", encoding="utf-8")
-    (row,) = report_rows(folder)
+    (row,) = read_trials(folder).rows()
     assert "note" not in row
 
 
@@ -170,4 +170,4 @@ def test_the_two_verdicts_go_together(changed: dict[str, Any], said: str, tmp_pa
     assert (right["success"], right["as_demonstrated"]) == (True, True)
     (tmp_path / "trials.jsonl").write_text(f"{json.dumps(right | changed)}\n", encoding="utf-8")
     with pytest.raises(InputError, match=f"line 1, field as_demonstrated: {said}"):
-        report_rows(tmp_path)
+        read_trials(tmp_path)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -79,12 +78,3 @@ def test_a_corrector_that_returns_what_no_row_holds_has_failed(monkeypatch: pyte
     row = trial.trial_row(mine, scene, shown, "0")
     assert (row["failure_stage"], row["failure_code"]) == ("correct", "raised")
     assert "returned what no row can hold (field p_value:" in row["sentence"]
-
-
-def test_folders_that_were_kept_can_be_read() -> None:
-    import lzma
-
-    kept = Path(__file__).parents[2] / "benchmarks" / "results" / "headline" / "rows.jsonl.xz"
-    with lzma.open(kept) as file:
-        for number, line in zip(range(1, 201), file, strict=False):
-            assert row_of(line, f"line {number}")["schema"].startswith("apo-bench/row/")

@@ -297,7 +297,7 @@ def test_what_changed_is_said(changed: dict[str, Any], words: str, tmp_path: Pat
         (
             "trials.jsonl",
             json.dumps(row(1) | {"schema": "apo-bench/row/10"}) + "\n",
-            "'apo-bench/row/10' was given; apo-bench/row/7, apo-bench/row/8 and apo-bench/row/9 can be read",
+            "'apo-bench/row/10' was given; only apo-bench/row/9 can be read",
         ),
         ("trials.jsonl", "{}\n", "line 1, field schema: it is missing"),
         ("trials.jsonl", "[1, 2]\n", "line 1: an object is needed, a list was given"),

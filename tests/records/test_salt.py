@@ -205,12 +205,13 @@ def test_the_report_says_which_salt_and_how_to_run_a_trial_again(tmp_path: Path)
     out = write(tmp_path / "out", of_salt(HERE.hash))
     (tmp_path / "salt").write_text(THERE.secret.hex())
     said = pages.words(report(out).page)
-    assert f"drawn with the salt of hash {HERE.hash}: FILE in a command stands for its file" in said
+    assert HERE.hash in said
+    assert "FILE in a command stands for its file" in said
     with pytest.raises(InputError, match=f"drawn with the salt {HERE.hash}, and the salt .* of {THERE.hash}; give"):
         report(out, salt_file=tmp_path / "salt")
     with pytest.raises(InputError, match="drawn without a salt; leave --salt-file out"):
         report(write(tmp_path / "plain", of_salt(None)), salt_file=tmp_path / "salt")
-    assert "of hash" not in pages.words(report(tmp_path / "plain").page)
+    assert HERE.hash not in pages.words(report(tmp_path / "plain").page)
 
 
 def test_a_replay_asks_for_the_file_that_there_is(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -16,14 +16,13 @@ from apo_bench import InputError, SweepSettings, TrialSettings, run_trial
 from apo_bench.cli import app as cli
 from apo_bench.cli.setting_options import sweep_options, trial_options
 from apo_bench.envs.apo_replay import APOReplay
-from apo_bench.records import KEY, LEVEL, REQUIRED, ROW_FIELDS, SETTINGS, look_up, setting_columns, settings_of
+from apo_bench.records import KEY, LEVEL, REQUIRED, ROW, ROW_FIELDS, SETTINGS, look_up, setting_columns, settings_of
 from apo_bench.records.run.run_folder import read_rows
 from apo_bench.report.comparison.compare import compare
-from apo_bench.statistics import tally
 from apo_bench.sweeps.sweep_file import SWEEP_KEYS
 
 ROOT = Path(__file__).parents[2]
-KEPT = ROOT / "tests" / "kept" / "row7"
+KEPT = ROOT / "tests" / "kept" / "sweep"
 """2 scenarios, 2 levels, 3 methods, 2 seeds."""
 
 
@@ -34,7 +33,7 @@ def test_columns_of_a_row_are_the_settings_in_their_order_with_their_ranges() ->
         column = ROW_FIELDS[SETTINGS[name].column]
         if not SETTINGS[name].choices and name != "salt":
             assert column in (kind, kind | None)
-    assert {*KEY, *columns} - {*REQUIRED} == {"salt", "wrench", "stated_error", "abstain"}
+    assert {*KEY, *columns} - {*REQUIRED} == {"salt"}
 
 
 def test_sweeps_have_an_axis_or_one_value_of_every_setting() -> None:
@@ -110,32 +109,13 @@ def test_a_trial_is_written_as_before() -> None:
 
 def test_a_folder_that_was_kept_is_reported_and_compared(tmp_path: Path) -> None:
     rows = read_rows(KEPT)
-    assert (len(rows), {row["schema"] for row in rows}) == (24, {"apo-bench/row/7"})
+    assert (len(rows), {row["schema"] for row in rows}) == (24, {ROW})
     for row, line in zip(rows, (KEPT / "trials.jsonl").read_text(encoding="utf-8").splitlines(), strict=True):
-        before = json.loads(line)
-        assert json.dumps({column: value for column, value in row.items() if column in before}) == line
+        assert json.dumps(row) == line
     folder = shutil.copytree(KEPT, tmp_path / "kept")
     assert cli.main(["report", str(folder), "--pictures", "0"]) == 0
     found = compare(KEPT, folder)
     assert (found.shared, len(found.changed), found.identical) == (24, 0, 24)
-
-
-def test_rows_of_the_schema_before_are_read_as_those_of_robots_that_do_not_feel() -> None:
-    """`tests/kept/row8`: 2 methods, 2 seeds, a robot error, `abstain`."""
-    folder = KEPT.with_name("row8")
-    rows = read_rows(folder)
-    lines = (folder / "trials.jsonl").read_text(encoding="utf-8").splitlines()
-    assert (len(rows), {row["schema"] for row in rows}) == (4, {"apo-bench/row/8"})
-    felt = ("touches", "touches_refused", "felt_mm", "felt_deg", "felt_sure_mm", "felt_sure_deg")
-    for row, line in zip(rows, lines, strict=True):
-        before = json.loads(line)
-        assert json.dumps({column: value for column, value in row.items() if column in before}) == line
-        assert {column: value for column, value in row.items() if column not in before} == {
-            "wrench": "external",
-            "stated_error": "drawn",
-            **dict.fromkeys(felt),
-        }
-    assert {cell.abstain for cell in tally(rows)} == {0.5}
 
 
 def test_every_setting_and_column_has_a_sentence_on_a_page(monkeypatch: pytest.MonkeyPatch) -> None:

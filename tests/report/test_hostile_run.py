@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 import os
@@ -12,18 +11,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from pyarrow import parquet
 
 from apo_bench import InputError
 from apo_bench.cli import app as cli
-from apo_bench.cli.terminal import print_cells, print_report
+from apo_bench.cli.terminal import print_cells
 from apo_bench.io import clean
 from apo_bench.records.run.replay_command import own_code, replay_command
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.report import report as reports
 from apo_bench.report.report import report
-from apo_bench.report.run.trials import sample
-from apo_bench.report.tables.table import Column, Table
 from apo_bench.show.failure_pictures import failure_pictures
 from apo_bench.statistics import tally
 from apo_bench.sweeps.progress import Rates
@@ -38,11 +33,7 @@ NAMES = (
     {"arm": "evil:arm"},
     {"method": "evil:correct"},
     {"noise": "evil:noise"},
-    {"noise": "evil.sub:noise.toml"},
     {"relations": "evil:told"},
-    {"method": "empirical:evil"},
-    {"arm": "missed:evil"},
-    {"arm": "os:abort"},
 )
 DANGEROUS = (
     *('<script>alert("1")</script>', "$(touch x)", "; rm -r .", "`touch x`", "'; touch x; '", "-x", "a b", "&&"),
@@ -58,8 +49,7 @@ def failed(seed: int, **more: Any) -> dict[str, Any]:
 def hostile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Rows that name code that lies beside them, from where the report is made."""
     folder = write(tmp_path / "run", [failed(seed, **names) for seed, names in enumerate(NAMES)])
-    for name in ("evil", "missed", "empirical"):
-        (folder / f"{name}.py").write_text(EVIL, encoding="utf-8")
+    (folder / "evil.py").write_text(EVIL, encoding="utf-8")
     (folder / "run.json").write_text(json.dumps({"files": {"evil": "evil:scenario"}, "command": "os:abort"}))
     monkeypatch.chdir(folder)
     monkeypatch.setattr(sys, "path", [*sys.path, str(folder)])
@@ -68,21 +58,11 @@ def hostile(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 def test_nothing_that_rows_name_is_imported(hostile: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert cli.main(["report", ".", "--pictures", "9"]) == 0
-    assert "8 failed trials name code that does not come with the package (evil:arm, " in capsys.readouterr().out
+    assert "4 failed trials name code that does not come with the package (evil:arm, " in capsys.readouterr().out
     assert cli.main(["compare", ".", ".", "--out", "made"]) == 0
-    assert not {"evil", "missed", "empirical"} & set(sys.modules)
+    assert "evil" not in sys.modules
     assert not (hostile / "touched").exists()
     assert "a report runs it only with --trust-code" in pages.words(hostile / "report.html")
-
-
-def test_pictures_are_asked_for_one_by_one_and_still_run_nothing(hostile: Path) -> None:
-    rows = [failed(seed, **names) for seed, names in enumerate(NAMES)]
-    assert sample(rows, 9) == []
-    assert len(sample(rows, 9, trust_code=True)) == 1
-    made, missed = failure_pictures(rows, hostile)
-    assert not made
-    assert all("--trust-code" in said for said in missed)
-    assert not (hostile / "touched").exists()
 
 
 def test_who_trusts_a_folder_runs_its_code(hostile: Path) -> None:
@@ -91,15 +71,6 @@ def test_who_trusts_a_folder_runs_its_code(hostile: Path) -> None:
     assert not made
     assert "its module raised SystemExit" in missed[0]
     assert (hostile / "touched").exists()
-
-
-def test_a_scenario_is_one_of_ours_or_a_file_that_the_run_names(tmp_path: Path) -> None:
-    other = [failed(0) | {"scenario": name} for name in ("../x.toml", "/dev/zero", "nowhere")]
-    made, missed = failure_pictures(other, tmp_path)
-    assert not made
-    assert [f"no file of the scenario '{r['scenario']}'" in said for r, said in zip(other, missed, strict=True)] == [
-        True
-    ] * 3
 
 
 @pytest.mark.parametrize(
@@ -145,8 +116,8 @@ def test_names_are_shown_and_not_obeyed(tmp_path: Path, capsys: pytest.CaptureFi
     assert "[/red]" in capsys.readouterr().out
 
 
-@pytest.mark.parametrize("name", ["scenario", "noise", "relations", "grasp", "arm", "method"])
-@pytest.mark.parametrize("evil", ["two\nlines", "\x1b[201~rm", "\x9b2J", "\u202etxt", "\x00"])
+@pytest.mark.parametrize("name", ["scenario", "method"])
+@pytest.mark.parametrize("evil", ["two\nlines", "\x1b[201~rm", "\u202etxt"])
 def test_names_in_commands_have_no_control_characters(name: str, evil: str, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=f"line 1, field {name}: text without control characters is needed"):
         report(write(tmp_path / "run", [row("contact") | {name: evil}]))
@@ -182,16 +153,6 @@ def test_a_sentence_of_a_row_is_only_shown(tmp_path: Path, capsys: pytest.Captur
     assert [one["sentence"] for one in read_rows(folder)] == ["\\x1b[31m\\x07\\r\\u202e"]
 
 
-@pytest.mark.parametrize(("count", "said"), [(0, "0 failures were"), (1, "1 failure was"), (2, "2 failures were")])
-def test_pictures_that_are_missing_are_said_in_sentences(
-    count: int, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(reports, "figures", lambda *_: {})  # figures take a second each
-    made = report(write(tmp_path / "run", [row("contact")]))
-    print_report(made._replace(pictures=count, no_pictures=("no file; check the path", "2 failed trials name code")))
-    assert f"{said} drawn. Not drawn: no file; check the path; 2 failed trials name code.\n" in capsys.readouterr().out
-
-
 @pytest.mark.parametrize(
     "name", ["report.html", "tables", "figures", "tables/cells.csv", "figures/success_over_level.svg"]
 )
@@ -222,22 +183,10 @@ def test_a_sweep_does_not_write_through_links(name: str, tmp_path: Path) -> None
     assert target.read_bytes() == b""
 
 
-def test_outputs_of_commands_are_not_written_through_links(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    target = tmp_path / "target"
-    target.write_text("mine", encoding="utf-8")
-    (tmp_path / "graph.svg").symlink_to(target)
-    assert cli.main(["graph", "block_on_block", "--out", str(tmp_path / "graph.svg")]) == 2
-    folder = write(tmp_path / "run", [row("contact")])
-    (tmp_path / "made").mkdir()
-    (tmp_path / "made" / "compare.html").symlink_to(target)
-    assert cli.main(["compare", str(folder), str(folder), "--out", str(tmp_path / "made")]) == 2
-    assert capsys.readouterr().err.count("is a symbolic link") == 2
-    assert target.read_text(encoding="utf-8") == "mine"
-
-
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="makes FIFOs")
-@pytest.mark.parametrize("name", ["trials.jsonl", "run.json", "timing.jsonl"])
-@pytest.mark.parametrize("kind", ["a pipe", "a folder", "a device"])
+@pytest.mark.parametrize(
+    ("name", "kind"), [("trials.jsonl", "a pipe"), ("run.json", "a device"), ("timing.jsonl", "a folder")]
+)
 def test_what_is_no_file_is_refused_at_once(kind: str, name: str, tmp_path: Path) -> None:
     folder = write(tmp_path / "run", [row("contact")])
     (folder / name).unlink(missing_ok=True)
@@ -249,24 +198,3 @@ def test_what_is_no_file_is_refused_at_once(kind: str, name: str, tmp_path: Path
         (folder / name).symlink_to("/dev/zero")
     with pytest.raises(InputError, match=f"{name}: {kind} was given; give a"):
         report(folder)
-
-
-def test_cells_of_a_table_are_no_formulas(tmp_path: Path) -> None:
-    lines = [("=1+1", -0.5, "-0.5"), ("+1.0 (2)", 1.0, "-1e3"), ("@a", 2.0, "1"), ("-x", None, "2"), ("\tq", 3.0, "+3")]
-    lines += [("'=x", 4.0, "4"), ("'plain", 5.0, "5"), ("\r=", 6.0, "6")]
-    names = ("text", "number", "said")
-    table = Table(lines, [Column(name, value=lambda line, i=i: line[i]) for i, name in enumerate(names)])
-    with table.write(tmp_path / "table.csv").open(newline="", encoding="utf-8") as file:
-        head, *read = csv.reader(file)
-    assert tuple(head) == names
-    assert [cells[0] for cells in read] == ["'=1+1", "'+1.0 (2)", "'@a", "'-x", "'\tq", "''=x", "'plain", "'\r="]
-    assert [cells[1] for cells in read] == ["-0.5", "1.0", "2.0", "", "3.0", "4.0", "5.0", "6.0"]
-    assert [cells[2] for cells in read] == [said for _, _, said in lines]
-    kept = parquet.read_table(table.write(tmp_path / "table.parquet"))
-    assert [tuple(line.values()) for line in kept.to_pylist()] == lines
-
-
-def test_a_report_of_formulas(tmp_path: Path) -> None:
-    made = report(write(tmp_path / "run", [row("=cmd|calc", scenario="@SUM(A1)")]))
-    (line,) = csv.DictReader(made.tables["cells"].open(newline="", encoding="utf-8"))
-    assert (line["scenario"], line["method"]) == ("'@SUM(A1)", "'=cmd|calc")

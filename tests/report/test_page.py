@@ -6,7 +6,6 @@ import csv
 import json
 import os
 import re
-import shlex
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -82,31 +81,13 @@ def test_the_page_asks_for_nothing_and_says_every_number(made: Report, chromium:
         assert not re.search(r"https?://(?!www\.w3\.org)", made.page.read_text(encoding="utf-8"))
 
 
-def test_a_folder_that_is_called_sweep_is_called_so_once(tmp_path: Path) -> None:
-    for name, title in (("sweep", "sweep"), ("mine", "Sweep mine"), ("my_sweep", "my_sweep")):
-        assert f"<title>{title}</title>" in report(write(tmp_path / name, [row()])).page.read_text(encoding="utf-8")
-
-
-@pytest.mark.parametrize("panels", [1, 2, 3, 7])
-def test_plots_use_the_width_of_the_page(panels: int, tmp_path: Path, chromium: Any) -> None:
-    """A line of two where there are several, however many; one alone is not taller than the window."""
-    rows = [
-        row(scenario=f"s{i}", seed=seed, level=x, level_deg=x)
-        for i in range(panels)
-        for x in (1.0, 2.0)
-        for seed in (0, 1)
-    ]
-    made = report(write(tmp_path / "run", rows))
-    for width in (1280, 390):
+def test_figures_use_the_width_of_the_page(made: Report, chromium: Any) -> None:
+    """Those of several panels scroll on a phone."""
+    for width, least in ((1280, 0.9), (390, 1.5)):
         with opened(chromium, made.page, width) as (page, _, _):
-            boxes = page.evaluate(
-                "[...document.querySelector('#levels').parentElement.querySelectorAll('.panel')]"
-                ".map(e => e.getBoundingClientRect()).map(r => [r.left, r.right, r.height])"
-            )
+            box = page.locator("img.figure.wide").first.bounding_box()
             inner = page.evaluate("document.querySelector('main').clientWidth")
-            used = max(right for _, right, _ in boxes) - min(left for left, _, _ in boxes)
-            assert used > (0.95 if panels > 1 or width == 390 else 0.65) * inner
-            assert max(height for _, _, height in boxes) < 600
+            assert box["width"] > least * inner
             assert overflow(page) <= 0
 
 
@@ -165,35 +146,6 @@ def test_nothing_is_wider_than_the_window(made: Report, chromium: Any, width: in
         assert said == []
 
 
-def test_tables_that_go_on_to_the_right_fade_there(made: Report, chromium: Any) -> None:
-    with opened(chromium, made.page, 390) as (page, _, _):
-        page.wait_for_function("document.querySelector('.scroll.cut') !== null")
-        box = page.query_selector(".scroll.cut")
-        box.evaluate("(box) => { box.scrollLeft = box.scrollWidth; }")
-        page.wait_for_function("(box) => !box.classList.contains('cut')", arg=box)
-        assert overflow(page) <= 0
-
-
-def test_names_of_methods_and_levels_do_not_lie_on_each_other(tmp_path: Path, chromium: Any) -> None:
-    """Where both are long, the name stands above its bars."""
-    long = [row(m, i, level=0.5, level_deg=1.25) for m in ("none", "mine:corrector_of_mine") for i in range(3)]
-    short = [row(m, i) for m in ("none", "paper-track") for i in range(3)]
-    for name, some in (("long", long), ("short", short)):
-        page = report(write(tmp_path / name, some)).page
-        with opened(chromium, page) as (tab, _, _):
-            boxes = tab.evaluate(
-                "[...document.querySelectorAll('#stages ~ * svg.chart text')]"
-                ".map((t) => { const b = t.getBoundingClientRect(); return [b.left, b.top, b.right, b.bottom]; })"
-            )
-        assert boxes
-        assert not [
-            (a, b)
-            for i, a in enumerate(boxes)
-            for b in boxes[:i]
-            if a[0] < b[2] - 0.5 and b[0] < a[2] - 0.5 and a[1] < b[3] - 4 and b[1] < a[3] - 4
-        ]
-
-
 def test_only_what_was_lost_is_replayed_in_a_process_of_its_own(tmp_path: Path) -> None:
     lost = {"failure_stage": "worker", "failure_code": "worker_died", "success": False}
     some = [row("paper", i, i not in (1, 2)) | (lost if i in (1, 2) else {}) for i in range(4)]
@@ -234,12 +186,12 @@ def test_what_is_packed_is_what_the_rows_say(made: Report) -> None:
 def test_what_is_not_measured_is_said(tmp_path: Path) -> None:
     page = pages.words(report(write(tmp_path / "one", [row("contact", i) for i in range(3)])).page)
     for sentence in (
-        "No level varied: every trial was at level 1",
+        "No level varied, so nothing is known",
         "No method shares a cell with none or paper",
         "contact succeeds in 3 of 3 trials (100.0 %). 3 seeds are too few",
         "No picture: None was asked for",
         "No method that corrects had a plan",
-        "No method was told contacts that were recognised.",
+        "No method was told relations that were recognised.",
         "There is no timing.jsonl",
         "There is no run.json",
     ):
@@ -253,6 +205,7 @@ def test_figures_are_files_that_stand_alone(made: Report) -> None:
     for path in drawn:
         root = ElementTree.parse(path).getroot()
         assert root.tag == "{http://www.w3.org/2000/svg}svg"
+        assert not re.search(r">[^<]*mathdefault", path.read_text(encoding="utf-8"))
         assert not re.search(r"https?://(?!www\.w3\.org)", path.read_text(encoding="utf-8"))
 
 
@@ -305,19 +258,6 @@ def test_many_rows_take_little_room(tmp_path: Path) -> None:
     assert len(pages.trials(made.page)["columns"]["seed"]) == 8000
 
 
-def test_rows_that_lack_something_are_refused(tmp_path: Path) -> None:
-    from apo_bench import InputError
-
-    broken = row("contact")
-    del broken["success"]
-    with pytest.raises(InputError, match="line 1, field success: it is missing"):
-        report(write(tmp_path / "broken", [broken]))
-    with pytest.raises(InputError, match="line 1, field worst_gap_mm: a number or null is needed, text was given"):
-        report(write(tmp_path / "wrong", [row("contact", worst_gap_mm="much")]))
-    with pytest.raises(InputError, match="line 1: this is not a row of a sweep"):
-        report(write(tmp_path / "nan", [row("contact", worst_gap_mm=float("nan"))]))
-
-
 def test_a_report_that_cannot_be_made_ends_in_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     from apo_bench.cli import app as cli
 
@@ -350,13 +290,6 @@ def test_odd_sweeps_have_a_page(trials: list[dict[str, Any]], tmp_path: Path) ->
     assert len(pages.trials(made.page)["columns"]["seed"]) == sum(r["level"] is not None for r in trials)
 
 
-def test_measured_demonstrations_alone_are_no_sweep(tmp_path: Path) -> None:
-    from apo_bench import InputError
-
-    with pytest.raises(InputError, match="belong to no cell"):
-        report(write(tmp_path / "run", [row("contact", level=None, level_deg=None, careless=None)]))
-
-
 def test_nothing_of_an_older_report_is_left(tmp_path: Path) -> None:
     two = [row("none"), row("contact", gap_before_mm=1.0, gap_after_mm=0.0)]
     folder = write(tmp_path / "run", two)
@@ -372,11 +305,3 @@ def test_trials_whose_worker_died_are_failures_of_a_stage_of_their_own(tmp_path:
     page = pages.lines(made.page)
     assert "50.0 % 9.5 to 90.5 % n 2 executed: 100.0 %, n 1" in page
     assert "worker: time_limit" in pages.trials(made.page)["words"]["why"]
-    assert "worker 1 of 2 (50.0 %)" in made.page.read_text(encoding="utf-8")
-
-
-def test_commands_are_split_by_a_shell_as_they_were_meant(made: Report) -> None:
-    commands = pages.trials(made.page)["words"]["command"]
-    evil = next(c for c in commands if "evil" in c)
-    assert shlex.split(evil)[2] == f"evil {EVIL}"
-    assert all(shlex.split(c)[:2] == ["apo-bench", "replay"] for c in commands)

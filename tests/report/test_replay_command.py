@@ -12,10 +12,9 @@ import pytest
 
 from apo_bench import TrialSettings, build_scene, load_scenario, run_trial
 from apo_bench.cli import app as cli
-from apo_bench.records import settings_of
 from apo_bench.records.run.replay_command import milli, number, replay_command
+from apo_bench.report.pictures import sample
 from apo_bench.report.report import report
-from apo_bench.report.run.trials import sample
 from apo_bench.show.failure_pictures import failure_pictures
 from tests import pages
 from tests.statistics.test_rates import row, write
@@ -105,10 +104,6 @@ def test_only_the_method_and_what_is_not_a_default_is_said() -> None:
 def test_numbers_are_read_as_they_were(x: float) -> None:
     assert float(number(x)) == x
     assert milli(x * 1e-3) * 1e-3 == x * 1e-3
-
-
-def test_the_specification_of_a_row_is_that_of_its_trial(trials: list[dict[str, Any]]) -> None:
-    assert [settings_of(r, r["scenario"]) for r in trials] == list(SPECS)
 
 
 def test_the_sample_does_not_depend_on_the_order() -> None:

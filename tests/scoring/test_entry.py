@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from msgspec.structs import replace
 
@@ -54,6 +54,7 @@ def test_tracks_that_do_not_count_are_left_out_of_the_score_over_all() -> None:
     assert entry("m", easy=track(overall=False, a="11")).overall is None
 
 
+@settings(deadline=None)
 @given(st.dictionaries(st.text("ab|", min_size=1), st.text("10x", min_size=1), min_size=1))
 def test_what_is_written_is_read(cells: dict[str, str]) -> None:
     first = entry("m", given=replace(track(c="1"), **_of(cells)))

@@ -61,24 +61,3 @@ def test_it_holds_the_mean_and_turns_round_with_the_values(steps: list[int]) -> 
     assert x.mean() - 1e-12 <= high <= 1.0
     assert mean_interval(1.0 - x) == pytest.approx((1 - high, 1 - low), abs=1e-6)
     assert mean_interval(x[::-1]) == (low, high)
-
-
-@settings(max_examples=30, deadline=None)
-@given(steps=STEPS)
-def test_its_ends_are_where_the_surprise_passes_its_threshold(steps: list[int]) -> None:
-    x = np.array(steps) / 20
-    for end in mean_interval(x):
-        inwards = 1e-4 * np.sign(x.mean() - end)
-        for mean, believed in ((end + inwards, True), (end - inwards, False)):
-            if 0.0 < mean < 1.0 and abs(x.mean() - end) > 2e-4:
-                assert (float(mean_surprise(x, np.ones_like(x), mean)) <= threshold(len(x))) is believed
-
-
-@settings(max_examples=20, deadline=None)
-@given(steps=STEPS)
-def test_the_same_again_narrows_it(steps: list[int]) -> None:
-    x = np.array(steps) / 20
-    once = mean_interval(x)
-    twice = mean_interval(np.r_[x, x])
-    assert once.low - 1e-6 <= twice.low
-    assert twice.high <= once.high + 1e-6

@@ -7,10 +7,10 @@ from typing import Any
 
 import pytest
 
-from apo_bench.report.tables.cells import cell_table, felt_table
-from apo_bench.statistics import felt, members, tally
+from apo_bench.report.tables.cells import cell_table
+from apo_bench.report.tables.methods import felt_table
+from apo_bench.statistics import felt, members, settings, tally
 from apo_bench.statistics.paired import place_of_reference
-from apo_bench.statistics.settings import settings
 from tests.statistics.test_rates import row
 
 
@@ -22,16 +22,18 @@ def by_touch(seed: int, mm: float, method: str = "contact+feel", **more: Any) ->
 
 def test_sizes_are_root_mean_squares_of_vectors_as_standard_deviations_are() -> None:
     (found,) = felt([by_touch(0, 0.3), by_touch(1, 0.4), row("contact")])
-    assert (found.trials, found.touches, found.refused) == (2, 6.5, 1)
-    assert found.felt_mm == pytest.approx(math.sqrt((0.09 + 0.16) / 2))
-    assert (found.sure_mm, found.sure_deg) == pytest.approx((0.2, 0.05))
-    assert found.drawn == found.told == pytest.approx((math.sqrt(3) * 0.5, math.sqrt(3) * 0.1))
+    assert (found["trials"], found["touches"], found["refused"]) == (2, 6.5, 1)
+    assert found["felt_mm"] == pytest.approx(math.sqrt((0.09 + 0.16) / 2))
+    assert (found["sure_mm"], found["sure_deg"]) == pytest.approx((0.2, 0.05))
+    assert found["drawn_mm"] == found["stated_mm"] == pytest.approx(math.sqrt(3) * 0.5)
+    assert found["drawn_deg"] == found["stated_deg"] == pytest.approx(math.sqrt(3) * 0.1)
 
 
 @pytest.mark.parametrize(("stated", "told"), [("unstated", None), ("tool:1", (0.0, 0.0)), ("drawn", (0.866, 0.173))])
 def test_what_a_robot_was_told_stands_beside_what_was_drawn(stated: str, told: tuple[float, float] | None) -> None:
     (found,) = felt([by_touch(0, 0.3, stated_error=stated)])
-    assert found.told == (told and pytest.approx(told, abs=1e-3))
+    said = (found["stated_mm"], found["stated_deg"])
+    assert said == ((None, None) if told is None else pytest.approx(told, abs=1e-3))
     (line,) = felt_table((found,)).lines
     assert "0.87" in line
     assert "0.30" in line
@@ -56,7 +58,7 @@ def test_sensors_and_stated_errors_are_cells_of_robots_that_feel_alone() -> None
         ("cobot", ("contact", "contact+feel")),
         ("external", ("contact", "contact+feel")),
     ]
-    assert ["wrench cobot" in s.title() for s in groups] == [s.wrench == "cobot" for s in groups]
+    assert ["wrench cobot" in s.title for s in groups] == [s.wrench == "cobot" for s in groups]
     assert place_of_reference(cells[2], "none").wrench == "external"
     table = cell_table(cells)
     shown = [column.head for column in table.shown].index("wrench")

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench import InputError
-from apo_bench.statistics.levels.half_level import summary
+from apo_bench.statistics import summary
 from tests.statistics.test_rates import row
 
 METHODS = ("none", "paper", "contact")
@@ -35,11 +35,9 @@ def test_it_holds_every_part() -> None:
     assert {(p.place.method, p.reference) for p in found.pairs} == {
         ("none", "paper"), ("paper", "none"), ("contact", "none"), ("contact", "paper")
     }  # fmt: skip
-    assert [h.setting.method for h in found.half_levels] == ["none", "contact", "paper"]
+    assert [h.place.method for h in found.half_levels] == ["none", "contact", "paper"]
     levels = [h.level or np.nan for h in found.half_levels]
     assert levels == pytest.approx([0.2, 3.0, 1.5], rel=0.6) or found.half_levels[0].beyond == "below"
-    assert [a.seeds for a in found.areas] == [40, 40, 40]
-    assert {d.reference for d in found.area_differences} == {"none", "paper"}
 
 
 @settings(max_examples=5, deadline=None)
@@ -58,7 +56,7 @@ def test_other_references() -> None:
 
 
 def test_without_rows_there_is_nothing() -> None:
-    assert summary([]).cells == summary([]).pairs == summary([]).half_levels == summary([]).areas == ()
+    assert summary([]).cells == summary([]).pairs == summary([]).half_levels == ()
 
 
 def test_ten_thousand_rows_take_a_second_or_two() -> None:

@@ -13,8 +13,6 @@ import pytest
 from apo_bench import Scene, TrialSettings, build_scene, load_scenario, run_trial
 from apo_bench.cli import app as cli
 from apo_bench.records import RECOGNISED
-from apo_bench.report.figures.levels import recognition_figure
-from apo_bench.report.figures.sheet import draw
 from apo_bench.report.tables.methods import recognition_table
 from apo_bench.statistics import ALL, recognitions
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
@@ -69,30 +67,28 @@ def test_missed_and_false_relations_are_counted_like_recognised_ones(
 def test_an_observation_counts_once_however_many_methods_were_told_it() -> None:
     rows = [row("recognised", "paper"), row("recognised", "contact"), row("recognised", seed=1, contacts_missed=1)]
     (found,) = recognitions([*rows, row("given"), row("missed"), row("recognised", "none", **UNCOUNTED)])
-    assert (found.demonstrations, found.complete, found.right, found.missed, found.false) == (2, 1, 6, 1, 0)
-    assert found.precision == 1.0
-    assert found.recall == pytest.approx(6 / 7)
+    assert [found[name] for name in ("demonstrations", "complete", "right", "missed", "false")] == [2, 1, 6, 1, 0]
+    assert found["precision"] == 1.0
+    assert found["recall"] == pytest.approx(6 / 7)
 
 
 def test_scenarios_are_also_counted_together() -> None:
     rows = [row("recognised"), row("recognised", scenario="two", contacts_right=1, contacts_false=2)]
-    found = {r.place.scenario: r for r in recognitions(rows)}
+    found = {line["scenario"]: line for line in recognitions(rows)}
     assert list(found) == ["one", "two", ALL]
-    assert (found[ALL].demonstrations, found[ALL].complete, found[ALL].right, found[ALL].false) == (2, 1, 4, 2)
-    assert found["two"].precision == pytest.approx(1 / 3)
+    assert [found[ALL][name] for name in ("demonstrations", "complete", "right", "false")] == [2, 1, 4, 2]
+    assert found["two"]["precision"] == pytest.approx(1 / 3)
 
 
 def test_nothing_recognised_has_no_precision(tmp_path: Path) -> None:
     found = recognitions([row("recognised-jointly", contacts_right=0, contacts_missed=3)])
-    assert (found[0].precision, found[0].recall) == (None, 0.0)
-    assert recognition_table(found).markdown()[-1].endswith("| – | 0.00 % | 3 | 0 |")
+    assert (found[0]["precision"], found[0]["recall"]) == (None, 0.0)
+    assert recognition_table(found).markdown()[-1].endswith("| 3 | 0 | – | 0.00 % |")
     assert recognition_table(()).markdown() == ["No method was told relations that were recognised."]
     recognition_table(found).write(tmp_path / "table.csv")
     with (tmp_path / "table.csv").open(encoding="utf-8") as file:
         (line,) = csv.DictReader(file)
     assert (line["missed"], line["precision"], line["recall"]) == ("3", "", "0.0")
-    draw(recognition_figure(found)).write(tmp_path / "figure.png")
-    assert (tmp_path / "figure.png").stat().st_size > 5000
 
 
 def test_a_report_shows_what_was_recognised(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -107,7 +103,7 @@ def test_a_report_shows_what_was_recognised(tmp_path: Path, capsys: pytest.Captu
     ]
     assert cli.main(["report", str(out)]) == 0
     page = pages.lines(out / "report.html")
-    assert "| block_on_block | isotropic | recognised | 0 | 0.5 | 1 of 1 |" in page
+    assert "| block_on_block | isotropic | noise | recognised | 0 | 0.5 | 0.5 | 1 of 1 |" in page
     assert (out / "tables" / "recognised.csv").exists()
     assert (out / "figures" / "recognised.png").exists()
     capsys.readouterr()

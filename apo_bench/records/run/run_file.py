@@ -66,6 +66,18 @@ def read_run(folder: Path) -> dict[str, Any]:
     return run_of(read_bytes(path, "run file", _LARGEST_BYTES), str(path)) if os.path.lexists(path) else {}
 
 
+def scenario_files(run: Mapping[str, Any]) -> dict[str, str]:
+    """Scenarios that were given as files: name -> path."""
+    return dict(run.get("files") or {})
+
+
+def limits_of(run: Mapping[str, Any]) -> Limits:
+    """The limits that a sweep had when it was last started; the usual ones where it does not say."""
+    limits = {"trial_s": USUAL_LIMITS.trial_s} | (run.get("limits") or {})
+    trial_s = limits["trial_s"]
+    return Limits(None if trial_s is None else float(trial_s))
+
+
 def check_same(folder: Path, run: Mapping[str, Any]) -> None:
     """Raise an `InputError` that says what differs, unless a folder is of the same sweep; it may have fewer trials."""
     try:

@@ -22,8 +22,8 @@ from apo_bench.io import (
     is_whole,
     read_whole,
 )
-from apo_bench.records.row import KEY, LATER, REQUIRED, ROW_FIELDS, Row
-from apo_bench.records.settings import OLDER_ROWS, ROW, Name, TrialSettings
+from apo_bench.records.row import KEY, REQUIRED, ROW_FIELDS, Row
+from apo_bench.records.settings import ROW, Name
 
 _Text = Annotated[str, Meta(max_length=100_000)]
 _Plain = None | bool | int | float | _Text
@@ -109,14 +109,8 @@ def row_of(line: bytes, where: str) -> Row:
         InputError: A line that is no row.
     """
     row = _decoded(_ROW, line, where, "this is not a row of a sweep")
-    if row["schema"] not in (ROW, *OLDER_ROWS):
-        raise InputError(
-            f"{where}: a row of schema '{_short(row['schema'])}' was given; {', '.join(OLDER_ROWS)} and {ROW} can be "
-            "read."
-        )
-    for name in LATER:
-        if row[name] is None:
-            row[name] = getattr(TrialSettings, name)
+    if row["schema"] != ROW:
+        raise InputError(f"{where}: a row of schema '{_short(row['schema'])}' was given; only {ROW} can be read.")
     fault = _fault(row)
     if fault is not None:
         raise _wrong(where, *fault)

@@ -1,25 +1,24 @@
-"""Two sweeps against each other, trial by trial: two versions, two machines, two fidelities.
+"""Two sweeps against each other, trial by trial: two versions, two machines, two fidelities."""
 
-What is counted stands above how it is counted, in one file, since neither is understood without the other.
-"""
-
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from operator import itemgetter
 from pathlib import Path
 from typing import Any, NamedTuple, final
 
-from apo_bench.errors import InputError, require
-from apo_bench.io import grouped
-from apo_bench.records import SETTINGS, Key, Row, one_salt, row_key, with_salt
-from apo_bench.records.run.run_file import read_run
-from apo_bench.records.run.run_folder import NUMBERS, report_rows
-from apo_bench.statistics import ALL, Cell, Interval, Place, Rate, cell_place, order, place_of, tally, tango
+import numpy as np
 
-RUN = "run.json can be read"
+from apo_bench.errors import InputError, require
+from apo_bench.geometry import Array
+from apo_bench.io import grouped
+from apo_bench.records import KEY, SETTINGS, Key, row_key, with_salt
+from apo_bench.records.run.replay_command import replay_command
+from apo_bench.records.run.run_file import limits_of, read_run, scenario_files
+from apo_bench.records.run.trials import Mask, Trials, read_trials
+from apo_bench.report.trials import NUMBERS, verdict, why
+from apo_bench.statistics import ALL, Line, Place, Rate, order, place_of, tally, tango
+
 _ENDING = ("success", "failure_stage", "failure_code")
-_ENDED = itemgetter(*_ENDING)
-_RESULT = itemgetter(*_ENDING, "as_demonstrated", "loose_success", "failure_operation", "sentence", "freed", *NUMBERS)
+_RESULT = (*_ENDING, "as_demonstrated", "loose_success", "failure_operation", "sentence", "freed", *NUMBERS)
 
 
 class Side(NamedTuple):
@@ -27,76 +26,7 @@ class Side(NamedTuple):
 
     folder: Path
     run: Mapping[str, Any]
-    rows: Sequence[Row]
-
-
-class Difference(NamedTuple):
-    """A setting that is not the same in both; None where a side does not say."""
-
-    what: str
-    first: Any
-    second: Any
-
-
-@dataclass(frozen=True, kw_only=True)
-class _Pairs:
-    """Trials that both sweeps have and count."""
-
-    shared: int
-    only_first: int
-    """Of these, those that were right in the first alone."""
-    only_second: int
-
-    @property
-    def difference(self) -> float | None:
-        """Success of the second minus that of the first, over the trials that they share."""
-        return (self.only_second - self.only_first) / self.shared if self.shared else None
-
-    @property
-    def interval(self) -> Interval:
-        """Tango's, of that difference."""
-        return tango(self.only_second, self.only_first, self.shared)
-
-
-@final
-@dataclass(frozen=True, kw_only=True)
-class Agreement(_Pairs):
-    """Verdicts of the trials that both have, of one scenario or of all."""
-
-    scenario: str
-    same: Rate
-    """Trials whose verdict is the same; those whose demonstration was right in neither are left out."""
-    same_ending: Rate
-    """Trials whose verdict, stage and code are the same."""
-    same_everywhere: Rate
-    """Seeds with which every trial has the same verdict in both. All random numbers of a trial are drawn from its seed,
-    in every scenario the same, so that seeds, and not trials, are independent."""
-    excluded_in_one: int
-    """Trials whose demonstration was right in one of the two alone."""
-
-
-class NumberChange(NamedTuple):
-    """A number of a row, over the trials that both have."""
-
-    name: str
-    both: int
-    """Trials in which both have it."""
-    differ: int
-    """Of these, trials in which it is not exactly the same."""
-    most: float
-    """The largest absolute difference."""
-    alone: int
-    """Trials in which one of the two alone has it."""
-
-
-@final
-@dataclass(frozen=True, kw_only=True)
-class CellPair(_Pairs):
-    """Cells of both at the same place, whatever the fidelity; None where one has none."""
-
-    place: Place
-    first: Cell | None
-    second: Cell | None
+    trials: Trials
 
 
 @final
@@ -106,19 +36,25 @@ class Comparison:
 
     first: Side
     second: Side
-    differences: tuple[Difference, ...]
+    differences: Sequence[Line]
+    """What is not the same, and what it is in the first and in the second; None where a side does not say."""
     shared: int
     """Trials that both have."""
     alone: tuple[int, int]
     """Trials that the first alone, and the second alone, has."""
-    agreements: tuple[Agreement, ...]
-    """By scenario, and of all at the end."""
-    changed: tuple[tuple[Row, Row], ...]
-    """The trials whose verdicts differ."""
-    numbers: tuple[NumberChange, ...]
+    agreements: Sequence[Line]
+    """By scenario, and of all at the end. Trials whose demonstration was right in neither are left out. All random
+    numbers of a trial are drawn from its seed, in every scenario the same, so that seeds, and not trials, are
+    independent: `same_verdicts_in_all` counts those with which every trial has the same verdict in both."""
+    changed: Sequence[Line]
+    """The trials whose verdicts differ, with what both say of them."""
+    numbers: Sequence[Line]
+    """In how many trials both have a number, in how many it differs and by how much at most, and in how many one alone
+    has it."""
     identical: int
     """Trials of which verdict, stage, code, words and every number are exactly the same."""
-    cells: tuple[CellPair, ...]
+    cells: Sequence[Line]
+    """Cells of both at the same place, whatever the fidelity; None where one has none."""
 
 
 def compare(first: str | Path, second: str | Path) -> Comparison:
@@ -131,10 +67,10 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
         InputError: A folder is no sweep, holds a trial twice, or both have no trial in common (of other salts a seed is
             another trial).
     """
-    sides = [Side(Path(folder), read_run(Path(folder)), report_rows(Path(folder))) for folder in (first, second)]
+    sides = [Side(Path(folder), read_run(Path(folder)), read_trials(folder)) for folder in (first, second)]
     for side in sides:
-        require(side.rows, f"'{side.folder}' holds no finished trial yet; run the sweep before it is compared.")
-    salt, other_salt = (one_salt(side.rows) for side in sides)
+        require(len(side.trials), f"'{side.folder}' holds no finished trial yet; run the sweep before it is compared.")
+    salt, other_salt = (side.trials.find_salt() for side in sides)
     require(
         salt == other_salt,
         f"'{first}' was drawn {with_salt(salt)} and '{second}' {with_salt(other_salt)}, so that they have no "
@@ -147,121 +83,172 @@ def compare(first: str | Path, second: str | Path) -> Comparison:
         f"'{first}' and '{second}' have no trial in common (scenario, clearance, seed, carelessness, level, noise, "
         "relations, grasp, robot error and method); compare sweeps of the same seeds.",
     )
-    pairs = [(ours[key], theirs[key]) for key in both]
+    a = sides[0].trials.where(np.array([ours[key] for key in both]))
+    b = sides[1].trials.where(np.array([theirs[key] for key in both]))
     return Comparison(
         first=sides[0],
         second=sides[1],
-        differences=differences(*sides),
+        differences=_differences(*sides),
         shared=len(both),
         alone=(len(ours) - len(both), len(theirs) - len(both)),
-        agreements=agreements(pairs),
-        changed=tuple(pair for pair in sorted(pairs, key=_place_and_seed) if pair[0]["success"] != pair[1]["success"]),
-        numbers=number_changes(pairs),
-        identical=sum(bool(_RESULT(a) == _RESULT(b)) for a, b in pairs),
-        cells=_cells(sides[0], sides[1], pairs),
+        agreements=_agreements(a, b),
+        changed=_changed(sides[0]._replace(trials=a), sides[1]._replace(trials=b)),
+        numbers=_number_changes(a, b),
+        identical=int(_same(a, b, _RESULT).sum()),
+        cells=_cells(sides[0].trials, sides[1].trials, a, b),
     )
 
 
-def differences(first: Side, second: Side) -> tuple[Difference, ...]:
+def _differences(first: Side, second: Side) -> list[Line]:
     """What the two were asked to do and made with that is not the same; of source files those that differ.
 
-    Where one of them has no `run.json` that can be read, nothing that only stands there is compared.
+    Where one of them has no `run.json`, nothing that only stands there is compared.
     """
     if not (first.run and second.run):
-        first, second = (side._replace(run={RUN: bool(side.run) or None}) for side in (first, second))
+        first, second = (s._replace(run={"run.json can be read": bool(s.run) or None}) for s in (first, second))
     ours, theirs = (_settings_of(side) for side in (first, second))
-    return tuple(
-        Difference(n, ours.get(n), theirs.get(n))
-        for n in dict.fromkeys([*ours, *theirs])
-        if ours.get(n) != theirs.get(n)
-    )
-
-
-def agreements(pairs: Sequence[tuple[Row, Row]]) -> tuple[Agreement, ...]:
-    """Per scenario, and over all."""
-    groups = grouped((pair[0]["scenario"], pair) for pair in pairs)
-    return (*(_agreement(name, groups[name]) for name in sorted(groups)), _agreement(ALL, pairs))
-
-
-def number_changes(pairs: Sequence[tuple[Row, Row]]) -> tuple[NumberChange, ...]:
-    """One per number that is in any row."""
-    changes = []
-    for name in NUMBERS:
-        values = [tuple(map(itemgetter(name), pair)) for pair in pairs]
-        both = [(x, y) for x, y in values if x is not None and y is not None]
-        alone = sum((x is None) != (y is None) for x, y in values)
-        if both or alone:
-            most = max((abs(x - y) for x, y in both), default=0.0)
-            changes.append(NumberChange(name, len(both), sum(x != y for x, y in both), float(most), alone))
-    return tuple(changes)
-
-
-def _by_key(side: Side) -> dict[Key, Row]:
-    rows: dict[Key, Row] = {}
-    for row in side.rows:
-        if row["level"] is None:
-            continue
-        if row_key(row) in rows:
-            raise InputError(
-                f"'{side.folder}' holds a trial twice ({row['scenario']}, {row['method']}, level {row['level']:g}, "
-                f"seed {row['seed']}); every trial counts once, so leave one of the two out."
-            )
-        rows[row_key(row)] = row
-    return rows
-
-
-def _agreement(name: str, pairs: Sequence[tuple[Row, Row]]) -> Agreement:
-    counted = [(a, b) for a, b in pairs if (a["success"], b["success"]) != (None, None)]
-    verdicts = [(a["success"], b["success"]) for a, b in counted]
-    seeds = grouped((a["seed"], a["success"] == b["success"]) for a, b in counted)
-    return Agreement(
-        scenario=name,
-        same=Rate(sum(a == b for a, b in verdicts), len(verdicts)),
-        same_ending=Rate(sum(_ENDED(a) == _ENDED(b) for a, b in counted), len(counted)),
-        same_everywhere=Rate(sum(map(all, seeds.values())), len(seeds)),
-        **_pairs(verdicts),
-        excluded_in_one=sum(None in both for both in verdicts),
-    )
-
-
-def _place_and_seed(pair: tuple[Row, Row]) -> tuple[Any, ...]:
-    return (*order(_anywhere(place_of(pair[0]))), pair[0]["seed"])
-
-
-def _pairs(verdicts: Sequence[tuple[Any, Any]]) -> dict[str, int]:
-    """What `_Pairs` counts."""
-    alone = {"only_first": verdicts.count((True, False)), "only_second": verdicts.count((False, True))}
-    return {"shared": sum(None not in both for both in verdicts)} | alone
-
-
-def _cells(first: Side, second: Side, pairs: Iterable[tuple[Row, Row]]) -> tuple[CellPair, ...]:
-    """Cells by place, whatever the fidelity; sorted as `tally` sorts."""
-    ours, theirs = ({_anywhere(cell_place(cell)): cell for cell in tally(side.rows)} for side in (first, second))
-    verdicts = grouped((_anywhere(place_of(a)), (a["success"], b["success"])) for a, b in pairs)
-    return tuple(
-        CellPair(place=place, first=ours.get(place), second=theirs.get(place), **_pairs(verdicts.get(place, [])))
-        for place in sorted({**ours, **theirs}, key=order)
-    )
-
-
-def _anywhere(place: Place | None) -> Place:
-    """Whatever the fidelity, of a row that has a place: one with a level."""
-    assert place is not None
-    return place._replace(fidelity="full")
+    every = [{"what": name, "first": ours.get(name), "second": theirs.get(name)} for name in {**ours, **theirs}]
+    return [line for line in every if line["first"] != line["second"]]
 
 
 def _settings_of(side: Side) -> dict[str, Any]:
-    """Settings by name: of `run.json` one level deep, and of the rows what cannot be seen there."""
+    """Settings by name: of `run.json` one level deep, and of the trials what cannot be seen there."""
     settings: dict[str, Any] = {}
     for name, value in side.run.items():
-        if isinstance(value, dict):
-            settings |= {f"{name}: {key}": inner for key, inner in value.items()}
-        elif isinstance(value, list) and all(isinstance(x, dict) for x in value):
-            for i, inner in enumerate(value, start=1):
-                settings |= {f"{name} {i}: {key}": x for key, x in inner.items()}
-        else:
-            settings[name] = value
-    return settings | {
-        f"rows: {name}": sorted(set(map(itemgetter(name), side.rows)))
-        for name in ("schema", *(info.column for info in SETTINGS.values() if info.shared))
+        several = isinstance(value, list) and all(isinstance(x, dict) for x in value)
+        parts = {f"{name} {i}": x for i, x in enumerate(value, start=1)} if several else {name: value}
+        for part, inner in parts.items():
+            settings |= {f"{part}: {key}": x for key, x in inner.items()} if isinstance(inner, dict) else {part: inner}
+    shared = ("schema", *(info.column for info in SETTINGS.values() if info.shared))
+    return settings | {f"rows: {name}": sorted(side.trials.distinct(name)) for name in shared}
+
+
+def _by_key(side: Side) -> dict[Key, int]:
+    """Key -> number of the trial."""
+    index: dict[Key, int] = {}
+    keys = zip(*(side.trials.values(name) for name in KEY), strict=True)
+    for i, (key, level) in enumerate(zip(keys, side.trials.values("level"), strict=True)):
+        require(
+            key not in index,
+            f"'{side.folder}' holds a trial twice ({', '.join(map(str, key))}); every trial counts once, so leave one "
+            "of the two out.",
+        )
+        if level is not None:
+            index[key] = i
+    return index
+
+
+def _same(a: Trials, b: Trials, names: Sequence[str]) -> Mask:
+    """(n,) whether all these columns are exactly the same."""
+    ours, theirs = (zip(*(trials.values(name) for name in names), strict=True) for trials in (a, b))
+    return np.array([x == y for x, y in zip(ours, theirs, strict=True)], dtype=bool)
+
+
+def _agreements(a: Trials, b: Trials) -> list[Line]:
+    """Per scenario, and over all."""
+    counts = ~(np.isnan(a.number("success")) & np.isnan(b.number("success")))
+    a = a.where(counts)
+    b = b.where(counts)
+    masks = {name: a.holds("scenario", (name,).__contains__) for name in sorted(a.distinct("scenario"))}
+    masks[ALL] = np.ones(len(a), dtype=bool)
+    return [_agreement(name, a.where(own), b.where(own)) for name, own in masks.items()]
+
+
+def _agreement(scenario: str, a: Trials, b: Trials) -> Line:
+    same = _same(a, b, ("success",))
+    seeds, of = np.unique(a.number("seed"), return_inverse=True)
+    alike = np.bincount(of, ~same, minlength=len(seeds)) == 0
+    verdicts = _verdicts(a.number("success"), b.number("success"))
+    del verdicts["shared"]
+    return {
+        "scenario": scenario,
+        "trials": len(same),
+        **_share("same_verdict", int(same.sum()), len(same)),
+        "seeds": len(seeds),
+        **_share("same_verdicts_in_all", int(alike.sum()), len(seeds)),
+        "same_stage_and_code": int(_same(a, b, _ENDING).sum()),
+        **verdicts,
+        "excluded_in_one": int((np.isnan(a.number("success")) != np.isnan(b.number("success"))).sum()),
     }
+
+
+def _share(name: str, successes: int, trials: int) -> Line:
+    """A count with its rate and Wilson's interval."""
+    low, high = Rate(successes, trials).interval
+    rate = Rate(successes, trials).rate
+    return {name: successes, f"{name}_rate": rate, f"{name}_low_95": low, f"{name}_high_95": high}
+
+
+def _verdicts(x: Array, y: Array) -> Line:
+    """Of the trials that both have and count, the difference of success, second minus first, with Tango's interval."""
+    shared = int((~np.isnan(x) & ~np.isnan(y)).sum())
+    first = int(((x == 1) & (y == 0)).sum())
+    second = int(((x == 0) & (y == 1)).sum())
+    low, high = tango(second, first, shared)
+    return {
+        "shared": shared,
+        "right_in_first_alone": first,
+        "right_in_second_alone": second,
+        "difference": (second - first) / shared if shared else None,
+        "difference_low_95": low,
+        "difference_high_95": high,
+    }
+
+
+def _changed(first: Side, second: Side) -> list[Line]:
+    """Sorted as cells are, then by seed."""
+    unlike = ~_same(first.trials, second.trials, ("success",))
+    pairs = zip(first.trials.where(unlike).rows(), second.trials.where(unlike).rows(), strict=True)
+    lines = [
+        dict(zip(KEY, row_key(x), strict=True))
+        | {"place": _anywhere(place_of(x)), "first": _ended(x, first), "second": _ended(y, second)}
+        for x, y in pairs
+    ]
+    return sorted(lines, key=lambda line: (*order(line["place"]), line["seed"]))
+
+
+def _ended(row: Mapping[str, Any], side: Side) -> Line:
+    """How a trial ended on a side, and how to run it again."""
+    return {
+        "verdict": verdict(row),
+        "why": why(row),
+        "stage": row["failure_stage"],
+        "code": row["failure_code"],
+        "sentence": row["sentence"],
+        "command": replay_command(row, scenario_files(side.run), limits_of(side.run)),
+    }
+
+
+def _number_changes(a: Trials, b: Trials) -> list[Line]:
+    """One per number that is in any record."""
+    lines = []
+    for name in NUMBERS:
+        x = a.number(name)
+        y = b.number(name)
+        apart = np.abs(x - y)[~np.isnan(x - y)]
+        alone = int((np.isnan(x) != np.isnan(y)).sum())
+        differ = int((apart > 0).sum())
+        most = float(apart.max(initial=0.0))
+        lines.append({"name": name, "both": len(apart), "differ": differ, "most": most, "alone": alone})
+    return [line for line in lines if line["both"] or line["alone"]]
+
+
+def _cells(first: Trials, second: Trials, a: Trials, b: Trials) -> list[Line]:
+    """Cells by place, whatever the fidelity; sorted as `tally` sorts."""
+    ours, theirs = ({_anywhere(cell.place): cell for cell in tally(trials)} for trials in (first, second))
+    trials = grouped((_anywhere(place_of(row)), i) for i, row in enumerate(a.rows()))
+    x = a.number("success")
+    y = b.number("success")
+    places = sorted({**ours, **theirs}, key=order)
+    of = {place: trials.get(place, []) for place in places}
+    return [
+        {"place": place, "first": ours.get(place), "second": theirs.get(place), **_verdicts(x[of[place]], y[of[place]])}
+        for place in places
+    ]
+
+
+def _anywhere(place: Place | None) -> Place:
+    """Whatever the fidelity, of a trial that has a place: one with a level."""
+    if place is None:
+        raise InputError("a measured demonstration has no level, so it belongs to no cell.")
+    return place._replace(fidelity="full")

@@ -6,24 +6,12 @@ from typing import Any
 
 from apo_bench.errors import InputError
 from apo_bench.io import check_folders, write_file
-from apo_bench.records import KEY, Row, row_key
-from apo_bench.records.run.replay_command import replay_command
-from apo_bench.records.run.run_folder import NUMBERS
-from apo_bench.report.comparison.compare import Agreement, Comparison, Side
-from apo_bench.report.page.report_page import page
-from apo_bench.report.run.trials import limits_of, scenario_files, value_words, verdict, why
-from apo_bench.report.tables.table import Column, Table, level_text
-from apo_bench.statistics import (
-    FEWEST_SEEDS,
-    Cell,
-    Rate,
-    cell_place,
-    percent,
-    percents,
-    place_of,
-    points,
-    setting_of,
-)
+from apo_bench.report.comparison.compare import Comparison
+from apo_bench.report.facts import value_words
+from apo_bench.report.page.page import Section, page
+from apo_bench.report.tables.table import Column, Table, fill
+from apo_bench.report.trials import NUMBERS
+from apo_bench.statistics import FEWEST_SEEDS, Interval, Line, percent, percents
 
 _AGREEMENT = (
     "The same trials in both: how often success is the same, with Wilson's interval, and how often stage and code of "
@@ -39,6 +27,13 @@ _CELLS = (
 )
 _MOST_LISTED = 2000
 """Changed trials that are listed."""
+_DIFFERENCE = fill("{difference:points} ({difference_low_95:points} to {difference_high_95:points})")
+_WHERE = (
+    Column("scenario", "scenario", "place.scenario", words=True),
+    Column("conditions", "conditions", "place.conditions", words=True),
+    Column("method", "method", "place.method", words=True),
+    Column("level", "level", "place.level_words", words=True),
+)
 
 
 def comparison_tables(comparison: Comparison) -> dict[str, Table]:
@@ -46,48 +41,49 @@ def comparison_tables(comparison: Comparison) -> dict[str, Table]:
     apart; rates of both, cell by cell; trials whose verdicts differ, with sentences and commands; and what is not the
     same in both."""
     agreement = (
-        _words("scenario"),
-        _both("trials", lambda a: a.same.trials),
-        _both("same verdict", lambda a: _counted(a.same)),
-        _both("95 %", lambda a: percents(a.same.interval, 2)),
-        _both("seeds", lambda a: a.same_everywhere.trials),
-        _both("same in all", lambda a: _counted(a.same_everywhere)),
-        _both("95 %", lambda a: percents(a.same_everywhere.interval, 2), "95 % 2"),
-        _both("same stage and code", lambda a: _counted(a.same_ending)),
-        _both("right in the first alone", lambda a: a.only_first),
-        _both("right in the second alone", lambda a: a.only_second),
-        _both("difference of success [points]", lambda a: points(a.difference, a.interval)),
+        Column("scenario", "scenario", words=True),
+        Column("trials", "trials"),
+        Column("same verdict", "same verdict", fill("{same_verdict} ({same_verdict_rate:percent2})")),
+        Column("95 %", "95 %", fill(_between("same_verdict"))),
+        Column("seeds", "seeds"),
+        Column("same in all", "same in all", fill("{same_verdicts_in_all} ({same_verdicts_in_all_rate:percent2})")),
+        Column("95 % 2", "95 %", fill(_between("same_verdicts_in_all"))),
+        Column("same stage and code", "same stage and code", "same_stage_and_code"),
+        Column("right in the first alone", "right in the first alone", "right_in_first_alone"),
+        Column("right in the second alone", "right in the second alone", "right_in_second_alone"),
+        Column("difference of success [points]", "difference of success [points]", _DIFFERENCE),
     )
     numbers = (
-        _words("number", lambda a: NUMBERS[a.name]),
-        _both("trials", lambda a: a.both),
-        _both("differ"),
-        _both("largest difference", lambda a: f"{a.most:.3g}" if a.both else None),
-        _both("in one alone", lambda a: a.alone),
+        Column("number", "number", _label, words=True),
+        Column("trials", "trials", "both"),
+        Column("differ", "differ"),
+        Column("largest difference", "largest difference", fill("{most:.3g}")),
+        Column("in one alone", "in one alone", "alone"),
     )
     cells = (
-        *_where(cell_place),
-        _both("first", lambda p: _rate(p.first)),
-        _both("second", lambda p: _rate(p.second)),
-        _both("shared"),
-        _both("first alone", lambda p: p.only_first),
-        _both("second alone", lambda p: p.only_second),
-        _both("difference [points]", lambda p: points(p.difference, p.interval)),
+        *_WHERE,
+        Column("first", "first", fill("{first.rate:percent}, n {first.trials}")),
+        Column("second", "second", fill("{second.rate:percent}, n {second.trials}")),
+        Column("shared", "shared"),
+        Column("first alone", "first alone", "right_in_first_alone"),
+        Column("second alone", "second alone", "right_in_second_alone"),
+        Column("difference [points]", "difference [points]", _DIFFERENCE),
     )
     changed = (
-        *_where(lambda pair: place_of(pair[0])),
-        _words("seed", lambda pair: pair[0]["seed"]),
-        _words("first", lambda pair: f"{verdict(pair[0])} {why(pair[0])}".strip()),
-        _words("in words", lambda pair: pair[0].get("sentence")),
-        _words("second", lambda pair: f"{verdict(pair[1])} {why(pair[1])}".strip()),
-        _words("in words", lambda pair: pair[1].get("sentence"), "in words 2"),
-        _words("command of the first", lambda pair: _command(pair[0], comparison.first)),
-        _words("command of the second", lambda pair: _command(pair[1], comparison.second)),
+        *_WHERE,
+        Column("seed", "seed", words=True),
+        Column("first", "first", fill("{first.verdict} {first.why}"), words=True),
+        Column("in words", "in words", "first.sentence", words=True),
+        Column("second", "second", fill("{second.verdict} {second.why}"), words=True),
+        Column("in words 2", "in words", "second.sentence", words=True),
+        Column("command of the first", "command of the first", "first.command", words=True),
+        Column("command of the second", "command of the second", "second.command", words=True),
     )
+    first, second = (str(side.folder) for side in (comparison.first, comparison.second))
     differences = (
-        _words("what"),
-        _words(str(comparison.first.folder), lambda d: _value(d.first)),
-        _words(str(comparison.second.folder), lambda d: _value(d.second)),
+        Column("what", "what", words=True),
+        Column(first, first, _side("first"), words=True),
+        Column(second, second, _side("second"), words=True),
     )
     return {
         "agreement": Table(comparison.agreements, agreement, note=_AGREEMENT),
@@ -106,26 +102,22 @@ def in_words(comparison: Comparison) -> str:
     return f"{shared} {_agreed(comparison.agreements[-1])} {identical}"
 
 
-def _agreed(total: Agreement) -> str:
+def _agreed(total: Line) -> str:
     """How many verdicts agree, and at how many seeds all of them do; seeds are independent, trials are not."""
-    same = total.same
-    seeds = total.same_everywhere
-    if not same.trials:
+    if not total["trials"]:
         return "None of them counts: no demonstration was right itself."
-    right = f"{total.only_first:,} right in the first alone, {total.only_second:,} in the second alone"
-    counted = f", {total.excluded_in_one:,} counted in one of the two alone" * bool(total.excluded_in_one)
-    if seeds.trials < FEWEST_SEEDS:
+    counted = f", {total['excluded_in_one']:,} counted in one of the two alone" * bool(total["excluded_in_one"])
+    seeds = Interval(total["same_verdicts_in_all_low_95"], total["same_verdicts_in_all_high_95"])
+    sure = f"95 % interval {percents(seeds)} of seeds"
+    if total["seeds"] < FEWEST_SEEDS:
         sure = f"too few for an interval: from {FEWEST_SEEDS} on there is one"
-    else:
-        sure = f"95 % interval {percents(seeds.interval)} of seeds"
+    rate = percent(total["same_verdict_rate"], 2)
     return (
-        f"Verdicts agree in {same.successes:,} of {same.trials:,} ({percent(same.rate, 2)}): {right}{counted}. All of "
-        f"them agree at {seeds.successes:,} of {seeds.trials:,} seed{'s' * (seeds.trials != 1)} ({sure})."
+        f"Verdicts agree in {total['same_verdict']:,} of {total['trials']:,} ({rate}): "
+        f"{total['right_in_first_alone']:,} right in the first alone, {total['right_in_second_alone']:,} in the second "
+        f"alone{counted}. All of them agree at {total['same_verdicts_in_all']:,} of {total['seeds']:,} "
+        f"seed{'s' * (total['seeds'] != 1)} ({sure})."
     )
-
-
-def _trials(n: int) -> str:
-    return "1 trial is" if n == 1 else f"{n:,} trials are"
 
 
 def write_comparison(comparison: Comparison, folder: Path) -> Path:
@@ -135,29 +127,24 @@ def write_comparison(comparison: Comparison, folder: Path) -> Path:
         InputError: The folder cannot be written.
     """
     tables = comparison_tables(comparison)
-    folders = [side.folder for side in (comparison.first, comparison.second)]
+    folders = [str(side.folder) for side in (comparison.first, comparison.second)]
+    names = [Path(each).resolve().name for each in folders]
     count = len(comparison.changed)
     listed = f"; the first {_MOST_LISTED:,} are listed" if count > _MOST_LISTED else ""
-    html = page(
-        "compare.html",
-        title=f"{folders[0].resolve().name} against {folders[1].resolve().name}",
-        sections={
-            "verdicts": "Verdicts",
-            "changed": "Trials whose verdicts differ",
-            "numbers": "Numbers",
-            "rates": "Rates",
-            "differences": "What is not the same",
-        },
-        answer=in_words(comparison),
-        folders=folders,
-        tables=tables,
-        changed=f"{count:,} of {comparison.shared:,} trials{listed}.",
-    )
+    changed = ("text", f"{count:,} of {comparison.shared:,} trials{listed}.")
+    sections = [
+        Section("verdicts", "Verdicts", [("table", tables["agreement"])]),
+        Section("changed", "Trials whose verdicts differ", [changed, ("table", tables["changed"])]),
+        Section("numbers", "Numbers", [("table", tables["numbers"])]),
+        Section("rates", "Rates", [("table", tables["cells"])]),
+        Section("differences", "What is not the same", [("table", tables["differences"])]),
+    ]
+    html = page(" against ".join(names), in_words(comparison), folders, sections)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         check_folders([folder])
         for name, table in tables.items():
-            table.write_all(folder / f"{name}.csv")
+            table.write(folder / f"{name}.csv")
         write_file(folder / "compare.html", html)
     except OSError as error:
         raise InputError(f"--out {folder} cannot be written ({error.strerror}); choose another place.") from error
@@ -166,9 +153,8 @@ def write_comparison(comparison: Comparison, folder: Path) -> Path:
 
 def comparison_form(comparison: Comparison) -> dict[str, Any]:
     """A comparison as JSON holds it."""
-    sides = (comparison.first, comparison.second)
     return {
-        "schema": ("apo-bench/comparison/1"),
+        "schema": "apo-bench/comparison/1",
         "first": str(comparison.first.folder),
         "second": str(comparison.second.folder),
         "verdict": "success",
@@ -176,77 +162,26 @@ def comparison_form(comparison: Comparison) -> dict[str, Any]:
         "first_alone": comparison.alone[0],
         "second_alone": comparison.alone[1],
         "identical": comparison.identical,
-        "agreements": [
-            {
-                "scenario": a.scenario,
-                "trials": a.same.trials,
-                "same_verdict": a.same.successes,
-                "same_verdict_rate": a.same.rate,
-                "same_verdict_low_95": a.same.interval.low,
-                "same_verdict_high_95": a.same.interval.high,
-                "seeds": a.same_everywhere.trials,
-                "same_verdicts_in_all": a.same_everywhere.successes,
-                "same_verdicts_in_all_low_95": a.same_everywhere.interval.low,
-                "same_verdicts_in_all_high_95": a.same_everywhere.interval.high,
-                "same_stage_and_code": a.same_ending.successes,
-                "right_in_first_alone": a.only_first,
-                "right_in_second_alone": a.only_second,
-                "excluded_in_one": a.excluded_in_one,
-                "difference": a.difference,
-                "difference_low_95": a.interval.low,
-                "difference_high_95": a.interval.high,
-            }
-            for a in comparison.agreements
-        ],
-        "numbers": [a._asdict() for a in comparison.numbers],
-        "differences": [d._asdict() for d in comparison.differences],
-        "changed": [
-            dict(zip(KEY, row_key(pair[0]), strict=True))
-            | {
-                name: {
-                    "verdict": verdict(row),
-                    "stage": row["failure_stage"],
-                    "code": row["failure_code"],
-                    "sentence": row.get("sentence"),
-                    "command": _command(row, side),
-                }
-                for name, row, side in zip(("first", "second"), pair, sides, strict=True)
-            }
-            for pair in comparison.changed
-        ],
+        "agreements": comparison.agreements,
+        "numbers": comparison.numbers,
+        "differences": comparison.differences,
+        "changed": [{name: x for name, x in line.items() if name != "place"} for line in comparison.changed],
     }
 
 
-def _both(head: str, value: Callable[[Any], object] | None = None, name: str = "") -> Column:
-    """A column that files and people read alike; `name` is its own in files, where heads are not."""
-    return Column(name or head, head, value)
+def _between(name: str) -> str:
+    """A template of both ends of an interval."""
+    return f"{{{name}_low_95:hundredths}} to {{{name}_high_95:hundredths}} %"
 
 
-def _words(head: str, value: Callable[[Any], object] | None = None, name: str = "") -> Column:
-    """The same, of words."""
-    return _both(head, value, name)._replace(words=True)
+def _label(line: Line) -> str:
+    return NUMBERS[line["name"]]
 
 
-def _where(of: Callable[[Any], Any]) -> tuple[Column, ...]:
-    return (
-        _words("scenario", lambda x: of(x).scenario),
-        _words("conditions", lambda x: ", ".join(setting_of(of(x)).conditions())),
-        _words("method", lambda x: of(x).method),
-        _words("level", lambda x: level_text(of(x))),
-    )
+def _trials(n: int) -> str:
+    return "1 trial is" if n == 1 else f"{n:,} trials are"
 
 
-def _counted(r: Rate) -> str:
-    return f"{r.successes} ({percent(r.rate, 2)})"
-
-
-def _rate(cell: Cell | None) -> str | None:
-    return None if cell is None else f"{percent(cell.rate)}, n {cell.trials}"
-
-
-def _value(x: Any) -> str:
-    return "not said" if x is None else value_words(x)
-
-
-def _command(row: Row, side: Side) -> str:
-    return replay_command(row, scenario_files(side.run), limits_of(side.run))
+def _side(name: str) -> Callable[[Line], str]:
+    """What a side says of something that is not the same in both."""
+    return lambda line: "not said" if line[name] is None else value_words(line[name])

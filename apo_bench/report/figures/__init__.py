@@ -1,1 +1,1 @@
-"""The figures of a report: drawn once by matplotlib, shown in the page and kept as files."""
+"""Figures of a sweep: rows in, pictures out."""

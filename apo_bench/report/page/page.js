@@ -183,10 +183,9 @@
   });
 
   function linked() {
-    const target = location.hash.length > 1 && document.getElementById(location.hash.slice(1));
-    if (!target) return;
-    for (let box = target.closest("details"); box; box = box.parentElement.closest("details")) box.open = true;
-    if (target.matches("button.cell") && target.getAttribute("aria-expanded") !== "true") open(target);
+    const number = location.hash.match(/^#cell-(\d+)$/);
+    const cell = number && document.querySelector(`button.cell[data-cell="${number[1]}"]`);
+    if (cell && cell.getAttribute("aria-expanded") !== "true") open(cell);
   }
   window.addEventListener("hashchange", linked);
   window.addEventListener("beforeprint", () => {

@@ -1,105 +1,73 @@
-"""Tables with one line per method: how much noise it bears (the level of half success, the area under success over
-level), what its replays take, and what a sweep took.
-
-What was said beforehand against what then happened: stated uncertainty, predicted failures, recognised contacts.
-"""
+"""Tables of lines that are counted over many conditions, as the statistics make them: column -> value."""
 
 from collections.abc import Sequence
+from typing import Any
 
-from apo_bench.records import knows_relations
-from apo_bench.report.tables.table import (
-    Column,
-    Table,
-    axis,
-    interval_columns,
-    millimetres,
-    place_columns,
-    rate_columns,
-)
-from apo_bench.statistics import (
-    Calibration,
-    Confusion,
-    Effort,
-    Rate,
-    Recognition,
-    TrialTimes,
-    Work,
-    level_label,
-    percent,
-    percents,
-    points,
-)
-from apo_bench.statistics.levels.curves import Area, AreaDifference
-from apo_bench.statistics.levels.half_level import HalfLevel
+from apo_bench.report.tables.table import Column, Table, interval_columns, place_columns
+from apo_bench.statistics import Line, percent
 
-_WHERE = place_columns(lambda x: x.setting, levels=False)
+_METHOD = (Column("scenario", "scenario", words=True), Column("method", "method", words=True))
 
 
-def half_table(levels: Sequence[HalfLevel], areas: Sequence[Area]) -> Table:
-    """One line per method and setting; in files a limit beyond the levels tried is empty."""
-    known = {
-        a.setting: f"{a.area:.3f} ({a.interval.low:.3f} to {a.interval.high:.3f}), {a.seeds} seeds"
-        for a in areas
-        if a.area is not None
-    }
+def gap_table(lines: Sequence[Line]) -> Table:
+    """One line per cell."""
     return Table(
-        levels,
+        lines,
         (
-            *_WHERE,
-            Column("smallest_level", value=lambda h: h.smallest),
-            Column("largest_level", value=lambda h: h.largest),
+            *place_columns(),
             Column("trials", "n"),
-            Column("half_level", value=lambda h: h.level),
-            Column("", "half success at level (95 %)", text=lambda h: f"{h.text} ({h.interval_text})"),
-            Column("low_95", value=lambda h: h.low),
-            Column("high_95", value=lambda h: h.high),
-            Column("surely_over", "surely", text=lambda h: h.sure_text),
-            Column("surely_under"),
-            Column("", "area (95 %)", text=lambda h: known.get(h.setting)),
+            Column("seen_5"),
+            Column("seen_median_mm", "as seen [mm]", text="{seen_median_mm:.3f}"),
+            Column("seen_95"),
+            Column("planned_5"),
+            Column("planned_median_mm", "as planned [mm]", text="{planned_median_mm:.3f}"),
+            Column("planned_95", "95 % are below [mm]", text="{planned_95:.3f}"),
         ),
-        ("No level varied, so nothing is known of how success falls with it."),
+        "No method that corrects had a plan, so there is no gap to compare.",
         (
-            "Where success falls to one half, read along the logarithm of the level, with a 95 % interval; *surely* "
-            "is from the last level with success surely over one half to the first surely under it, whatever the "
-            "curve between them. *Any* is an interval that is open at both ends, *none* is under one half even at "
-            "level 0. The area is mean success over the logarithm of the level, from 0 to 1, of seeds that have a "
-            "result at every level."
+            "The largest distance of any face from the one it should touch, as it was seen and as the method planned "
+            "it: medians, and in the drawing bands from the 5th to the 95th percentile of the trials. What is below "
+            "0.001 mm is drawn there. `none` plans what was seen."
         ),
     )
 
 
-def area_table(areas: Sequence[Area], differences: Sequence[AreaDifference]) -> Table:
-    """Areas, whose reference is empty, and differences to those of a reference."""
+def felt_table(lines: Sequence[Line]) -> Table:
+    """One line per cell of a robot that feels."""
+    heads = {"drawn": "drawn with", "stated": "stated", "felt": "felt", "sure": "sure to"}
     return Table(
-        [*areas, *differences],
+        lines,
         (
-            *_WHERE,
-            Column("reference", "against", lambda a: getattr(a, "reference", None), words=True),
-            Column("smallest_level", value=lambda a: min(a.levels)),
-            Column("largest_level", value=lambda a: max(a.levels)),
-            Column("seeds", "seeds"),
-            Column("area", value=lambda a: a.area if isinstance(a, Area) else a.difference),
-            Column(
-                "",
-                "difference of the areas [points]",
-                text=lambda a: points(a.difference, a.interval) if isinstance(a, AreaDifference) else None,
+            *place_columns(),
+            Column("trials", "n"),
+            Column("touches", "touches", text="{touches:.1f}"),
+            Column("refused", "refused"),
+            *(
+                Column(f"{name}_{unit}", f"{head} [{unit}]", text=f"{{{name}_{unit}:.2f}}")
+                for unit in ("mm", "deg")
+                for name, head in heads.items()
             ),
-            *interval_columns(lambda a: a.interval),
+        ),
+        "No robot felt.",
+        (
+            "How far the base of a robot that feels (`+feel`) is off at the middle of the goals: by what its error was "
+            "drawn with, by what it was told, as it felt in the end, and how far that may be wrong, as it says itself. "
+            "All are root mean squares of vectors: the square root of three times a standard deviation per axis. "
+            "*Refused* are touches that contradicted the others, of all trials together."
         ),
     )
 
 
-def effort_table(efforts: Sequence[Effort]) -> Table:
-    """One line per scenario and method; for people."""
+def effort_table(lines: Sequence[Line]) -> Table:
+    """One line per scenario and method."""
     return Table(
-        efforts,
+        lines,
         (
-            Column("scenario", "scenario", words=True),
-            Column("method", "method", words=True),
+            *_METHOD,
             Column("trials", "right"),
-            Column("extra_operations", "extra operations", text=lambda e: f"{e.extra_operations:.1f}"),
-            Column("sim_seconds", "simulated", text=lambda e: f"{e.sim_seconds:.0f} s"),
-            Column("pushed_mm", "pushed at most", text=lambda e: f"{e.pushed_mm:.2f} mm"),
+            Column("extra_operations", "extra operations", text="{extra_operations:.1f}"),
+            Column("sim_seconds", "simulated", text="{sim_seconds:.0f} s"),
+            Column("pushed_mm", "pushed at most", text="{pushed_mm:.2f} mm"),
         ),
         "No trial was right.",
         (
@@ -109,58 +77,54 @@ def effort_table(efforts: Sequence[Effort]) -> Table:
     )
 
 
-def time_table(times: Sequence[TrialTimes]) -> Table:
+def time_table(lines: Sequence[Line]) -> Table:
     """Wall times, one line per scenario and method."""
     return Table(
-        times,
+        lines,
         (
-            Column("scenario", "scenario", words=True),
-            Column("method", "method", words=True),
+            *_METHOD,
             Column("trials", "n"),
-            Column("trial_5_s", "5 % are below [s]", lambda t: t.low, lambda t: f"{t.low:.2f}"),
-            Column("trial_median_s", "median [s]", lambda t: t.median, lambda t: f"{t.median:.2f}"),
-            Column("trial_95_s", "95 % are below [s]", lambda t: t.high, lambda t: f"{t.high:.2f}"),
-            Column("trial_sum_s", "together [min]", lambda t: t.total, lambda t: f"{t.total / 60:.1f}"),
+            Column("trial_5_s", "5 % are below [s]", text="{trial_5_s:.2f}"),
+            Column("trial_median_s", "median [s]", text="{trial_median_s:.2f}"),
+            Column("trial_95_s", "95 % are below [s]", text="{trial_95_s:.2f}"),
+            Column("trial_sum_s", "together [s]", text="{trial_sum_s:.0f}"),
         ),
+        "There is no timing.jsonl beside the rows, so times are not known.",
+        "Without compilation and demonstration; in the drawing medians, and lines from the 5th to the 95th percentile.",
     )
 
 
-def work_table(work: Sequence[Work]) -> Table:
-    """One line per worker; for people."""
+def work_table(lines: Sequence[Line]) -> Table:
+    """One line per worker."""
     return Table(
-        work,
+        lines,
         (
             Column("host", "host", words=True),
             Column("worker", "worker", words=True),
             Column("trials", "rows"),
-            Column("busy_s", "busy [min]", text=lambda w: f"{w.busy_s / 60:.1f}"),
-            Column("rows_per_minute", "rows per minute", text=lambda w: f"{w.rows_per_minute:.1f}"),
+            Column("busy_s", "busy [s]", text="{busy_s:.0f}"),
+            Column("rows_per_minute", "rows per minute", text="{rows_per_minute:.1f}"),
         ),
     )
 
 
-def calibration_table(calibrations: Sequence[Calibration]) -> Table:
-    """One line per scenario, noise, relations and method; for people."""
+def calibration_table(lines: Sequence[Line]) -> Table:
+    """One line per scenario, noise, relations and method."""
+    share = "{{{0}.rate:percent}} of {{{0}.trials}}".format
     return Table(
-        calibrations,
+        lines,
         (
             Column("scenario", "scenario", words=True),
             Column("noise", "noise", words=True),
-            Column(
-                "relations", "relations", text=lambda c: c.relations if knows_relations(c.method) else "any", words=True
-            ),
+            Column("relations", "relations", words=True),
             Column("method", "method", words=True),
             Column("planned", "n"),
-            Column("covered", "covered", text=lambda c: _share(c.covered)),
-            Column("fixed_mm", "fixed error [mm]", text=lambda c: millimetres(c.fixed_mm)),
-            Column(
-                "fixed_over_clearance",
-                "over clearance",
-                text=lambda c: None if c.fixed_over_clearance is None else f"{c.fixed_over_clearance:.2f}",
-            ),
-            Column("free_mm", "free error [mm]", text=lambda c: millimetres(c.free_mm)),
-            Column("failed_tests", "test fails", text=lambda c: _share(c.failed_tests)),
-            Column("culprits", "culprit", text=lambda c: _share(c.culprits)),
+            Column("covered", "covered", text=share("covered")),
+            Column("fixed_mm", "fixed error [mm]", text="{fixed_mm:.3f}"),
+            Column("fixed_over_clearance", "over clearance", text="{fixed_over_clearance:.2f}"),
+            Column("free_mm", "free error [mm]", text="{free_mm:.3f}"),
+            Column("failed_tests", "test fails", text=share("failed_tests")),
+            Column("culprits", "culprit", text=share("culprits")),
         ),
         "No trial of a method but the oracle counts.",
         (
@@ -174,24 +138,19 @@ def calibration_table(calibrations: Sequence[Calibration]) -> Table:
     )
 
 
-def confusion_table(confusions: Sequence[Confusion]) -> Table:
+def confusion_table(lines: Sequence[Line]) -> Table:
     """One line per scenario and method, and one of them all."""
     return Table(
-        confusions,
+        lines,
         (
-            Column("scenario", "scenario", words=True),
-            Column("method", "method", words=True),
-            Column("", "n", text=lambda c: c.executed),
-            Column("predicted_fit_fitted", "fit: fitted", lambda c: c.fit_fitted),
-            Column("predicted_fit_failed", "fit: failed", lambda c: c.fit_failed),
-            Column("predicted_fail_fitted", "fail: fitted", lambda c: c.fail_fitted),
-            Column("predicted_fail_failed", "fail: failed", lambda c: c.fail_failed),
-            Column("agreement", "agreement", text=lambda c: percent(c.agreement)),
-            Column(
-                "same_operation",
-                "right operation",
-                text=lambda c: f"{c.same_operation} of {c.stopped}" if c.stopped else None,
-            ),
+            *_METHOD,
+            Column("", "n", "executed"),
+            Column("predicted_fit_fitted", "fit: fitted"),
+            Column("predicted_fit_failed", "fit: failed"),
+            Column("predicted_fail_fitted", "fail: fitted"),
+            Column("predicted_fail_failed", "fail: failed"),
+            Column("agreement", "agreement", text="{agreement:percent}"),
+            Column("same_operation", "right operation", text="{same_operation} of {stopped}"),
             Column("stopped"),
             Column("not_executed", "not executed"),
             Column("excluded", "excluded"),
@@ -204,39 +163,28 @@ def confusion_table(confusions: Sequence[Confusion]) -> Table:
     )
 
 
-def recognition_table(recognitions: Sequence[Recognition]) -> Table:
-    """One line per place."""
+def recognition_table(lines: Sequence[Line]) -> Table:
+    """One line per scenario, noise, eye, way of recognising, carelessness and level."""
     return Table(
-        recognitions,
+        lines,
         (
-            axis("scenario", head="scenario", words=True),
-            axis(
-                "noise",
-                head="noise",
-                text=lambda r: r.place.noise if r.place.eye == "noise" else r.place.eye,
-                words=True,
-            ),
-            axis("eye"),
-            axis("relations", head="relations", words=True),
-            axis("careless", head="careless", words=True),
-            axis(
-                "level",
-                name="level_mm",
-                head="level",
-                text=lambda r: level_label(r.place.level, r.place.level_deg, r.place.noise),
-            ),
-            axis("level_deg"),
+            Column("scenario", "scenario", words=True),
+            Column("noise", "noise", words=True),
+            Column("eye", "eye", words=True),
+            Column("relations", "relations", words=True),
+            Column("careless", "careless", words=True),
+            Column("level_mm", "level [mm]", "level", words=True),
+            Column("level_deg", "level [deg]", words=True),
             Column("demonstrations"),
-            Column("complete", "all right", text=lambda r: f"{r.complete} of {r.demonstrations}"),
-            *rate_columns(lambda r: r.all_right, ("", "", "rate", "low_95", "high_95")),
-            Column("", "95 % interval", text=lambda r: percents(r.all_right.interval)),
+            Column("complete", "all right", text="{complete} of {demonstrations}"),
+            Column("rate", "rate", "all_right.rate", "{all_right.rate:percent}"),
+            Column("", "95 % interval", "all_right.interval", "{all_right.interval:percents}"),
+            *interval_columns("all_right.interval"),
             Column("right"),
-            Column("missed"),
-            Column("false"),
-            Column("precision", "precision", text=lambda r: _percent(r.precision)),
-            Column("recall", "recall", text=lambda r: _percent(r.recall)),
-            Column("", "missed", text=lambda r: r.missed),
-            Column("", "false", text=lambda r: r.false),
+            Column("missed", "missed"),
+            Column("false", "false"),
+            Column("precision", "precision", text="{precision:percent2}"),
+            Column("recall", "recall", text="{recall:percent2}"),
         ),
         "No method was told relations that were recognised.",
         (
@@ -247,20 +195,14 @@ def recognition_table(recognitions: Sequence[Recognition]) -> Table:
     )
 
 
-def prediction_summary(c: Confusion) -> str:
+def prediction_summary(line: Line) -> str:
     """`Predicted: 129 of 134 executed trials ended as predicted (96.3 %, counted by as_demonstrated); failures ...`"""
-    if c.agreement is None:
+    executed: Any = line["executed"]
+    if not executed:
         return "Predicted: nothing, since no trial was executed."
-    trials = "1 executed trial" if c.executed == 1 else f"{c.executed:,} executed trials"
+    trials = "1 executed trial" if executed == 1 else f"{executed:,} executed trials"
     return (
-        f"Predicted: {c.right:,} of {trials} ended as predicted ({percent(c.agreement)}, counted by as_demonstrated); "
-        f"failures that were not predicted: {c.fit_failed}, warnings that were wrong: {c.fail_fitted}."
+        f"Predicted: {line['right']:,} of {trials} ended as predicted ({percent(line['agreement'])}, counted by "
+        f"as_demonstrated); failures that were not predicted: {line['predicted_fit_failed']}, warnings that were "
+        f"wrong: {line['predicted_fail_fitted']}."
     )
-
-
-def _share(r: Rate) -> str | None:
-    return f"{100 * r.successes / r.trials:.1f} % of {r.trials}" if r.trials else None
-
-
-def _percent(x: float | None) -> str | None:
-    return None if x is None else f"{100 * x:.2f} %"

@@ -1,16 +1,83 @@
-"""One table, said once: the page, the terminal, Markdown, CSV and Parquet are made from its columns; and the columns
-that several tables share."""
+"""One table, said once: the page, the terminal, Markdown, CSV and Parquet are made from its columns."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
-from operator import attrgetter
 from pathlib import Path
+from string import Formatter
 from typing import Any, NamedTuple, final
 
 from apo_bench.io import has_parquet, markdown, write_columns, write_csv
-from apo_bench.records import knows_truth
-from apo_bench.statistics import Interval, Place, Rate, cell_place, level_label, setting_of
+from apo_bench.statistics import percent, percents, points, signed
+
+DASH = "–"
+"""Stands for what is not known."""
+
+
+def _p_value(p: float) -> str:
+    return f"{p:.3f}" if p >= 0.001 else "< 0.001"
+
+
+def endings(failures: Mapping[str, int], most: int | None = 3) -> str:
+    """`attach: force_stop 12, judge: gap 3`: how trials failed, the most frequent first."""
+    return ", ".join(f"{why} {count}" for why, count in list(failures.items())[:most])
+
+
+def _hundredths(share: float) -> str:
+    return f"{100 * share:.2f}"
+
+
+_SPELLED: Mapping[str, Callable[[Any], str]] = {
+    "percent": percent,
+    "percent2": partial(percent, digits=2),
+    "percents": percents,
+    "hundredths": _hundredths,
+    "points": points,
+    "signed": partial(signed, digits=3),
+    "p": _p_value,
+    "endings": endings,
+}
+"""How a template may write a number or an interval, besides the formats of Python."""
+
+
+class _Unknown(Exception):
+    """Something that a template names is None."""
+
+
+class _Template(Formatter):
+    """`{interval.low:.3f}` of any object or mapping."""
+
+    def get_field(self, field_name: str, args: Any, kwargs: Any) -> tuple[Any, str]:
+        return look_up(args[0], field_name), field_name
+
+    def format_field(self, value: Any, format_spec: str) -> str:
+        if value is None:
+            raise _Unknown
+        return _SPELLED[format_spec](value) if format_spec in _SPELLED else str(format(value, format_spec))
+
+
+_TEMPLATE = _Template()
+
+
+def fill(template: str) -> Callable[[Any], str | None]:
+    """What a template says of an item; None where anything in it is None."""
+
+    def say(item: Any) -> str | None:
+        try:
+            return _TEMPLATE.format(template, item)
+        except _Unknown:
+            return None
+
+    return say
+
+
+def look_up(item: Any, path: str) -> Any:
+    """What an object or mapping has at a path, as `interval.low`; None where something on the way is None."""
+    for name in path.split("."):
+        if item is not None:
+            item = item[name] if isinstance(item, Mapping) else getattr(item, name)
+    return item
 
 
 class Column(NamedTuple):
@@ -18,24 +85,24 @@ class Column(NamedTuple):
 
     name: str = ""
     head: str = ""
-    value: Callable[[Any], object] | None = None
-    """From what a line is of to what files hold; usually what is called like the column."""
-    text: Callable[[Any], object] | None = None
-    """From the same to what people read; usually the value. None is a dash."""
+    value: str | Callable[[Any], object] = ""
+    """Path from what a line is of to what files hold, or a function; usually called like the column."""
+    text: str = ""
+    """Template of what people read; usually the value. Where anything in it is None it is a dash."""
     words: bool = False
     """Set to the left, and broken into lines; else it is a number."""
     group: bool = False
     """A page says it once above all lines that have the same."""
 
-    def of(self, item: Any) -> object:
+    def of(self, item: Any) -> Any:
         """What files hold of an item."""
-        return attrgetter(self.name)(item) if self.value is None else self.value(item)
+        return look_up(item, self.value or self.name) if isinstance(self.value, str) else self.value(item)
 
     def said(self, item: Any) -> str:
         """What people read of it."""
-        value = self.of(item) if self.text is None else self.text(item)
+        value = fill(self.text)(item) if self.text else self.of(item)
         if value is None:
-            return "–"
+            return DASH
         return f"{value:g}" if isinstance(value, float) else str(value)
 
 
@@ -57,24 +124,19 @@ class Table:
         return [column for column in self.columns if column.head]
 
     @property
-    def kept(self) -> list[Column]:
-        """The columns of files."""
-        return [column for column in self.columns if column.name]
-
-    @property
     def lines(self) -> list[list[str]]:
         """What people read, line by line."""
         return [[column.said(item) for column in self.shown] for item in self.items]
 
     @property
-    def beside(self) -> list[Column]:
+    def ungrouped(self) -> list[Column]:
         """The columns of a page: those that people read and no line of which stands above its group."""
         return [column for column in self.shown if not column.group]
 
     def groups(self) -> list[tuple[str, list[list[str]]]]:
         """What a page says: heading (empty where nothing is grouped), and the lines below it."""
         together = groupby(self.items, lambda item: ", ".join(c.said(item) for c in self.shown if c.group))
-        return [(heading, [[c.said(item) for c in self.beside] for item in own]) for heading, own in together]
+        return [(heading, [[c.said(item) for c in self.ungrouped] for item in own]) for heading, own in together]
 
     def markdown(self) -> list[str]:
         """The table as lines of Markdown, in which no cell has markup, or the sentence where there is none."""
@@ -82,72 +144,47 @@ class Table:
         lines = [f"| {' | '.join(map(markdown, cells))} |" for cells in (heads, *self.lines)]
         return [lines[0], "|" + "---|" * len(heads), *lines[1:]] if self.items else [self.empty]
 
-    def write_all(self, path: Path) -> list[Path]:
-        """Write a CSV file and, where Parquet can be written, the same as Parquet."""
-        return [self.write(path), *([self.write(path.with_suffix(".parquet"))] if has_parquet() else [])]
-
-    def write(self, path: Path) -> Path:
-        """Write a file, by its ending as CSV, where None is an empty field, or as Parquet."""
-        names = [column.name for column in self.kept]
-        columns = [[column.of(item) for item in self.items] for column in self.kept]
-        if path.suffix == ".parquet":
-            write_columns(list(map(_text, names)), [list(map(_text, column)) for column in columns], path)
-        else:
-            write_csv(path, names, zip(*columns, strict=True))
-        return path
+    def write(self, path: Path) -> list[Path]:
+        """Write a CSV file, where None is an empty field, and the same as Parquet where pyarrow is installed."""
+        columns = {c.name: [c.of(item) for item in self.items] for c in self.columns if c.name}
+        return save_columns(columns, path)
 
 
-def millimetres(x: float | None) -> str | None:
-    """`0.012`: to a thousandth."""
-    return None if x is None else f"{x:.3f}"
+def save_columns(columns: Mapping[str, Sequence[Any]], path: Path) -> list[Path]:
+    """Write columns as CSV and, where the package pyarrow is installed, as Parquet beside it; which files."""
+    write_csv(path, list(columns), zip(*columns.values(), strict=True))
+    if not has_parquet():
+        return [path]
+    beside = path.with_suffix(".parquet")
+    write_columns(list(map(_text, columns)), [list(map(_text, column)) for column in columns.values()], beside)
+    return [path, beside]
 
 
-def place_columns(of: Callable[[Any], Any] = cell_place, levels: bool = True) -> tuple[Column, ...]:
+def place_columns(path: str = "place", levels: bool = True) -> tuple[Column, ...]:
     """Where something was measured: for people scenario, conditions and method, for files every axis by itself.
 
     Args:
-        of: From an item to its place, or to the setting of its curve, which has no level.
+        path: From an item to its place.
     """
+    last = ("grasp", "fidelity", "looks", "robot_error", "wrench", "stated_error", "abstain")
     return (
-        axis("scenario", of, head="scenario", words=True, group=True),
-        Column("", "conditions", text=lambda x: ", ".join(setting_of(of(x)).conditions()), words=True, group=True),
-        *(axis(name, of) for name in ("clearance_mm", "noise", "relations", "careless")),
-        *((axis("level", of, name="level_mm"), axis("level_deg", of)) if levels else ()),
-        axis("method", of, head="method", words=True),
+        Column("scenario", "scenario", f"{path}.scenario", words=True, group=True),
+        Column("", "conditions", f"{path}.conditions", words=True, group=True),
+        *(Column(name, value=f"{path}.{name}") for name in ("clearance_mm", "noise", "relations", "careless")),
         *(
-            axis(name, of)
-            for name in ("grasp", "fidelity", "looks", "robot_error", "wrench", "stated_error", "abstain")
+            (Column("level_mm", value=f"{path}.level"), Column("level_deg", value=f"{path}.level_deg"))
+            if levels
+            else ()
         ),
+        Column("method", "method", f"{path}.method", words=True),
+        *(Column(name, value=f"{path}.{name}") for name in last),
+        *([Column("", "level", f"{path}.level_words")] * levels),
     )
 
 
-def axis(field: str, of: Callable[[Any], Any] = cell_place, **more: Any) -> Column:
-    """A column of one field of a place or setting, called like it; `more` are other fields of the column."""
-    return Column(field, value=lambda x: getattr(of(x), field))._replace(**more)
-
-
-def level_text(x: Any) -> str:
-    """`0.5`, or `0.5 mm, 1 deg`, of anything that has a place; `any` of the oracle, which meets none."""
-    place = x if isinstance(x, Place) else cell_place(x)
-    return "any" if knows_truth(place.method) else level_label(place.level, place.level_deg, place.noise)
-
-
-def interval_columns(
-    of: Callable[[Any], Interval | None], low: str = "low_95", high: str = "high_95"
-) -> tuple[Column, ...]:
+def interval_columns(path: str = "interval", low: str = "low_95", high: str = "high_95") -> tuple[Column, ...]:
     """Both ends of an interval, for files."""
-    return (
-        Column(low, value=lambda x: (of(x) or (None, None))[0]),
-        Column(high, value=lambda x: (of(x) or (None, None))[1]),
-    )
-
-
-def rate_columns(of: Callable[[Any], Rate], names: tuple[str, str, str, str, str]) -> tuple[Column, ...]:
-    """Trials, successes, rate and its interval, for files; an empty name is left out."""
-    trials, successes, rate, low, high = names
-    ends = interval_columns(lambda x: of(x).interval, low, high)
-    counts = zip((trials, successes, rate), ("trials", "successes", "rate"), strict=True)
-    return (*(axis(field, of, name=name) for name, field in counts if name), *ends)
+    return Column(low, value=f"{path}.low"), Column(high, value=f"{path}.high")
 
 
 def _text(x: Any) -> Any:

@@ -1,0 +1,177 @@
+"""Trial records as columns: numbers as arrays, everything else by the number of its value.
+
+A million records fit into memory so, and are grouped in seconds.
+"""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple, final
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.geometry import Array
+from apo_bench.records.row import ROW_FIELDS
+from apo_bench.records.run.run_folder import each_row
+from apo_bench.records.salt import one_salt
+from apo_bench.records.settings import SETTINGS
+
+Mask = NDArray[np.bool_]
+"""(n,) which trials."""
+Index = NDArray[np.integer[Any]]
+"""(n,) numbers of trials, or of what they have."""
+_NOT_KEPT = (
+    *("env_id", "thresholds", "as_demonstrated_code", "conditions", "tried", "free_moved", "moved_in_hand", "reached"),
+    "predicted",  # has columns of its own
+)
+_USUAL = {info.column: info.default for name, info in SETTINGS.items() if name != "scenario"}
+_PLAIN = {msgspec.inspect.FloatType: float, msgspec.inspect.IntType: int, msgspec.inspect.BoolType: bool}
+
+
+def _kind(annotation: Any) -> type | None:
+    """Float, int or bool; None of anything else."""
+    info = msgspec.inspect.type_info(annotation)
+    kinds = {type(part) for part in getattr(info, "types", (info,))}
+    return next((plain for found, plain in _PLAIN.items() if found in kinds), None)
+
+
+COLUMNS: Mapping[str, type | None] = {
+    **{name: _kind(annotation) for name, annotation in ROW_FIELDS.items() if name not in _NOT_KEPT},
+    "predicted_fails": bool,
+    "predicted_operation": int,
+    "predicted_code": None,
+}
+"""What is kept of a record -> the type of its numbers; None where it has none."""
+
+
+class Coded(NamedTuple):
+    """A column of texts, or of tuples."""
+
+    codes: Index
+    """(n,) the number of the value of each trial."""
+    names: Sequence[Any]
+    """Every value, at its number."""
+
+
+class Groups(NamedTuple):
+    """Trials that agree in some columns."""
+
+    keys: list[tuple[Any, ...]]
+    """What each group has in these columns."""
+    of: Index
+    """(n,) the number of the group of each trial."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Trials:
+    """Trial records as columns.
+
+    Attributes:
+        numbers: Column -> (n,); NaN where a record does not say, 1 for true.
+        coded: All other columns.
+    """
+
+    numbers: Mapping[str, Array]
+    coded: Mapping[str, Coded]
+
+    def __len__(self) -> int:
+        return len(self.numbers["seed"])
+
+    def find_salt(self) -> str | None:
+        """The hash of the salt that all trials were drawn with.
+
+        Raises:
+            InputError: They were drawn with several, so that their seeds are different trials.
+        """
+        return one_salt({"salt": salt} for salt in self.distinct("salt"))
+
+    def number(self, name: str) -> Array:
+        """(n,) a column of numbers."""
+        return self.numbers[name]
+
+    def values(self, name: str) -> list[Any]:
+        """A column as plain values; None where a record does not say."""
+        if name in self.coded:
+            codes, names = self.coded[name]
+            return [names[code] for code in codes.tolist()]
+        kind = COLUMNS[name] or float
+        return [None if math.isnan(x) else kind(x) for x in self.numbers[name].tolist()]
+
+    def distinct(self, name: str) -> list[Any]:
+        """The values that a column has, in the order in which they first come."""
+        return list(dict.fromkeys(self.values(name)))
+
+    def holds(self, name: str, condition: Callable[[Any], object]) -> Mask:
+        """(n,) whether a condition holds for the value of a column that is no number."""
+        codes, names = self.coded[name]
+        return np.array([bool(condition(each)) for each in names], dtype=bool)[codes]
+
+    def rows(self) -> list[dict[str, Any]]:
+        """The trials as records, with what is kept of them."""
+        columns = [self.values(name) for name in COLUMNS]
+        return [dict(zip(COLUMNS, values, strict=True)) for values in zip(*columns, strict=True)]
+
+    def where(self, which: Mask | Index | slice) -> Trials:
+        """Some of the trials, by a mask, by their numbers in this order, or by a slice."""
+        return Trials(
+            {name: column[which] for name, column in self.numbers.items()},
+            {name: Coded(column.codes[which], column.names) for name, column in self.coded.items()},
+        )
+
+    def groups(self, names: Iterable[str]) -> Groups:
+        """Trials by what they have in some columns; the numbers of groups have no meaning."""
+        names = list(names)
+        of = np.zeros(len(self), dtype=np.int64)
+        for name in names:
+            own = (
+                self.coded[name].codes if name in self.coded else np.unique(self.numbers[name], return_inverse=True)[1]
+            )
+            of = np.unique(of * (int(own.max(initial=0)) + 1) + own, return_inverse=True)[1]
+        first = self.where(np.unique(of, return_index=True)[1])
+        return Groups(list(zip(*(first.values(name) for name in names), strict=True)), of)
+
+    def parts(self, names: Iterable[str]) -> dict[tuple[Any, ...], Trials]:
+        """What trials have in some columns -> these trials, in the order of their seeds."""
+        keys, of = self.groups(names)
+        order = np.lexsort((self.numbers["seed"], of))
+        ends = np.cumsum(np.bincount(of, minlength=len(keys))).tolist()
+        together = self.where(order)
+        return {key: together.where(slice(a, b)) for key, a, b in zip(keys, [0, *ends], ends, strict=False)}
+
+
+def trials_of(records: Trials | Iterable[Mapping[str, Any]]) -> Trials:
+    """The columns of records; settings that a record does not say are as usual."""
+    if isinstance(records, Trials):
+        return records
+    numbers: dict[str, array[float]] = {name: array("d") for name, kind in COLUMNS.items() if kind is not None}
+    codes: dict[str, array[int]] = {name: array("i") for name, kind in COLUMNS.items() if kind is None}
+    names: dict[str, dict[Any, int]] = {name: {} for name in codes}
+    for record in records:
+        said = _USUAL | dict(record) | {f"predicted_{key}": x for key, x in (record.get("predicted") or {}).items()}
+        for name, numbered in numbers.items():
+            number = said.get(name)
+            numbered.append(math.nan if number is None else number)
+        for name, coded in codes.items():
+            value = said.get(name)
+            known = names[name]
+            coded.append(known.setdefault(tuple(value) if isinstance(value, list) else value, len(known)))
+    return Trials(
+        {name: np.array(column, dtype=float) for name, column in numbers.items()},
+        {name: Coded(np.array(column, dtype=np.int32), list(names[name])) for name, column in codes.items()},
+    )
+
+
+def read_trials(folder: str | Path) -> Trials:
+    """The trials of a sweep.
+
+    Raises:
+        InputError: No such folder, no trials in it, or a line that is not a whole record.
+    """
+    return trials_of(each_row(folder))

@@ -1,0 +1,96 @@
+"""How figures look: colours, markers and dashes, told apart without colour too."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, NamedTuple
+
+from apo_bench.io import default_looks
+
+INK = "#1d2430"
+"""Of text and lines."""
+SOFT = "#5b6575"
+"""Of what matters less."""
+RULE = "#d9dde4"
+"""Of the grid."""
+_SOLID: Any = "-"
+_DASHED = (0, (4, 1.5))
+_DOTTED = (0, (1, 1))
+
+
+class Style(NamedTuple):
+    """How the line of a method looks."""
+
+    color: str
+    marker: Any
+    """As matplotlib takes it: a letter, or a star as (points, 1, turned by degrees)."""
+    dashes: Any
+
+
+STYLES = {
+    "oracle": Style(SOFT, "", _DASHED),
+    "none": Style("#d55e00", "o", _SOLID),
+    "search": Style("#e7298a", "8", _DASHED),
+    "by-heart": Style("#999933", (3, 1, 0), _DASHED),
+    "contact": Style("#332288", "p", _SOLID),
+    "contact-robust": Style("#aa3377", (4, 1, 0), _DASHED),
+    "paper": Style("#0072b2", "s", _SOLID),
+    "paper-track": Style("#009e73", "D", _SOLID),
+    "snap": Style("#a6761d", "*", _DOTTED),
+    "least-squares": Style("#117733", "<", _DOTTED),
+    "settle": Style("#882255", ">", _DOTTED),
+    "penalty": Style("#88ccee", "d", _DOTTED),
+}
+OWN_STYLES = (Style("#6b6b6b", "h", _DOTTED), Style("#ddcc77", "H", _DOTTED), Style("#000000", "1", _DOTTED))
+"""Of methods that do not come with the package, in turn."""
+COLORS = {
+    "success": "#cfe3dc",
+    "observe": "#999999",
+    "correct": "#aa4499",
+    "plan": "#ddaa33",
+    "pick": "#88ccee",
+    "lift": "#44aa99",
+    "carry": "#117733",
+    "attach": "#d55e00",
+    "release": "#999933",
+    "depart": "#882255",
+    "judge": "#0072b2",
+    "worker": "#222222",
+    "fit: fitted": "#cfe3dc",
+    "fit: failed": "#d55e00",
+    "fail: fitted": "#ddaa33",
+    "fail: failed": "#0072b2",
+}
+"""How a trial ended, or what was predicted and came of it -> the colour of its share."""
+_LOOKS: Any = {
+    "svg.fonttype": "none",
+    "font.family": ["sans-serif"],
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 9.0,
+    "text.color": INK,
+    "axes.edgecolor": RULE,
+    "axes.labelcolor": INK,
+    "axes.titlesize": 9.0,
+    "axes.titlelocation": "left",
+    "xtick.color": INK,
+    "ytick.color": INK,
+    "axes.grid": True,
+    "axes.grid.axis": "y",
+    "grid.color": RULE,
+    "axes.axisbelow": True,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "legend.frameon": False,
+}
+
+
+def styles(names: Sequence[str]) -> dict[str, Style]:
+    """One each; what has no style of its own takes the next that is left."""
+    own = [name for name in names if name not in STYLES]
+    return {name: STYLES[name] if name in STYLES else OWN_STYLES[own.index(name) % len(OWN_STYLES)] for name in names}
+
+
+@contextmanager
+def report_looks(salt: str) -> Iterator[None]:
+    """Matplotlib's own settings but for these; one text as salt gives one file."""
+    with default_looks(_LOOKS | {"svg.hashsalt": salt}):
+        yield

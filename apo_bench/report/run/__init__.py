@@ -1,1 +1,0 @@
-"""What was run, how its trials ended, and which of its failures are drawn."""

@@ -1,0 +1,50 @@
+"""How a trial ended, in a few words, and which numbers of it people are shown."""
+
+from collections.abc import Mapping
+from typing import Any
+
+NUMBERS: Mapping[str, str] = {
+    "gap_before_mm": "gap as seen [mm]",
+    "gap_after_mm": "gap as planned [mm]",
+    "worst_gap_mm": "gap reached [mm]",
+    "worst_angle_deg": "angle reached [deg]",
+    "least_overlap": "least overlap",
+    "penetration_mm": "penetration [mm]",
+    "pushed_mm": "pushed [mm]",
+    "planned_error_fixed_mm": "planned error, fixed [mm]",
+    "planned_error_free_mm": "planned error, free [mm]",
+    "pose_error_fixed_mm": "reached error, fixed [mm]",
+    "pose_error_free_mm": "reached error, free [mm]",
+    "p_value": "p of the test",
+    "promised": "promised",
+    "extra_operations": "extra operations",
+    "peak_force_n": "peak force [N]",
+    "sim_seconds": "simulated [s]",
+}
+"""Numbers of a trial, in the order of a page, with what they are called there."""
+
+
+def verdict(row: Mapping[str, Any]) -> str:
+    """How a trial ended, in a word or two."""
+    if row["success"] is None:
+        return "excluded"
+    if row["success"]:
+        return "right" if row["as_demonstrated"] else "right, not as demonstrated"
+    return "loosely right" if row["loose_success"] else "failed"
+
+
+def why(row: Mapping[str, Any]) -> str:
+    """`attach: force_stop, operation 3`; nothing where nothing failed."""
+    if row["failure_stage"] is None:
+        return ""
+    where = "" if row["failure_operation"] is None else f", operation {row['failure_operation']}"
+    return f"{row['failure_stage']}: {row['failure_code']}{where}"
+
+
+def predicted(row: Mapping[str, Any]) -> str:
+    """What the plan said beforehand."""
+    if row["predicted_fails"] is None:
+        return ""
+    return (
+        f"operation {row['predicted_operation']} fails: {row['predicted_code']}" if row["predicted_fails"] else "fits"
+    )

@@ -1,1 +1,0 @@
-"""Success over level: curves, the level of half success, the area below."""
