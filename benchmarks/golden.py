@@ -21,8 +21,8 @@ Design: 15 shipped scenarios and 20 generated assemblies, seeds 0, 1 and 2; some
 Left out are texts, settings that a record repeats, provenance and iterations of solvers (`DROPPED`). Numbers have 12
 digits; poses are in mm, covariances in mm^2 and mrad^2. Items of the subset `small` are collected a second time,
 perturbed: poses are observed 1e-9 m and rad elsewhere, and in trials and episodes the clearance is 1e-9 m larger as
-well. Those that end the same, and corrections that move by less than 1e-4 mm and rad, are marked stable; only they
-repeat on other processors.
+well. Trials and episodes that end the same, and corrections that move by less than 1e-4 mm and rad, are marked stable:
+only those repeat on other processors.
 
 `benchmarks/golden_items.py` lists the items; after a rename in the package, change its tables of names.
 """
@@ -50,8 +50,9 @@ from benchmarks.golden_values import PERTURBATION, compute
 
 SAME = 1e-9
 """What two checkouts may differ by on one machine: [mm], [rad], or a part of numbers above 1."""
-CLOSE = 1e-6
-"""What stable corrections may differ by on another processor, in the same units."""
+CLOSE = 2e-5
+"""What stable corrections may differ by on another processor, in the same units. Solvers stop when a step is small, so
+that rounding decides about the last one: under other kernels of OpenBLAS, NumPy and Numba 5e-6 was the largest."""
 STABLE = 1e-4
 """By what the perturbation, 1e-6 mm, may move a stable correction."""
 VERDICT = ("success", "as_demonstrated", "loose_success", "failure_stage", "failure_code", "error")

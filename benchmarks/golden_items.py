@@ -41,7 +41,7 @@ VALUES = {
 """Values of settings, and correctors."""
 EXPORTS = {"detect_contacts": "recognise", "TrialConfig": "TrialSettings"}
 """What `apo_bench` exports."""
-KEYS = {"poses": "goals", "observed": "seen", "predicted_success": "promised"}
+KEYS = {"poses": "goals", "observed": "seen", "human_covariance": "careless", "predicted_success": "promised"}
 """Attributes, columns of records, keys of observations and of `info`."""
 DROPPED = {
     *(
@@ -196,4 +196,4 @@ def neutral(name: str) -> str:
     return _NEUTRAL.get(name, name)
 
 
-_NEUTRAL = {now: name for name, now in (SETTINGS | KEYS).items()}
+_NEUTRAL = {now: name for name, now in (KEYS | SETTINGS).items()}

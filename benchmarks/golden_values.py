@@ -81,20 +81,40 @@ def scene_of(scenario: str, clearance_mm: float, grasp: str = "friction", arm: s
 
 
 @lru_cache(maxsize=3)
-def observed(scenario: str, seed: int) -> tuple[Any, Any]:
-    """The demonstration of an item and what is observed of it."""
+def demonstrated(scenario: str, seed: int) -> Any:
+    """The demonstration of an item."""
     loaded = apo_bench.load_scenario(scenario)
     layout = apo_bench.draw_layout(loaded, np.random.default_rng([seed, 0]), loaded.clearance_mm)
     scene = scene_of(scenario, loaded.clearance_mm)
-    demonstration = apo_bench.demonstrate(scene, layout, 1.0, np.random.default_rng([seed, 1]))
-    noise = "isotropic" if seed == 0 else NOISES[(2 * SCENARIOS.index(scenario) + seed) % len(NOISES)]
-    rng = np.random.default_rng([seed, 2])
-    return demonstration, apo_bench.observe(demonstration, today(noise, VALUES), rng, level=LEVELS[seed])
+    return apo_bench.demonstrate(scene, layout, 1.0, np.random.default_rng([seed, 1]))
 
 
-def with_poses(observation: Any, poses: Any) -> Any:
-    """An observation with other poses, (n, 4, 4), [m]."""
-    return replace(observation, **{today("poses", KEYS): poses})
+def recorded_demonstration(scenario: str, values: Mapping[str, Any]) -> Any:
+    """The demonstration out of the values of an observation, which were simulated elsewhere."""
+    start, final = (
+        {key.removeprefix(prefix): in_m(value)[0] for key, value in values.items() if key.startswith(prefix)}
+        for prefix in ("demonstration.start.", "demonstration.final.")
+    )
+    covariance = 1e-6 * np.array(values["human_covariance"]).reshape(-1, 6, 6)
+    rest = {name: values[f"demonstration.{name}"] for name in ("code", "gap_m", "play_m")}
+    arrays = {"poses": in_m(values["demonstration.poses"]), "human_covariance": covariance}
+    named = {"start": start, "final": final, **arrays, **rest}
+    assembly = apo_bench.load_scenario(scenario).assembly
+    return apo_bench.Demonstration(assembly=assembly, **{today(key, KEYS): value for key, value in named.items()})
+
+
+def in_m(values: Sequence[float]) -> np.ndarray:
+    """Poses (n, 4, 4), [m], out of recorded ones."""
+    poses = np.tile(np.eye(4), (len(values) // 12, 1, 1))
+    poses[:, :3] = np.reshape(values, (-1, 3, 4)) / np.array([1.0, 1.0, 1.0, 1e3])
+    return poses
+
+
+def observe(item: Item, demonstration: Any) -> Any:
+    """What is observed of a demonstration."""
+    noise = "isotropic" if item.seed == 0 else NOISES[(2 * SCENARIOS.index(item.scenario) + item.seed) % len(NOISES)]
+    rng = np.random.default_rng([item.seed, 2])
+    return apo_bench.observe(demonstration, today(noise, VALUES), rng, level=LEVELS[item.seed])
 
 
 def perturbed(observation: Any) -> Any:
@@ -105,15 +125,16 @@ def perturbed(observation: Any) -> Any:
     nudge[:, :3, 3] = np.stack([x, y, z], axis=1)
     nudge[:, 0, 1], nudge[:, 1, 0], nudge[:, 1, 2] = -z, z, -x
     nudge[:, 2, 1], nudge[:, 0, 2], nudge[:, 2, 0] = x, y, -y
-    return with_poses(observation, poses @ nudge)
+    return replace(observation, **{today("poses", KEYS): poses @ nudge})
 
 
 def observation_values(demonstration: Any, observation: Any) -> dict[str, Any]:
     """Poses that were demonstrated and observed, and the error between them."""
     true, found = (np.asarray(getattr(each, today("poses", KEYS))) for each in (demonstration, observation))
-    return flat(
-        {"demonstration": demonstration, "observation": observation, "observed_error": np.linalg.inv(true) @ found}
-    )
+    covariance = np.asarray(getattr(demonstration, today("human_covariance", KEYS)))
+    error = np.linalg.inv(true) @ found
+    named = {"demonstration": demonstration, "observation": observation}
+    return flat({**named, "human_covariance": covariance, "observed_error": error})
 
 
 def detection_values(observation: Any) -> dict[str, Any]:
@@ -182,22 +203,25 @@ def episode_values(item: Item, off: float) -> dict[str, Any]:
     return values | {"failure_code": info.get("code"), "success": info.get("success")}
 
 
-def compute(item: Item, off: float = 0.0, poses: Any = None) -> dict[str, Any]:
+def compute(item: Item, off: float = 0.0, recorded: Mapping[str, Any] | None = None) -> dict[str, Any]:
     """The values of an item; where an error is raised, its kind.
 
     Args:
         off: By how much it is perturbed, [m] and [rad].
-        poses: (n, 4, 4), [m]: correct these in place of the observed ones.
+        recorded: The values of an observation whose demonstration takes the place of a simulated one.
     """
     try:
         if item.kind == "trial":
             return trial_values(item, off)
         if item.kind == "episode":
             return episode_values(item, off)
-        demonstration, observation = observed(item.scenario, item.seed)
+        if recorded is None:
+            demonstration = demonstrated(item.scenario, item.seed)
+        else:
+            demonstration = recorded_demonstration(item.scenario, recorded)
+        observation = observe(item, demonstration)
         if item.kind == "observation":
             return observation_values(demonstration, observation)
-        observation = observation if poses is None else with_poses(observation, poses)
         observation = perturbed(observation) if off else observation
         if item.kind == "detection":
             return detection_values(observation)
