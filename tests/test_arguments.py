@@ -22,7 +22,7 @@ from apo_bench.parts.making import rectangle
 from apo_bench.resources import folder
 from apo_bench.scoring.track import read_track, read_tracks
 from apo_bench.simulation.arms.arm import read_description
-from apo_bench.sweeps.sweep import read_sweep
+from apo_bench.sweeps.sweep_file import read_sweep
 from apo_bench.trial.stages import simulate_demonstration
 
 SCENARIO = "stick_on_castles"

@@ -22,14 +22,11 @@ OPTIONS: Mapping[str, tuple[str, ...]] = MappingProxyType(
         "Task and robot": ("--careless", "--clearance", "--arm", "--grasp", "--robot-error"),
         "A robot that feels": ("--wrench", "--stated-error"),
         "What is seen": ("--level", "--levels", "--level-mm", "--level-deg", "--noise", "--eye", "--observation"),
-        "What a method makes of it": (
-            *("--method", "--methods", "--relations", "--looks", "--abstain"),
-            "--corrector-limit",
-        ),
+        "What a method makes of it": (*("--method", "--methods", "--relations", "--looks", "--abstain"),),
         "Which trials": ("--trials", "--seed", "--salt-file"),
         "How they are simulated": ("--fidelity", "--timestep-ms", "--trial-limit"),
         "Where they run": ("--workers", "--backend", "--address"),
-        "Files": ("--out", "--save-observation", "--video", "--cache"),
+        "Files": ("--out", "--save-observation", "--video"),
         "What is shown": ("--view", "--port", "--json"),
     }
 )

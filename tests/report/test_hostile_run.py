@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import os
 import shlex
@@ -21,7 +20,6 @@ from apo_bench.records.run.run_folder import read_rows
 from apo_bench.report.report import report
 from apo_bench.show.failure_pictures import failure_pictures
 from apo_bench.statistics import tally
-from apo_bench.sweeps.progress import Rates
 from tests import pages
 from tests.statistics.test_rates import row, write
 
@@ -109,10 +107,6 @@ def test_names_are_shown_and_not_obeyed(tmp_path: Path, capsys: pytest.CaptureFi
     assert cli.main(["compare", str(folder), str(folder), "--out", str(tmp_path / "made")]) == 0
     assert "<script>alert" not in (tmp_path / "made" / "compare.html").read_text(encoding="utf-8")
     print_cells(tally(rows))
-    rates = Rates()
-    for one in rows:
-        rates.count(one)
-    rates.table(30)
     assert "[/red]" in capsys.readouterr().out
 
 
@@ -126,16 +120,9 @@ def test_names_in_commands_have_no_control_characters(name: str, evil: str, tmp_
 def test_a_terminal_shows_what_it_would_obey(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert clean("a\x1b[2J\nb\x07\x9b\u202e\ud800é") == "a\\x1b[2J\\nb\\x07\\x9b\\u202e\\ud800é"
     print_cells(tally([row("contact", 0, False, scenario="\x1b]0;title\x07")]))
-    rates = Rates()
-    rates.count(row("contact", 0, False, scenario="\x1b[2J"))
-    rates.count(row("contact", 0, False, scenario="b"))
-    from rich.console import Console
-
-    shown = io.StringIO()
-    Console(file=shown, markup=False).print(rates.table(3))
     assert cli.main(["report", str(tmp_path / "no\x1b[31mwhere")]) == 2
     said = capsys.readouterr()
-    for text in (said.out, said.err, shown.getvalue()):
+    for text in (said.out, said.err):
         assert "\x1b" not in text
         assert "\\x1b" in text
 
