@@ -98,7 +98,6 @@ CORRECTORS = (
     "contact-robust",
     "contact-drop",
     "least-squares",
-    "learned-set",
 )
 METHODS = ("uncorrected", "nominal", "snap", "paper", "paper-track", "contact", "contact-robust", "oracle")
 NOISES = (
@@ -136,7 +135,7 @@ OPTIONS = (
     "method=contact arm=panda_primitive fidelity=near-contact",
     "method=contact human_error_scale=0 noise_mm=0 noise_deg=0",
     "method=contact-robust contact_source=detected-jointly fidelity=near-contact",
-    "method=learned-set noise=bias-view",
+    "method=contact-robust noise=bias-view",
     "method=physics-settle fidelity=near-contact",
     "method=contact clearance_mm=0.1",
     "method=last-only",

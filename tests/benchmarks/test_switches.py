@@ -7,11 +7,10 @@ import re
 from collections.abc import Mapping
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
 
 import pytest
 
-from benchmarks import processors, switches
+from benchmarks import switches
 from benchmarks.switches import EXPECTED, Kernels, Switch
 
 OWN = Kernels(("SkylakeX", "SkylakeX"), ("X86_V3", "X86_V4"), ("znver4", "+avx2"))
@@ -118,28 +117,3 @@ def test_a_single_kernel_has_both_cores(
     monkeypatch.setattr(switches, "switches", lambda own: iter([Switch(name, {}, own) for name in names]))
     assert switches.main(["echo", "-n", "processes", switches.PROCESSES]) == 0
     assert capsys.readouterr().out.count(f"processes {processes}") == len(names)
-
-
-@pytest.mark.parametrize(
-    ("change", "told"),
-    [
-        ({}, []),
-        ({"as_demonstrated": False, "failure_stage": "judge"}, [("stick_in_tower", "paper", 1)]),
-        ({"success": False}, [("stick_in_tower", "paper", 1)]),
-    ],
-)
-def test_a_verdict_that_differs_is_told_whatever_the_bits(change: dict[str, Any], told: list[processors.Trial]) -> None:
-    asked = processors.trials(["stick_in_tower"], ["paper", "none"], 2)
-    assert asked == [("stick_in_tower", m, seed) for m in ("none", "paper") for seed in (0, 1)]
-    plain = [{"as_demonstrated": m == "paper", "success": m == "paper", "failure_stage": None} for _, m, _ in asked]
-    first = {"bits": {"stick_in_tower": "0"}, "rows": plain}
-    found = processors.compared(Switch("", {}, OWN), asked, {**first, "rows": [*plain[:3], plain[3] | change]}, first)
-    assert found["demonstrations with other bits"] == ["stick_in_tower"]
-    assert [(d["scenario"], d["method"], d["seed"]) for d in found["verdicts that differ"]] == told
-
-
-def test_what_was_kept_of_the_repeated_verdicts_names_its_kernels() -> None:
-    kept = json.loads(processors.RESULT.read_text(encoding="utf-8"))
-    assert kept["runs"][0]["switch"] == "none"
-    assert len({(tuple(run["openblas"]), tuple(run["numpy"])) for run in kept["runs"]}) == len(kept["runs"]) > 1
-    assert len({run["trials"] for run in kept["runs"]}) == 1

@@ -11,10 +11,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench import InputError, build_scene, load_scenario
-from apo_bench.geometry import Box, Solid, face_area
+from apo_bench.geometry import Box, face_area
 from apo_bench.parts import load_part, part_names, part_path
 from apo_bench.parts.allowed import LARGEST_PART_BYTES, MOST_FACES
-from apo_bench.parts.checking import _mesh
 from apo_bench.parts.faces import SIDES, unite
 from apo_bench.resources import folder
 
@@ -218,7 +217,7 @@ def test_a_mesh_of_the_same_boxes_has_the_same_matter(spans: list[tuple[int, ...
         for size in [(sx, sy, sz)]
     ]
     union = unite(boxes)
-    mesh = _mesh(Solid("thing", {}, tuple(boxes), union.centroid, union.volume))
+    mesh = union_mesh(boxes)
     assert mesh.volume == pytest.approx(union.volume, rel=1e-6)
     assert mesh.center_mass == pytest.approx(union.centroid, abs=1e-7)
 

@@ -16,13 +16,12 @@ from typing import Any
 
 import imageio.v3 as imageio
 import pytest
-from apo_bench.report.run.trials import limits_of
 
 from apo_bench import InputError, SweepSettings, TrialSettings, run_sweep
 from apo_bench.cli.app import main
 from apo_bench.records import USUAL_LIMITS, Limits
 from apo_bench.records.run.replay_command import replay_command
-from apo_bench.records.run.run_file import read_run
+from apo_bench.records.run.run_file import limits_of, read_run
 from apo_bench.sweeps import pool
 from apo_bench.sweeps.stopping import Stopped, stoppable
 from apo_bench.sweeps.worker import SweepInputs, Worker
