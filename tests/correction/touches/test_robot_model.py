@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
@@ -43,6 +43,7 @@ def some_places(rng: np.random.Generator) -> Places:
     return Places(B, rng.uniform(-1.0, 1.0, (3, 6, JOINTS)), held, np.array([1, 0, -1]))
 
 
+@settings(deadline=None, max_examples=30)
 @given(seed=st.integers(0, 10**6), block=st.sampled_from(sorted(BLOCKS)), size=st.sampled_from([0.0, 1e-3, 0.3]))
 def test_each_block_of_the_derivative_is_that_of_finite_differences(seed: int, block: str, size: float) -> None:
     rng = np.random.default_rng(seed)
@@ -58,6 +59,7 @@ def test_each_block_of_the_derivative_is_that_of_finite_differences(seed: int, b
         assert_allclose(D[:, :, column], (ahead - behind) / (2.0 * step), atol=1e-8)
 
 
+@settings(deadline=None, max_examples=20)
 @given(seed=st.integers(0, 10**6))
 def test_a_part_is_where_its_factors_put_it(seed: int) -> None:
     rng = np.random.default_rng(seed)
