@@ -1,4 +1,4 @@
-"""The scenes of the paper are assembled, and taken apart and built again when a step turns out wrong."""
+"""Scenes of the paper are taken apart and built again when a step turns out wrong."""
 
 from __future__ import annotations
 
@@ -11,12 +11,7 @@ import pytest
 from apo_bench import Plan, Scene, build_scene, draw_layout, load_scenario, replay
 from apo_bench.assembly import Step
 from apo_bench.geometry import pose
-from apo_bench.trial.stages import (
-    LAYOUT,
-    Attempt,
-    replay_and_judge,
-    stream,
-)
+from apo_bench.trial.stages import LAYOUT, Attempt, replay_and_judge, stream
 
 SEED = 3
 
@@ -26,12 +21,7 @@ def scene_of(name: str) -> Scene:
     return build_scene(load_scenario(name))
 
 
-def built(
-    scene: Scene,
-    schedule: tuple[Step, ...],
-    wrong_mm: Mapping[int, Sequence[float]],
-    fidelity: str = "contact",
-) -> Attempt:
+def built(scene: Scene, schedule: tuple[Step, ...], wrong_mm: Mapping[int, Sequence[float]]) -> Attempt:
     """Follow a schedule at the truth; operations done for the first time are `wrong_mm` off in the part's frame."""
     layout = draw_layout(scene.scenario, stream(SEED, LAYOUT), scene.clearance_mm)
     seen: set[int] = set()
@@ -44,7 +34,7 @@ def built(
         if undo:
             wrong_mm = {j: w for j, w in wrong_mm.items() if j != k}
     plan = Plan(scene.scenario.assembly, layout.start, layout.goals, schedule, np.array(targets))
-    return replay_and_judge(plan, scene, layout.goals, fidelity=fidelity)
+    return replay_and_judge(plan, scene, layout.goals, fidelity="contact")
 
 
 def back_to(oldest: int, step: int, n: int) -> tuple[Step, ...]:

@@ -14,7 +14,7 @@ from numpy.testing import assert_array_equal
 from apo_bench import Correction
 from apo_bench.assembly import largest_gap
 from apo_bench.assembly.goals import once_each
-from apo_bench.correction.baselines.track import nested, paper_track, reached_back
+from apo_bench.correction.baselines.track import paper_track
 from apo_bench.geometry import Array, is_rigid
 from apo_bench.records import CODES
 from tests import scenes
@@ -143,18 +143,6 @@ def test_a_tighter_threshold_never_reaches_back_less() -> None:
     frees = [len(paper_track(replace(seen, gap_m=gap_m)).schedule) for gap_m in (1e-2, 1e-3, 1e-4, 1e-6)]
     assert frees == sorted(frees)
     assert frees[0] < frees[-1]
-
-
-def test_nested_sets_and_how_far_they_reach() -> None:
-    assert list(nested((4, 2, 1))) == [(4,), (4, 2), (4, 2, 1)]
-    assert [(k, undo) for k, undo in reached_back(3, (3, 1))] == [
-        (2, True),
-        (1, True),
-        (1, False),
-        (2, False),
-        (3, False),
-    ]
-    assert reached_back(3, ()) == reached_back(3, (3,)) == [(3, False)]
 
 
 @pytest.mark.parametrize("name", ["stick_in_tower", "pockets"])

@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from functools import cache
-from itertools import combinations
 
 import numpy as np
 import pytest
@@ -10,20 +9,10 @@ from numpy.testing import assert_allclose
 
 from apo_bench import Demonstration, InputError, correct, draw_layout, load_scenario
 from apo_bench.assembly import OutlierModel, largest_gap, looking_away, placements
-from apo_bench.assembly.pattern import pattern
-from apo_bench.correction.checks.status import p_value
 from apo_bench.correction.contact.inferred import inferred_goals
-from apo_bench.correction.contact.problem import seen_system
 from apo_bench.correction.region import contains_truth
-from apo_bench.correction.robust.agreement import ContactAgreement
-from apo_bench.correction.robust.beliefs import INLIER
 from apo_bench.correction.robust.crowding import crowding
-from apo_bench.correction.robust.hypotheses import Case, soft_deviation
 from apo_bench.correction.robust.robust import UNNAMED, contact_robust
-from apo_bench.correction.robust.views import views_of
-from apo_bench.correction.solvers.compact import linearised_by
-from apo_bench.correction.solvers.posterior import jacobian_rank
-from apo_bench.correction.solvers.whitened import noise_factor
 from apo_bench.geometry import overlap_area, pose
 from apo_bench.geometry.covering import overlap
 from apo_bench.observation.noise import Level, make_noise
@@ -265,24 +254,6 @@ def test_rates_are_those_that_the_observation_states():
     found = correct(known, "contact-robust")
     assert found.left_out == ()
     assert "seen badly: operation 3" in found.sentence
-
-
-def test_sets_are_scored_as_if_each_were_looked_at_alone():
-    observation = astray(look("vanished_fixture", 2), 1)
-    n = len(observation.goals)
-    p = len(observation.assembly.solids)
-    rest = ContactAgreement(Case(observation, views_of(observation), OutlierModel()), ((INLIER,),) * n)
-    e, Jt = linearised_by(seen_system(observation), observation.goals, noise_factor(observation))
-    soft = np.hypot(soft_deviation(observation), 3.0 * np.radians(1.0) ** 2 * 0.1)
-    found = []
-    for left_out in (s for size in range(n) for s in combinations(range(n), size)):
-        rows = np.repeat(~np.isin(pattern(observation.assembly).letters - p, left_out).any(axis=1), 3)
-        J = Jt[:, rows].T
-        square = e[rows] @ np.linalg.solve(J @ J.T + np.diag(soft[rows] ** 2), e[rows])
-        found.append(rest.agreement(left_out))
-        assert found[-1] == pytest.approx(p_value(square, jacobian_rank(J.T)), rel=1e-6)
-    assert found[0] == 0.0
-    assert max(found) > 0.01
 
 
 def test_what_faces_cover_is_the_area_of_their_overlap():

@@ -15,34 +15,25 @@ from apo_bench.assembly import Operation
 from apo_bench.correction.solvers import posterior, sparse
 from apo_bench.correction.solvers.compact import CompactEquations
 from apo_bench.correction.solvers.gauss_newton import NearestGoals, batch_goals, nearest_goals
-from apo_bench.geometry import Array, Solid
+from apo_bench.geometry import Array
 from benchmarks.corrector_bench.problems import problem
 from tests import scenes
 from tests.correction.solvers.test_manifold import correction, crooked, scales, system_of, twisted
 
 BLOCK = scenes.block()
-PLATE = scenes.cuboid("plate", (600, 500, 10))
-
-
-def blocks(n: int, onto: Callable[[int], str], goal: Callable[[int], Array], first: Solid = BLOCK) -> scenes.Scene:
-    """n blocks, b0, b1, ..: the first stands on the table, each other one on the part of that name."""
-    solids = {"table": scenes.table(), "b0": first} | {f"b{k}": BLOCK for k in range(1, n)}
-    operations = [Operation("b0", scenes.touch("b0", "table", "nz-top"))]
-    for k in range(1, n):
-        below = onto(k)
-        operations.append(Operation(f"b{k}", scenes.touch(f"b{k}", below, "nz-top" if below == "table" else "nz-pz")))
-    start = {part: np.eye(4) for part in solids}
-    goals = np.array([goal(k) for k in range(n)])
-    return scenes.Scene(Assembly(solids, tuple(operations), frozenset({"table"})), start, goals)
-
-
-def tower(n: int) -> scenes.Scene:
-    return blocks(n, lambda k: f"b{k - 1}", lambda k: scenes.mm(0, 0, 25 + 50 * k))
 
 
 def hub(n: int) -> scenes.Scene:
-    """One plate that carries everything."""
-    return blocks(n, lambda k: "b0", lambda k: scenes.mm(0, 0, 10) if k == 0 else scenes.mm(k % 20, k // 20, 45), PLATE)
+    """One plate, b0, that carries blocks, b1, b2 and so on."""
+    solids = {"table": scenes.table(), "b0": scenes.cuboid("plate", (600, 500, 10))}
+    operations = [Operation("b0", scenes.touch("b0", "table", "nz-top"))]
+    goals = [scenes.mm(0, 0, 10)]
+    for k in range(1, n):
+        solids[f"b{k}"] = BLOCK
+        operations.append(Operation(f"b{k}", scenes.touch(f"b{k}", "b0", "nz-pz")))
+        goals.append(scenes.mm(k % 20, k // 20, 45))
+    assembly = Assembly(solids, tuple(operations), frozenset({"table"}))
+    return scenes.Scene(assembly, {part: np.eye(4) for part in solids}, np.array(goals))
 
 
 def fence(n: int) -> scenes.Scene:
@@ -158,10 +149,9 @@ def test_rank_of_nothing() -> None:
         assert sparse.sparse_rank(csr_array(shape)) == posterior.jacobian_rank(np.zeros(shape)) == 0
 
 
-@pytest.mark.parametrize("build", [tower, hub])
-def test_a_thousand_blocks(build: Callable[[int], scenes.Scene]) -> None:
+def test_a_thousand_blocks_on_one_plate() -> None:
     n = 1000
-    scene = build(n)
+    scene = hub(n)
     L = scales(n, 0.5, 0.02)
     seen = twisted(scene.goals, L, np.random.default_rng(0))
     found = nearest_goals(system_of(scene, seen), seen, L)

@@ -11,14 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from apo_bench import Correction, Observation, correct, correct_many, load_scenario
+from apo_bench import Correction, Observation, correct, correct_many
 from apo_bench.assembly import Operation
-from apo_bench.assembly.equations import equations
 from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.region import contains_truth
-from apo_bench.correction.solvers.compact import compact_equations
 from apo_bench.correction.solvers.gauss_newton import nearest_goals
-from apo_bench.correction.solvers.kernels import PLAIN
 from apo_bench.correction.solvers.posterior import freedom_of, jacobian_rank, projections, settled_basis
 from apo_bench.geometry import Array, pose
 from tests import scenes
@@ -192,17 +189,3 @@ def test_a_settled_basis_is_of_the_span_alone(free: int) -> None:
         settled = settled_basis(N)
         assert_allclose(settled @ settled.T, N @ N.T, rtol=0, atol=1e-12)
         assert_allclose(settled_basis(turned + 1e-15), settled, rtol=0, atol=1e-9)
-
-
-def test_free_directions_are_the_same_compiled_or_not() -> None:
-    """The plan that fits is sought along them: rounding must not turn them."""
-    of = load_scenario("stick_in_tower")
-    rng = np.random.default_rng(4)
-    for _ in range(3):
-        n = len(of.assembly)
-        L = np.tile(np.diag(np.repeat([16e-3, np.radians(16.0)], 3)), (n, 1, 1))
-        seen = of.goals @ pose.exp((L @ rng.standard_normal((n, 6, 1)))[..., 0])
-        system = compact_equations(equations(of.assembly, of.start, seen), n)
-        bases = [freedom_of(nearest_goals(system, seen, L, kernels=by).Jt) for by in (None, PLAIN)]
-        plain, looped = (known.free for known in bases if known is not None)
-        assert_allclose(looped, plain, rtol=0, atol=1e-6)
