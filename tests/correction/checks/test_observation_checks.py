@@ -35,10 +35,6 @@ def stretched(goals: Array) -> None:
     goals[1, :3, :3] *= 1.3
 
 
-def mirrored(goals: Array) -> None:
-    goals[2, :3, 0] *= -1.0
-
-
 def far(goals: Array) -> None:
     goals[0, 0, 3] = 1e200
 
@@ -49,7 +45,6 @@ def lopsided(covariance: Array) -> None:
 
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "stretched": (lambda: edited("goals", stretched), "the goal of operation 2 in the observation is not a rigid pose"),
-    "mirrored": (lambda: edited("goals", mirrored), "the goal of operation 3 in the observation is not a rigid pose"),
     "far": (lambda: edited("goals", far), "the goal of operation 1 in the observation has a position of 1e+200 m"),
     "lopsided": (
         lambda: edited("covariance", lopsided),

@@ -103,23 +103,6 @@ def test_every_draw_is_solved_and_no_wall_overstepped(
     assert touched > 0
 
 
-def test_walls_that_close_lead_to_the_middle() -> None:
-    name = "stick_on_castles"
-    scene = scenes.stick_on_castles()
-    rng = np.random.default_rng(1)
-    L = crooked(len(scene.goals), rng)
-    goals = twisted(scene.goals, L, rng)
-    middle = correct(look(scene.assembly, scene, goals, L), "contact").goals
-    off = []
-    for half_m in (1e-3, 1e-4, 1e-5, 1e-6):
-        made = correct(look(walled(scene, name, Gap("clearance", -half_m, half_m)), scene, goals, L), "contact")
-        assert made.ok, made.sentence
-        off.append(float(np.abs(made.goals - middle).max()))
-    assert off == sorted(off, reverse=True)
-    assert off[-1] <= 1e-4
-    assert off[-1] <= 0.02 * off[-3] * 1.5
-
-
 def test_a_part_that_was_seen_between_its_walls_stays() -> None:
     """Nothing but walls: a block seen 0.4 mm above the table, and one seen 3 mm above it."""
     scene = scenes.scene(
