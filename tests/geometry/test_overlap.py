@@ -58,13 +58,6 @@ def test_a_share_is_what_is_covered_of_the_other_overlap():
     assert wide.share(NO_OVERLAP) == 1.0
 
 
-def test_a_strip_across_a_concave_face_leaves_two_pieces():
-    found = overlap(rectangle(0.05, 0.005), pose.at((0, 0.02, 0), (180, 0, 0)), U_SHAPE, EYE)
-    assert found.area == pytest.approx(2 * 0.02 * 0.01)
-    assert len(found.corners) == 8
-    assert np.abs(found.corners[:, 0]).min() == pytest.approx(0.01)
-
-
 def test_a_hole_is_no_overlap_and_its_corners_count():
     found = overlap(rectangle(0.02, 0.02), OVER, ring(0.025, 0.01), EYE)
     assert found.area == pytest.approx(0.04**2 - 0.02**2)

@@ -74,13 +74,6 @@ def test_known_parts(part: Solid, order: int, fold: tuple[int, ...]) -> None:
     assert_allclose(found[0], np.eye(4))
 
 
-def test_a_mirror_image_is_not_a_turn() -> None:
-    """A part that differs from its mirror image only by handedness, an S of two steps, has its half turn alone."""
-    screw = scenes.solid("S", [], ((0, 0, 0), (10, 10, 10)), ((20, 0, 5), (10, 10, 5)), ((-20, 0, -5), (10, 10, 5)))
-    assert len(symmetries(screw)) == 2
-    assert_allclose(symmetries(screw)[1][:3, :3], np.diag([-1.0, 1.0, -1.0]))
-
-
 def test_no_turn_is_farther_than_half_the_way_to_an_equal_pose() -> None:
     """Of a stick: 45 degrees about its axis; every rotation is within 90 degrees of one of the eight."""
     group = symmetries(scenes.stick())

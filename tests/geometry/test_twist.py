@@ -60,17 +60,6 @@ def test_no_twist_is_exactly_nothing() -> None:
     assert_array_equal(J, np.tile(np.eye(6), (3, 1, 1)))
 
 
-@pytest.mark.parametrize("lead", [(2, 3), (0,)])
-def test_leading_axes_are_single_calls(lead: tuple[int, ...]) -> None:
-    xi = np.random.default_rng(0).standard_normal((*lead, 6))
-    T, J = exp_and_jacobian(xi)
-    assert (T.shape, J.shape) == ((*lead, 4, 4), (*lead, 6, 6))
-    for at in np.ndindex(lead):
-        one = exp_and_jacobian(xi[at])
-        assert_allclose(T[at], one[0], rtol=0, atol=1e-14)
-        assert_allclose(J[at], one[1], rtol=0, atol=1e-14)
-
-
 def test_generators_are_the_derivatives_of_the_exponential() -> None:
     by = 1e-6
     numeric = [(pose.exp(by * unit) - pose.exp(-by * unit)) / (2 * by) for unit in np.eye(6)]
