@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from apo_bench.geometry import pose
-from tests.audited_states import ALONE, HALF_Y, HALF_Z, WHOLE, Seen
-from tests.end_states import END, moved, put, shift, state
+from tests.audited_states import HALF_Y, HALF_Z, Seen
+from tests.end_states import END, moved, put, shift
 from tests.rounds import (
     countersink,
     dovetail,
@@ -24,35 +24,17 @@ from tests.scenes import mm
 PEGS = [
     Seen("peg, exactly", peg_in_plate, [], True),
     Seen("peg, turned by 30 degrees about its axis", peg_in_plate, [shift("peg", 2, 0, 0, 0, (0, 0, 30))], True),
-    Seen(
-        "peg, turned by 137 degrees about its axis at the end",
-        peg_in_plate,
-        [shift("peg", END, 0, 0, 0, (0, 0, 137))],
-        True,
-    ),
     Seen("peg, upside down", peg_in_plate, [put("peg", 2, mm(0, 0, 50, (180, 0, 0)))], True),
     Seen("peg, 0.34 mm aside", peg_in_plate, [shift("peg", 2, 0.34, 0, 0)], True),
     Seen("peg, 0.36 mm aside", peg_in_plate, [shift("peg", 2, 0, -0.36, 0)], False),
-    Seen("peg, 0.24 mm aside both ways", peg_in_plate, [shift("peg", 2, 0.24, 0.24, 0)], True),
     Seen("peg, 0.3 mm aside both ways", peg_in_plate, [shift("peg", 2, 0.3, -0.3, 0)], False),
-    Seen("peg, 0.09 mm above the table", peg_in_plate, [shift("peg", 2, 0, 0, 0.09)], True),
-    Seen("peg, 0.11 mm above the table", peg_in_plate, [shift("peg", 2, 0, 0, 0.11)], False),
     Seen("peg, leans by 0.9 degrees", peg_in_plate, [shift("peg", 2, 0, 0, 0, (0.9, 0, 0))], True),
     Seen("peg, leans by 1.1 degrees", peg_in_plate, [shift("peg", 2, 0, 0, 0, (0, 1.1, 0))], False),
-    Seen("peg, stuck 9 mm above the table", peg_in_plate, [shift("peg", 2, 0, 0, 9)], False),
     Seen("peg, on top of the plate", peg_in_plate, [shift("peg", 2, 8, 0, 20)], False),
-    Seen("peg, beside the plate", peg_in_plate, [put("peg", 2, mm(50, 0, 0))], False),
     Seen("peg, the plate turned by 30 degrees about it", peg_in_plate, [shift("plate", 1, 0, 0, 0, (0, 0, 30))], True),
-    Seen("peg, the plate upside down", peg_in_plate, [put("plate", 1, mm(0, 0, 20, (180, 0, 0)))], True),
-    Seen("peg, all of it 150 mm further and turned", peg_in_plate, [moved(1, mm(150, -80, 0, (0, 0, 30)))], True),
-    Seen("peg, plate and peg pushed by 0.9 mm at the insertion", peg_in_plate, [moved(2, mm(0.9, 0, 0))], True),
     Seen("peg, plate and peg pushed by 1.1 mm at the insertion", peg_in_plate, [moved(2, mm(1.1, 0, 0))], True),
-    Seen("peg, still turning", peg_in_plate, [state(END, spin_rad_s=np.radians(3.0))], False),
-    Seen("peg, still held", peg_in_plate, [state(END, released=False)], False),
-    Seen("peg, 0.06 mm deep in the wall", peg_in_plate, [state(END, penetration_m=6e-5)], False),
     Seen("thin peg, 0.19 mm aside where its size leaves 0.1", loose_peg, [shift("peg", 2, 0.19, 0, 0)], True),
     Seen("thin peg, 0.21 mm aside where its size leaves 0.1", loose_peg, [shift("peg", 2, 0.21, 0, 0)], False),
-    Seen("bush, exactly", nested, [], True),
     Seen(
         "bush, it and the peg in it turned each by its own",
         nested,
@@ -66,67 +48,38 @@ PEGS = [
         True,
     ),
     Seen("bush, 0.36 mm aside, the peg in its middle", nested, [moved(2, mm(0.36, 0, 0), "bush", "peg")], False),
-    Seen("bush, upside down", nested, [put("bush", 2, mm(0, 0, 20, (180, 0, 0)))], True),
-    Seen("bush, on top of the plate", nested, [shift("bush", 2, 0, 0, 20)], False),
-    Seen("bush, the peg stands beside the plate", nested, [put("peg", 3, mm(60, 0, 0))], False),
 ]
 """Pegs that stand in holes."""
 
 SHAFTS = [
     Seen("shaft, exactly through both plates", through, [], True),
     Seen("shaft, turned by 77 degrees about its axis", through, [shift("peg", 3, 0, 0, 0, (0, 0, 77))], True),
-    Seen("shaft, end for end", through, [put("peg", 3, mm(0, -60, 30, (-90, 0, 0)))], True),
     Seen("shaft, 55 % of the second bore filled", through, [shift("peg", 3, 0, 0, 29)], True),
     Seen("shaft, 45 % of the second bore filled", through, [shift("peg", 3, 0, 0, 31)], False),
-    Seen("shaft, in the first plate only", through, [shift("peg", 3, 0, 0, 60)], False),
-    Seen("shaft, the second plate 0.3 mm aside", through, [shift("b", 2, 0.3, 0, 0)], True),
-    Seen("shaft, the second plate 0.4 mm aside", through, [shift("b", 2, 0.4, 0, 0)], False),
     Seen("shaft, the second plate turned by 0.9 degrees", through, [shift("b", 2, 0, 0, 0, (0, 0.9, 0))], True),
     Seen("shaft, the second plate turned by 1.5 degrees", through, [shift("b", 2, 0, 0, 0, (0, 1.5, 0))], False),
-    Seen("shaft, 0.34 mm high in both bores", through, [shift("peg", 3, 0, 0.34, 0)], True),
-    Seen("shaft, 0.36 mm low in both bores", through, [shift("peg", 3, 0, -0.36, 0)], False),
     Seen("shaft, skew by 0.15 degrees", through, [shift("peg", 3, 0, 0, 0, (0, 0.15, 0))], True),
     Seen("shaft, skew by 0.3 degrees", through, [shift("peg", 3, 0, 0, 0, (0, 0.3, 0))], False),
-    Seen("shaft, on the table beside the plates", through, [put("peg", 3, mm(60, 60, 5, (90, 0, 0)))], False),
-    Seen("groove, exactly", in_groove, [], True),
     Seen(
         "groove, the shaft rolled by 50 degrees about its axis", in_groove, [shift("peg", 2, 0, 0, 0, (0, 0, 50))], True
     ),
-    Seen("groove, the shaft end for end", in_groove, [put("peg", 2, mm(25, 0, 20 + 50**0.5, (0, -90, 0)))], True),
-    Seen("groove, the shaft 10 mm along it", in_groove, [shift("peg", 2, 0, 0, 10)], True),
     Seen("groove, the shaft 26 mm along it, 39 of 50 mm in it", in_groove, [shift("peg", 2, 0, 0, 26)], True),
     Seen("groove, the shaft 0.12 mm up, 0.085 mm off both walls", in_groove, [shift("peg", 2, -0.12, 0, 0)], True),
     Seen("groove, the shaft 0.16 mm up, 0.113 mm off both walls", in_groove, [shift("peg", 2, -0.16, 0, 0)], False),
-    Seen("groove, the shaft 0.2 mm aside", in_groove, [shift("peg", 2, 0, 0.2, 0)], False),
-    Seen("groove, the shaft across it, on top", in_groove, [put("peg", 2, mm(0, 25, 45, (90, 0, 0)))], False),
-    Seen("groove, one end of the shaft 0.09 mm up", in_groove, [shift("peg", 2, 0, 0, 0, (0, -0.1, 0))], True),
-    Seen("groove, one end of the shaft 0.26 mm up", in_groove, [shift("peg", 2, 0, 0, 0, (0, -0.3, 0))], False),
-    Seen("lying shaft, exactly", on_table, [], True),
-    Seen("lying shaft, 40 mm aside", on_table, [moved(1, mm(0, 40, 0))], True),
-    Seen("lying shaft, turned by 70 degrees on the table", on_table, [moved(1, mm(0, 0, 0, (0, 0, 70)))], True),
-    Seen("lying shaft, end for end", on_table, [put("peg", 1, mm(50, 0, 5, (0, -90, 0)))], True),
     Seen("lying shaft, 0.09 mm above the table", on_table, [shift("peg", 1, -0.09, 0, 0)], True),
     Seen("lying shaft, 0.11 mm above the table", on_table, [shift("peg", 1, -0.11, 0, 0)], False),
-    Seen("lying shaft, one end 0.13 mm up", on_table, [shift("peg", 1, 0, 0, 0, (0, -0.15, 0))], False),
     Seen("lying shaft, rolls by 5 mm at the end", on_table, [moved(END, mm(0, 5, 0))], True),
-    Seen("lying shaft, stands on its end", on_table, [put("peg", 1, mm(0, 0, 0))], False),
     Seen("lying shaft, 26 of 50 mm on the table", on_table, [put("peg", 1, mm(674, 0, 5, (0, 90, 0)))], True),
     Seen("lying shaft, 24 of 50 mm on the table", on_table, [put("peg", 1, mm(676, 0, 5, (0, 90, 0)))], False),
 ]
 """Shafts that lie, and shafts through two parts."""
 
 CONES = [
-    Seen("plug, exactly", countersink, [], True),
     Seen("plug, turned by 100 degrees about its axis", countersink, [shift("plug", 2, 0, 0, 0, (0, 0, 100))], True),
     Seen("plug, 0.12 mm high, 0.085 mm off the wall", countersink, [shift("plug", 2, 0, 0, 0.12)], True),
     Seen("plug, 0.16 mm high, 0.113 mm off the wall", countersink, [shift("plug", 2, 0, 0, 0.16)], False),
-    Seen("plug, 0.09 mm aside", countersink, [shift("plug", 2, 0, 0.09, 0)], True),
-    Seen("plug, 0.11 mm aside", countersink, [shift("plug", 2, 0.11, 0, 0)], False),
     Seen("plug, tilted by 0.5 degrees", countersink, [shift("plug", 2, 0, 0, 0, (0.5, 0, 0))], True),
     Seen("plug, tilted by 1.5 degrees", countersink, [shift("plug", 2, 0, 0, 0, (1.5, 0, 0))], False),
-    Seen("plug, on its head", countersink, [put("plug", 2, mm(0, 0, 36, (180, 0, 0)))], False),
-    Seen("plug, 3.1 mm high", countersink, [shift("plug", 2, 0, 0, 3.1)], False),
-    Seen("rim, exactly", on_rim, [], True),
     Seen(
         "rim, the plug tilted by 3 degrees on it",
         on_rim,
@@ -139,11 +92,8 @@ CONES = [
         [put("plug", 2, mm(0, 0, 20, (6, 0, 0)) @ mm(0, 0, -2))],
         False,
     ),
-    Seen("rim, the plug 0.12 mm high", on_rim, [shift("plug", 2, 0, 0, 0.12)], True),
-    Seen("rim, the plug 0.16 mm high", on_rim, [shift("plug", 2, 0, 0, 0.16)], False),
     Seen("rim, the plug 0.09 mm aside", on_rim, [shift("plug", 2, 0.09, 0, 0)], True),
     Seen("rim, the plug 0.11 mm aside", on_rim, [shift("plug", 2, 0, -0.11, 0)], False),
-    Seen("rim, the plug beside the hole", on_rim, [shift("plug", 2, 15, 0, 2)], False),
 ]
 """Cones in their seats, and on the rim of a hole."""
 
@@ -155,8 +105,6 @@ ABOUT = MIDDLE @ pose.exp([0, 0, 0, *np.radians(3.0) * OUT]) @ pose.inverse(MIDD
 TOP = 20.0 + 60.0 * np.tan(SLOPE)
 
 TILTED = [
-    Seen("wedges, exactly", wedges_meet, [], True),
-    Seen("wedges, the upper one slid by 10 mm", wedges_meet, [moved(2, mm(*(10 * DOWN)), "high")], True),
     Seen("wedges, the upper one slid by 40 of 69 mm", wedges_meet, [moved(2, mm(*(40 * DOWN)), "high")], False),
     Seen("wedges, 0.09 mm apart", wedges_meet, [moved(2, mm(*(0.09 * OUT)), "high")], True),
     Seen("wedges, 0.11 mm apart", wedges_meet, [moved(2, mm(*(0.11 * OUT)), "high")], False),
@@ -165,19 +113,10 @@ TILTED = [
     ),
     Seen("wedges, the upper one turned by 3 degrees on the slope", wedges_meet, [moved(2, ABOUT, "high")], True),
     Seen("wedges, the upper one turned by half a turn", wedges_meet, [put("high", 2, mm(0, 0, TOP, HALF_Y))], False),
-    Seen("wedges, the lower one turned by half a turn", wedges_meet, [put("low", 1, mm(0, 0, 0, HALF_Z))], False),
-    Seen("wedges, the upper one tilted by 6 degrees", wedges_meet, [shift("high", 2, 0, 0, 0, (6, 0, 0))], False),
-    Seen("dovetail, exactly", dovetail, [], True),
     Seen("dovetail, the slider by half a turn", dovetail, [shift("slider", 2, 0, 0, 0, HALF_Z)], True),
-    Seen("dovetail, 20 mm along", dovetail, [shift("slider", 2, 20, 0, 0)], True),
     Seen("dovetail, 31 mm along, 49 of 60 mm on the rail", dovetail, [shift("slider", 2, -31, 0, 0)], True),
     Seen("dovetail, 0.4 mm aside, 0.346 mm off the walls", dovetail, [shift("slider", 2, 0, 0.4, 0)], True),
     Seen("dovetail, 0.42 mm aside, 0.364 mm off the walls", dovetail, [shift("slider", 2, 0, 0.42, 0)], False),
-    Seen("dovetail, 0.09 mm up", dovetail, [shift("slider", 2, 0, 0, 0.09)], True),
-    Seen("dovetail, 0.2 mm up", dovetail, [shift("slider", 2, 0, 0, 0.2)], False),
-    Seen("dovetail, skew by 0.5 degrees", dovetail, [shift("slider", 2, 0, 0, 0, (0, 0, 0.5))], True),
-    Seen("dovetail, skew by 1 degree", dovetail, [shift("slider", 2, 0, 0, 0, (0, 0, 1))], False),
-    Seen("dovetail, the slider on top of the rail", dovetail, [shift("slider", 2, 0, 0, 20)], False),
 ]
 """Faces that are neither level nor upright."""
 
@@ -191,9 +130,3 @@ DIFFERS = {
     "dovetail, 31 mm along, 49 of 60 mm on the rail": PLACE,
 }
 """States of which the rule says otherwise than the person, and what in the rule does."""
-
-REVISED = {
-    "peg, plate and peg pushed by 1.1 mm at the insertion": WHOLE,
-    "lying shaft, rolls by 5 mm at the end": ALONE,
-}
-"""States that the person called wrong at first, for where a part had been before, and why they are right."""

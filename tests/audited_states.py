@@ -13,7 +13,6 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.assembly import Operation
-from apo_bench.geometry import pose
 from tests import scenes
 from tests.end_states import (
     ALIGNED,
@@ -22,7 +21,6 @@ from tests.end_states import (
     CASTLES,
     END,
     FIXTURE,
-    LAYOUT,
     POCKETS,
     TOWER,
     Edit,
@@ -120,7 +118,6 @@ HALF_X = (180, 0, 0)
 HALF_Y = (0, 180, 0)
 HALF_Z = (0, 0, 180)
 QUARTER_X = (90, 0, 0)
-QUARTER_Y = (0, 90, 0)
 QUARTER_Z = (0, 0, 90)
 GROUP = ("cube2", "cube3", "stick")
 IN_A = mm(-60, 150, 19)
@@ -128,9 +125,6 @@ IN_B = mm(60, 150, 19)
 
 TURNED = [
     Seen("tower, the stick turned by a quarter about its length", TOWER, [shift("stick", 3, 0, 0, 0, QUARTER_X)], True),
-    Seen("tower, the stick turned end for end and upside down", TOWER, [shift("stick", 3, 0, 0, 0, HALF_Y)], True),
-    Seen("tower, castle 1 turned by half a turn", TOWER, [shift("castle1", 1, 0, 0, 0, HALF_Z)], True),
-    Seen("tower, castle 2 turned by half a turn", TOWER, [shift("castle2", 2, 0, 0, 0, HALF_Z)], True),
     Seen(
         "tower, every part turned by half a turn of its own",
         TOWER,
@@ -148,39 +142,18 @@ TURNED = [
         "castles, the stick on its edge, turned by 45 degrees", CASTLES, [shift("stick", 3, 0, 0, 0, (45, 0, 0))], False
     ),
     Seen(
-        "castles, the stick turned by 30 degrees about its length",
-        CASTLES,
-        [shift("stick", 3, 0, 0, 0, (30, 0, 0))],
-        False,
-    ),
-    Seen("castles, castle 2 turned by half a turn", CASTLES, [shift("castle2", 2, 0, 0, 0, HALF_Z)], True),
-    Seen("castles, castle 2 turned by a quarter", CASTLES, [shift("castle2", 2, 0, 0, 0, QUARTER_Z)], False),
-    Seen("castles, castle 2 upside down", CASTLES, [put("castle2", 2, mm(70, 0, 40, HALF_X))], False),
-    Seen(
         "carried stick, the cube turned by a quarter about its hole",
         CARRIED,
         [shift("cube", 3, 0, 0, 0, QUARTER_X)],
         True,
     ),
-    Seen("carried stick, the cube turned end for end", CARRIED, [shift("cube", 3, 0, 0, 0, HALF_Z)], True),
     Seen(
         "carried stick, the cube turned by a quarter, its hole across",
         CARRIED,
         [shift("cube", 3, 0, 0, 0, QUARTER_Z)],
         False,
     ),
-    Seen(
-        "carried stick, the cube upright, its hole from above", CARRIED, [shift("cube", 3, 0, 0, 0, QUARTER_Y)], False
-    ),
-    Seen(
-        "bridge, the blocks turned by a quarter and by half a turn",
-        BRIDGE,
-        [shift("B", 1, 0, 0, 0, QUARTER_Z), shift("C", 2, 0, 0, 0, HALF_X)],
-        True,
-    ),
-    Seen("bridge, A turned by half a turn", BRIDGE, [shift("A", 3, 0, 0, 0, HALF_Z)], True),
     Seen("bridge, A lies along the seam, turned by 80 degrees", BRIDGE, [shift("A", 3, 0, 0, 0, (0, 0, 80))], False),
-    Seen("bridge, A stands on its long side", BRIDGE, [put("A", 3, mm(0, 0, 75, QUARTER_X))], False),
     Seen(
         "pockets, each cube and the stick turned by a quarter of its own",
         POCKETS,
@@ -191,7 +164,6 @@ TURNED = [
         ],
         True,
     ),
-    Seen("pockets, cube 3 turned end for end", POCKETS, [shift("cube3", 3, 0, 0, 0, HALF_Z)], True),
     Seen("pockets, cube 2 turned by a quarter in its pocket", POCKETS, [shift("cube2", 6, 0, 0, 0, QUARTER_Z)], False),
     Seen(
         "narrow stick, turned so that its fit side stays at its wall",
@@ -205,19 +177,11 @@ TURNED = [
         [shift("stick", 3, 0, 0, 0, HALF_Z)],
         False,
     ),
-    Seen(
-        "narrow stick, turned by a quarter: its fit side up",
-        narrow_stick,
-        [shift("stick", 3, 0, 0, 0, QUARTER_X)],
-        False,
-    ),
 ]
 """Turns of single parts."""
 
 ELSEWHERE = [
     Seen("tower, 150 mm further and turned by 30 degrees", TOWER, [moved(1, mm(150, -80, 0, (0, 0, 30)))], True),
-    Seen("castles, all of it turned by 80 degrees", CASTLES, [moved(1, mm(0, 60, 0, (0, 0, 80)))], True),
-    Seen("castles, all of it turned by 120 degrees", CASTLES, [moved(1, mm(0, 60, 0, (0, 0, 120)))], True),
     Seen(
         "castles, all of it turned by a quarter, give or take a little play",
         CASTLES,
@@ -228,50 +192,29 @@ ELSEWHERE = [
         ],
         True,
     ),
-    Seen("bridge, turned by 30 degrees", BRIDGE, [moved(1, mm(40, -200, 0, (0, 0, 30)))], True),
     Seen("bridge, turned by 60 degrees", BRIDGE, [moved(1, mm(40, -200, 0, (0, 0, 60)))], True),
-    Seen(
-        "castles, built where the scenario's file says, not where they were shown",
-        CASTLES,
-        [moved(1, pose.inverse(LAYOUT))],
-        True,
-    ),
     Seen("tower, at the table's edge, 51 % of castle 1 on it", TOWER, [moved(1, at_edge(0.51))], True),
     Seen("tower, at the table's edge, 49 % of castle 1 on it", TOWER, [moved(1, at_edge(0.49))], False),
-    Seen("tower, in the air beyond the table's edge", TOWER, [moved(1, at_edge(-0.5))], False),
     Seen("tower, all of it 3 mm above the table", TOWER, [moved(1, mm(0, 0, 3))], False),
     Seen(
         "bridge, B and C in each other's place", BRIDGE, [put("B", 1, mm(25, 0, 25)), put("C", 2, mm(-25, 0, 25))], True
     ),
     Seen("pockets, the cubes in each other's pocket", POCKETS, [put("cube2", 6, IN_B), put("cube3", 6, IN_A)], True),
-    Seen("pockets, both cubes on the table between the pockets", POCKETS, [moved(6, mm(0, -80, 6), *GROUP)], False),
     Seen("pockets, all one pocket too far", POCKETS, [moved(6, mm(120, 0, 0), *GROUP)], False),
 ]
 """Right or wrong in itself, at another place."""
 
 AFTERWARDS = [
-    Seen("tower, all of it turned by 0.4 degrees at the end", TOWER, [moved(END, mm(0, 0, 0, (0, 0, 0.4)))], True),
-    Seen("tower, all of it turned by 0.6 degrees at the end", TOWER, [moved(END, mm(0, 0, 0, (0, 0, 0.6)))], True),
     Seen("tower, all of it turned by 5 degrees at the end", TOWER, [moved(END, mm(0, 0, 0, (0, 0, 5)))], True),
-    Seen("tower, all of it pushed by 0.9 mm at the end", TOWER, [moved(END, mm(0.5, 0.74, 0))], True),
     Seen("tower, all of it pushed by 1.1 mm at the end", TOWER, [moved(END, mm(0.7, 0.86, 0))], True),
-    Seen("tower, the stick turned by 0.4 degrees at the end", TOWER, [shift("stick", END, 0, 0, 0, (0, 0, 0.4))], True),
     Seen("tower, the stick turned by 0.6 degrees at the end", TOWER, [shift("stick", END, 0, 0, 0, (0, 0, 0.6))], True),
-    Seen("tower, the stick put in at 0.6 degrees", TOWER, [shift("stick", 3, 0, 0, 0, (0, 0, 0.6))], True),
     Seen(
         "castles, the stick turned by 0.4 degrees into the walls",
         CASTLES,
         [shift("stick", END, 0, 0, 0, (0, 0, 0.4))],
         False,
     ),
-    Seen("castles, castle 1 pushed by 0.98 mm by the stick", CASTLES, [shift("castle1", 3, 0.98, 0, 0)], True),
     Seen("castles, castle 1 pushed by 1.02 mm by the stick", CASTLES, [shift("castle1", 3, 1.02, 0, 0)], True),
-    Seen(
-        "tower, both castles turned by 1.3 degrees by the stick: 0.96 mm at the corners",
-        TOWER,
-        [moved(3, mm(0, 0, 0, (0, 0, 1.3)))],
-        True,
-    ),
     Seen(
         "tower, both castles turned by 1.4 degrees by the stick: 1.04 mm at the corners",
         TOWER,
@@ -279,18 +222,6 @@ AFTERWARDS = [
         True,
     ),
     Seen("castles, castle 1 pushed away by 3 mm and back", CASTLES, [shift("castle1", 2, 3, 0, 0, until=3)], True),
-    Seen(
-        "tower, castle 2 slides off after the last operation",
-        TOWER,
-        [put("castle2", 4, mm(0, 62, 30, (90, 0, 0)))],
-        False,
-    ),
-    Seen(
-        "carried stick, the cube with the stick falls at the end",
-        CARRIED,
-        [moved(END, mm(0, 60, -40), "cube", "stick")],
-        False,
-    ),
     Seen("pockets, the stick works itself out at the end", POCKETS, [shift("stick", END, 60, 0, 0)], False),
 ]
 """What happened to it after it was built."""
@@ -298,7 +229,6 @@ AFTERWARDS = [
 ON_THE_WAY = [
     Seen("tower, the last operation was not ended, yet everything is in its place", TOWER, [never(3)], True),
     Seen("castles, operation 2 was left out and castle 2 stands in its place", CASTLES, [never(2)], True),
-    Seen("castles, castle 2 was still held when it was put", CASTLES, [state(2, released=False)], True),
     Seen(
         "carried stick, the cube hung 5 mm above castle 1 when it got the stick",
         CARRIED,
@@ -306,21 +236,9 @@ ON_THE_WAY = [
         True,
     ),
     Seen(
-        "carried stick, the stick was half in when the cube took it",
-        CARRIED,
-        [shift("stick", 4, -60, 0, 0, until=5)],
-        True,
-    ),
-    Seen(
         "pockets, cube 3 stood 3 mm off cube 1 and 0.15 mm in the air before",
         POCKETS,
         [shift("cube3", 3, -3, 0, 0.15, until=6)],
-        True,
-    ),
-    Seen(
-        "pockets, cube 2 was turned over by hand before it was lowered",
-        POCKETS,
-        [shift("cube2", 2, 0, 0, 0, QUARTER_Z, until=5)],
         True,
     ),
     Seen("aligned blocks, A stands 3 mm off where B was", ALIGNED, [shift("A", 2, -3, 0, 0)], True),
@@ -332,22 +250,12 @@ MARGINS = [
     Seen("bridge, A over 49 % of each block", BRIDGE, [shift("A", 3, 0, 25.5, 0)], False),
     Seen("bridge, A 0.09 mm above the blocks", BRIDGE, [shift("A", 3, 0, 0, 0.09)], True),
     Seen("bridge, A 0.11 mm above the blocks", BRIDGE, [shift("A", 3, 0, 0, 0.11)], False),
-    Seen("bridge, C stands 0.09 mm beside B", BRIDGE, [shift("C", 2, 0.09, 0, 0)], True),
-    Seen("bridge, C stands 0.11 mm beside B", BRIDGE, [shift("C", 2, 0.11, 0, 0)], False),
     Seen("tower, the stick 0.34 mm aside", TOWER, [shift("stick", 3, 0, 0.34, 0)], True),
     Seen("tower, the stick 0.36 mm aside", TOWER, [shift("stick", 3, 0, 0.36, 0)], False),
-    Seen("pockets, all 0.34 mm towards a wall", POCKETS, [moved(6, mm(0, 0.34, 0), *GROUP)], True),
-    Seen("pockets, all 0.36 mm towards a wall", POCKETS, [moved(6, mm(0, 0.36, 0), *GROUP)], False),
 ]
 """Just below and just above a threshold."""
 
 FIXTURES = [
-    Seen(
-        "fixture, the cube put away upside down at the far end",
-        FIXTURE,
-        [put("cube", 4, mm(300, -260, 25, HALF_X))],
-        True,
-    ),
     Seen("fixture, the cube put down on the floor beside the table", FIXTURE, [put("cube", 4, mm(900, 0, -700))], True),
     Seen(
         "fixture, the cube was not put away: it stands against castle 2",
@@ -356,32 +264,11 @@ FIXTURES = [
         True,
     ),
     Seen("fixture, the cube put down on the finished assembly", FIXTURE, [put("cube", 4, mm(70, 0, 75))], False),
-    Seen("fixture, the cube still rocks at the end", FIXTURE, [state(END, spin_rad_s=np.radians(3.0))], False),
     Seen("fixture, the cube is still held at the end", FIXTURE, [state(END, released=False)], False),
-    Seen(
-        "fixture, the cube ends 5 mm deep in castle 1",
-        FIXTURE,
-        [put("cube", 4, mm(-70, 50, 25)), state(END, penetration_m=5e-3)],
-        False,
-    ),
     Seen("fixture, the cube slips 20 mm after it was put away", FIXTURE, [shift("cube", 5, 20, 0, 0)], True),
-    Seen(
-        "fixture, the cube under castle 1",
-        FIXTURE,
-        [put("cube", 4, mm(-70, 0, 25)), shift("castle1", 4, 0, 0, 50)],
-        False,
-    ),
     Seen("fixture, castle 2 pushed by 2 mm when the cube was taken", FIXTURE, [shift("castle2", 4, 0, 2, 0)], False),
     Seen("pockets, cube 1 on top of cube 3", POCKETS, [put("cube1", 6, mm(60, 150, 69))], False),
-    Seen("pockets, cube 1 put away on its side", POCKETS, [put("cube1", 4, mm(-200, -100, 25, QUARTER_X))], True),
     Seen("kept block: B ends 10 mm off C", kept, [shift("B", 4, 10, 0, 0)], False),
-    Seen(
-        "kept block: B and C together 60 mm further",
-        kept,
-        [moved(1, mm(60, 0, 0), "C"), moved(4, mm(60, 0, 0), "B")],
-        True,
-    ),
-    Seen("block used later: D 80 mm beside B", used_later, [shift("D", 4, 80, 0, 0)], False),
     Seen(
         "block used later: B pushed by 3 mm under D",
         used_later,
@@ -395,7 +282,6 @@ FIXTURES = [
         True,
     ),
     Seen("block aligned twice: A pushed by 5 mm when D goes", aligned_twice, [shift("A", 5, -5, 0, 0)], True),
-    Seen("block aligned twice: D put away elsewhere", aligned_twice, [put("D", 5, mm(200, -200, 25, QUARTER_Z))], True),
     Seen("stop for two: B pushed by 3 mm when D goes", stop_for_two, [shift("B", 5, -3, 0, 0)], True),
 ]
 """Parts that were used and put away, and parts that only look like that."""
@@ -421,18 +307,6 @@ DIFFERS = {
     "pockets, cube 1 on top of cube 3": "where a fixture ends is free",
 }
 """States of which the rule says otherwise than the person, and what in the rule does."""
-
-WHOLE = "all of it moved as one, and a whole may stand anywhere on the table"
-ALONE = "it touches nothing but the table, and nothing in the finished assembly shows where it was before"
-REVISED = {
-    "tower, all of it turned by 5 degrees at the end": WHOLE,
-    "tower, all of it pushed by 1.1 mm at the end": WHOLE,
-    "castles, castle 1 pushed by 1.02 mm by the stick": "the stick was let go of after that, and lies as it was put",
-    "tower, both castles turned by 1.4 degrees by the stick: 1.04 mm at the corners": WHOLE,
-    "block used later: B pushed by 3 mm under D": WHOLE,
-    "block aligned twice: A pushed by 5 mm when D goes": ALONE,
-}
-"""States that the person called wrong at first, for where a part had been before, and why they are right."""
 
 
 class Loose(NamedTuple):

@@ -12,4 +12,3 @@ BOXES = (
 )
 """The figures and examples of the paper."""
 TILTED = ("dovetail", "wedge_under_roof")
-ROUND = ("gearbox", "l_bracket_on_plate", "nested_bushings", "peg_in_hole", "shaft_through_brackets")

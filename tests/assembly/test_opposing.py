@@ -11,7 +11,6 @@ from apo_bench.assembly.facing_round import OPPOSING
 from apo_bench.correction.contact.contact import contact
 from apo_bench.geometry import pose
 from tests.correction.robust.test_robust import look, shown
-from tests.shipped import BOXES
 
 TURNS = [[135, 0, 0], [180, 0, 0], [0, 135, 0], [0, 180, 0], [180, 0, 90], [0, 180, 90]]
 
@@ -24,7 +23,7 @@ def turned(name, k, turn, seed=0):
     return replace(observation, goals=goals)
 
 
-@pytest.mark.parametrize("name", BOXES)
+@pytest.mark.parametrize("name", ["carried_bridge", "pocket_table"])
 def test_faces_look_at_each_other_at_the_truth_and_one_turned_over_does_not(name):
     scenario, layout, _ = shown(name)
     assembly = scenario.assembly
@@ -42,15 +41,15 @@ def test_faces_look_at_each_other_at_the_truth_and_one_turned_over_does_not(name
             assert both[1, i] == (cosine > OPPOSING)
 
 
-@pytest.mark.parametrize("name", BOXES)
+@pytest.mark.parametrize("name", ["carried_bridge", "pocket_table"])
 def test_nothing_converges_where_a_part_was_seen_turned_over(name):
     """Operations and turns in turn; what the solver turns back is right, what it leaves upside down is said."""
     scenario, layout, _ = shown(name)
     seen = [turned(name, k, turn) for k in range(len(scenario.assembly)) for turn in TURNS]
-    for made in correct_many(seen[::5], contact):
+    for made in correct_many(seen[::7], contact):
         assert not made.ok or not looking_away(scenario.assembly, layout.start, made.goals).any()
     for corrector in ("paper", "contact-drop", "snap", "contact-robust"):
-        for one in seen[::11]:
+        for one in seen[::13]:
             made = correct(one, corrector)
             kept = scenario.assembly.without(made.dropped)
             assert not made.ok or not looking_away(scenario.assembly, layout.start, made.goals)[kept].any()

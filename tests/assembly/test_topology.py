@@ -25,10 +25,6 @@ def moves(*operations: Operation) -> Assembly:
     return Assembly({part: scenes.block(part) for part in sorted(parts)}, operations, frozenset())
 
 
-def test_one_object_as_in_fig_4a() -> None:
-    assert words(moves(Operation("A")), 1) == {"A": "T1"}
-
-
 def test_sub_assembly_as_in_fig_4c() -> None:
     assembly = moves(Operation("A"), Operation("B"), Operation("A", carries=("B",)))
     assert words(assembly, 2) == {"A": "T1", "B": "T2"}
@@ -48,11 +44,6 @@ def test_cube_carries_stick_as_in_example_5_2() -> None:
     after = words(scenes.subassembly_on_castles().assembly, 5)
     assert after["cube"] == "T5"
     assert after["stick"] == "T5 T3^-1 T4"
-
-
-def test_carried_twice_by_the_same_part_stays_short() -> None:
-    assembly = moves(Operation("A"), Operation("B"), Operation("A", carries=("B",)), Operation("A", carries=("B",)))
-    assert words(assembly, 4)["B"] == "T4 T1^-1 T2"
 
 
 def test_carried_by_one_part_then_by_another() -> None:

@@ -19,13 +19,10 @@ from apo_bench.correction.solvers.compact import CompactEquations, compact_equat
 from apo_bench.correction.solvers.play import laid_contacts
 from apo_bench.geometry import Array, pose
 from tests import scenes
-from tests.assembly.test_equations import random_scene
 from tests.correction.checks.test_consistency import shifted
 from tests.correction.solvers.test_large import of_problem
 from tests.correction.solvers.test_manifold import crooked, scales, twisted
 from tests.correction.solvers.test_walls import walled
-
-SCENES: dict[str, Callable[[], scenes.Scene]] = {**scenes.ALL, "chain6": lambda: of_problem("chain6")}
 
 
 def draws(scene: scenes.Scene, count: int, mm: float = 2.0, deg: float = 1.0) -> list[Observation]:
@@ -49,15 +46,15 @@ def check_same(many: tuple[Correction, ...], single: list[Correction]) -> None:
         assert (a.test is None) == (b.test is None)
         assert (a.covariance is None) == (b.covariance is None)
         if a.covariance is not None and b.covariance is not None:
-            assert_allclose(a.covariance, b.covariance, rtol=0, atol=1e-9)
+            assert_allclose(a.covariance, b.covariance, rtol=0, atol=1e-12)
         if a.test is not None and b.test is not None:
             assert a.test.freedom == b.test.freedom
             assert a.test.chi_square == pytest.approx(b.test.chi_square, rel=1e-6, abs=1e-12)
 
 
-@pytest.mark.parametrize("name", SCENES)
-def test_many_are_one_after_the_other(name: str) -> None:
-    seen = draws(SCENES[name](), 12)
+@pytest.mark.parametrize("build", [scenes.fixture, scenes.pockets, lambda: of_problem("chain6")])
+def test_many_are_one_after_the_other(build: Callable[[], scenes.Scene]) -> None:
+    seen = draws(build(), 8)
     corrector = ContactCorrector()
     check_same(correct_many(seen, contact), [corrector(one) for one in seen])
 
@@ -70,7 +67,7 @@ def laid_together(scene: scenes.Scene, goals: Array) -> CompactEquations:
 @pytest.mark.parametrize("name", ["stick_on_castles", "pockets"])
 def test_vertices_of_either_face(name: str) -> None:
     """Corners of the manipulated face are laid onto the other one at each observation's own goals."""
-    scene = SCENES[name]()
+    scene = scenes.ALL[name]()
     laid = pattern(scene.assembly).laid
     assert laid.any()
     assert not laid.all()
@@ -86,19 +83,6 @@ def test_vertices_of_either_face(name: str) -> None:
         J_one = one.gathered(blocks_one).T
         assert_allclose(J.T @ J, J_one.T @ J_one, rtol=0, atol=1e-12)
         assert_allclose(J.T @ e[0], J_one.T @ e_one, rtol=0, atol=1e-12)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_vertices_of_random_assemblies(seed: int) -> None:
-    scene = random_scene(seed)
-    rng = np.random.default_rng(seed)
-    goals = np.array([scenes.noisy(scene.goals, rng, 20.0, 20.0) for _ in range(3)])
-    together = laid_together(scene, goals)
-    e = together.residual(goals).reshape(3, -1, 3)
-    for i, each in enumerate(goals):
-        one = compact_equations(equations(scene.assembly, scene.start, each), len(each))
-        expected = (one.residual(each).reshape(-1, 3) ** 2).sum(axis=1)
-        assert_allclose((e[i] ** 2).sum(axis=1), expected, rtol=1e-9, atol=1e-15)
 
 
 def test_more_than_fit_into_a_chunk() -> None:
@@ -120,7 +104,7 @@ def test_the_same_with_walls() -> None:
     check_same(many, [corrector(one) for one in seen])
 
 
-@pytest.mark.parametrize("doubt", ["apply", "warn", "refuse", "drop"])
+@pytest.mark.parametrize("doubt", ["warn", "drop"])
 def test_the_same_with_wrong_relations(doubt: str) -> None:
     scene = scenes.stick_on_castles()
     assembly = shifted(scene.assembly, {"stick.py on castle1.spy": 10.0})
@@ -164,15 +148,6 @@ def test_other_assemblies_are_refused() -> None:
             "observation 3 is of another assembly, start or play than observation 1; "
             "correct those together that share them."
         )
-
-
-def test_a_covariance_that_is_not_positive_definite_is_refused() -> None:
-    seen = draws(scenes.stick_in_tower(), 3)
-    covariance = np.array(seen[2].covariance)
-    covariance[1] = 0.0
-    seen[2] = replace(seen[2], covariance=covariance)
-    with pytest.raises(InputError, match="the covariance of operation 2 is not positive definite"):
-        correct_many(seen, contact)
 
 
 def test_no_operations_and_no_contacts() -> None:

@@ -17,8 +17,8 @@ SLAB = cuboid(0.4, 0.4, 0.001)
 CUBE = cuboid(0.02, 0.02, 0.02)
 
 
-@pytest.mark.parametrize("height", [0.0, 1e-5, 0.0123, 1.5])
-@pytest.mark.parametrize("turn", [(0, 0, 0), (0, 0, 30), (45, 0, 0), (20, 30, 40)])
+@pytest.mark.parametrize("height", [0.0, 0.0123])
+@pytest.mark.parametrize("turn", [(0, 0, 0), (20, 30, 40)])
 def test_a_cube_falls_until_its_lowest_corner_touches(height: float, turn: tuple[float, float, float]) -> None:
     T = pose.at((0.05, 0.03, 0.0), turn)
     T[2, 3] = 0.001 + height + 0.02 * np.abs(T[2, :3]).sum()

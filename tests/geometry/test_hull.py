@@ -42,7 +42,7 @@ def as_hull(box: Box) -> Hull:
     return Hull(box.name, box.corners)
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(5))
 def test_a_box_as_a_hull_is_as_deep_in_another_one_as_the_box(seed: int):
     rng = np.random.default_rng(seed)
     a, b = (Box(name, rng.uniform(-0.02, 0.02, 3), rng.uniform(0.005, 0.03, 3)) for name in "ab")
@@ -85,8 +85,8 @@ def bore(radius: float, fit: bool) -> RoundFace:
     return RoundFace("bore", np.zeros(3), np.array([0.0, 0.0, 1.0]), (0.0, 0.02), (radius, radius), True, fit)
 
 
-@pytest.mark.parametrize("clearance_mm", [0.05, 0.25])
-def test_a_hole_that_fits_gets_wider_by_the_clearance(clearance_mm: float):
+def test_a_hole_that_fits_gets_wider_by_the_clearance():
+    clearance_mm = 0.25
     plate = solid(*wedges(0.005, 70), bore=bore(0.005, fit=True))
     made = physical_pieces(plate, 1e-3 * clearance_mm)
     inner = [np.linalg.norm(p.corners[:, :2], axis=1).min() * np.cos(np.pi / 70) for p in made]
@@ -97,7 +97,7 @@ def test_a_hole_that_fits_gets_wider_by_the_clearance(clearance_mm: float):
     assert physical_pieces(plain, 1e-3 * clearance_mm) is plain.pieces
 
 
-@pytest.mark.parametrize("off_mm", [0.0, 0.1, 0.2, 0.3, 0.5])
+@pytest.mark.parametrize("off_mm", [0.1, 0.5])
 def test_a_shaft_beside_the_middle_of_its_hole_is_as_deep_as_it_is_off(off_mm: float):
     plate = solid(*physical_pieces(solid(*wedges(0.005, 70), bore=bore(0.005, True)), 0.25e-3))
     shaft = solid(cylinder_hull("shaft", Cylinder(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.005, 0.03)))
@@ -107,7 +107,7 @@ def test_a_shaft_beside_the_middle_of_its_hole_is_as_deep_as_it_is_off(off_mm: f
     assert deep == pytest.approx(max(0.0, 1e-3 * (off_mm - 0.25)), abs=2 * SAGITTA_M)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_pairs_that_are_not_looked_at_change_no_depth(seed: int):
     """Against every pair of pieces across every side and edge."""
     rng = np.random.default_rng(seed)

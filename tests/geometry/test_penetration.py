@@ -37,7 +37,7 @@ def overlap(a: np.ndarray, b: np.ndarray) -> bool:
     return bool(linprog(np.zeros(A.shape[1]), A_eq=A, b_eq=[0.0, 0.0, 0.0, 1.0, 1.0]).success)
 
 
-@pytest.mark.parametrize("seed", range(100))
+@pytest.mark.parametrize("seed", range(30))
 def test_random_pieces_are_as_deep_as_their_difference_says(seed: int):
     rng = np.random.default_rng(seed)
     a = random_hull(rng)
@@ -52,7 +52,7 @@ def test_random_pieces_are_as_deep_as_their_difference_says(seed: int):
         assert (found > 0.0) == overlap(*corners)
 
 
-@pytest.mark.parametrize("seed", range(10))
+@pytest.mark.parametrize("seed", range(4))
 def test_so_are_cylinders(seed: int):
     rng = np.random.default_rng(seed)
     a = cylinder_hull("shaft", Cylinder(rng.normal(0.0, 0.002, 3), np.array([0.0, 0.6, 0.8]), 0.0006, 0.01))
@@ -64,7 +64,7 @@ def test_so_are_cylinders(seed: int):
     assert max(0.0, found) == pytest.approx(depth(*corners), abs=1e-9)
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(2))
 def test_what_is_far_apart_may_be_left_out(seed: int):
     rng = np.random.default_rng(seed)
     a, b = (tuple(random_hull(rng) for _ in range(5)) for _ in range(2))

@@ -1,10 +1,9 @@
-"""Boxes that are swept along a line: against samples of the way, points in common, and cases by hand."""
+"""Boxes that are swept along a line: against samples of the way, and cases by hand."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.optimize import linprog
 from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import Array, Box, Hull, Posed, Solid, exit_distance, intrusion_depths, is_way_free, pose
@@ -26,7 +25,7 @@ def boxes(rng: np.random.Generator) -> Posed:
 def test_swept_boxes_meet_where_they_do_at_every_place_of_the_way() -> None:
     rng = np.random.default_rng(1)
     met = 0
-    for _ in range(250):
+    for _ in range(100):
         a = boxes(rng)
         b = boxes(rng)
         slack = rng.choice([5e-5, -5e-5])
@@ -39,41 +38,7 @@ def test_swept_boxes_meet_where_they_do_at_every_place_of_the_way() -> None:
         clear = np.abs(deep) > 1e-9
         np.testing.assert_array_equal(inside[clear], deep[clear] > 0.0)
         met += bool(inside.any())
-    assert met > 40
-
-
-def test_boxes_meet_exactly_where_they_have_a_point_in_common() -> None:
-    """The same without separating axes: by a programme for a point in both boxes."""
-    rng = np.random.default_rng(2)
-    met = 0
-    for _ in range(60):
-        a = boxes(rng)
-        b = boxes(rng)
-        a = Posed(a.pieces[:1], a.T)
-        b = Posed(b.pieces[:1], b.T)
-        way = (b.T - a.T)[:3, 3] + rng.uniform(-0.02, 0.02, 3)
-        way = way / np.linalg.norm(way)
-        spans = overlap_intervals(a, way, b, 0.0)
-        for s in rng.uniform(0.0, 0.3, 4):
-            moved = Posed(a.pieces, pose.at(s * way) @ a.T)
-            if np.abs(spans - s).min(initial=1.0) > 1e-6:
-                assert common_point(moved, b) == bool(((spans[:, 0] < s) & (s < spans[:, 1])).any())
-                met += common_point(moved, b)
-    assert met > 20
-
-
-def common_point(a: Posed, b: Posed) -> bool:
-    A = []
-    limits = []
-    for posed in (a, b):
-        (box,) = posed.pieces
-        R = posed.T[:3, :3]
-        middle = posed.T[:3, :3] @ box.center + posed.T[:3, 3]
-        A += [R.T, -R.T]
-        limits += [box.half + R.T @ middle, box.half - R.T @ middle]
-    scale = 100.0
-    found = linprog(np.zeros(3), A_ub=np.concatenate(A), b_ub=scale * np.concatenate(limits), bounds=[(None, None)] * 3)
-    return bool(found.status == 0)
+    assert met > 15
 
 
 def posed(solid: Solid, T: Array) -> Posed:

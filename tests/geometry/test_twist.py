@@ -1,4 +1,4 @@
-"""The exponential as a matrix polynomial and its derivative: against the closed form, differences and the series."""
+"""The exponential as a matrix polynomial and its derivative: against the closed form and the series."""
 
 from __future__ import annotations
 
@@ -33,15 +33,8 @@ def ad(xi: Array) -> Array:
     return out
 
 
-def adjoint(T: Array) -> Array:
-    out = np.zeros((6, 6))
-    out[:3, :3] = out[3:, 3:] = T[:3, :3]
-    out[:3, 3:] = pose.hat(T[:3, 3]) @ T[:3, :3]
-    return out
-
-
 @given(SEEDS, ANGLES)
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=60, deadline=None)
 def test_the_exponential_is_that_of_poses(seed: int, angle: float) -> None:
     """Just above 1e-4 rad, 1 - cos in `pose.exp` keeps 1e-16 of 5e-9: up to 1.1e-12 of the length that is moved."""
     xi = twist(seed, angle)
@@ -61,51 +54,10 @@ def test_the_jacobian_is_its_power_series(seed: int, angle: float) -> None:
     assert_allclose(right_jacobian(xi), series, rtol=0, atol=1e-12)
 
 
-@given(SEEDS, st.floats(0.0, 2.5))
-@settings(max_examples=50, deadline=None)
-def test_the_jacobian_is_the_difference_of_exponentials(seed: int, angle: float) -> None:
-    """Of steps that are large: just above 1e-4 rad `pose.exp` loses some 1e-13 m, which a step of 1e-6 makes 1.7e-7.
-
-    With this one the largest error found is 2.6e-9.
-    """
-    xi = twist(seed, angle)
-    by = 5e-5
-    back = pose.inverse(pose.exp(xi))
-    sides = [pose.log(back @ pose.exp(xi + sign * by * np.eye(6))) for sign in (1.0, -1.0)]
-    assert_allclose(right_jacobian(xi), (sides[0] - sides[1]).T / (2 * by), rtol=0, atol=1e-8)
-
-
-@given(SEEDS, ANGLES)
-@settings(max_examples=50, deadline=None)
-def test_left_and_right_differ_by_the_adjoint(seed: int, angle: float) -> None:
-    xi = twist(seed, angle)
-    T, right = exp_and_jacobian(xi)
-    assert_allclose(right_jacobian(-xi), adjoint(T) @ right, rtol=0, atol=1e-12)
-
-
 def test_no_twist_is_exactly_nothing() -> None:
     T, J = exp_and_jacobian(np.zeros((3, 6)))
     assert_array_equal(T, np.tile(np.eye(4), (3, 1, 1)))
     assert_array_equal(J, np.tile(np.eye(6), (3, 1, 1)))
-
-
-def test_a_shift_is_exactly_a_shift() -> None:
-    T, J = exp_and_jacobian(np.array([0.1, -0.2, 0.3, 0.0, 0.0, 0.0]))
-    assert_array_equal(T[:3, :3], np.eye(3))
-    assert_array_equal(T[:3, 3], [0.1, -0.2, 0.3])
-    assert_array_equal(J[:3, :3], np.eye(3))
-    assert_allclose(J[:3, 3:], -pose.hat(np.array([0.1, -0.2, 0.3])) / 2, rtol=0, atol=1e-17)
-
-
-@pytest.mark.parametrize("lead", [(), (1,), (4,), (2, 3), (3, 1, 2, 1), (0,)])
-def test_leading_axes_are_single_calls(lead: tuple[int, ...]) -> None:
-    xi = np.random.default_rng(0).standard_normal((*lead, 6))
-    T, J = exp_and_jacobian(xi)
-    assert (T.shape, J.shape) == ((*lead, 4, 4), (*lead, 6, 6))
-    for at in np.ndindex(lead):
-        one = exp_and_jacobian(xi[at])
-        assert_allclose(T[at], one[0], rtol=0, atol=1e-14)
-        assert_allclose(J[at], one[1], rtol=0, atol=1e-14)
 
 
 def test_generators_are_the_derivatives_of_the_exponential() -> None:

@@ -12,7 +12,6 @@ from apo_bench.assembly import Operation
 from apo_bench.geometry import Array, Solid
 from apo_bench.insertion.arrival import Arrival, Preference, arrive
 from apo_bench.insertion.macros import Chain, Way, chain, departure, peel
-from apo_bench.insertion.states import ContactState
 from tests import scenes
 
 X, Y, Z = np.eye(3)
@@ -114,29 +113,6 @@ def arrival(built: tuple[Assembly, dict[str, Array]], stated: Preference | None 
     return arrive(of, ("part",), of.operations[0].contacts, poses, stated or Preference())
 
 
-TABLE = (scenes.table(), np.eye(4))
-ON = {"table": ("nz-top",)}
-
-
-def test_a_block_in_a_corner() -> None:
-    found = arrival(
-        assembly(
-            {"left": ("px-nx",), **ON, "back": ("py-ny",)},
-            table=TABLE,
-            left=(scenes.block(), scenes.mm(50, 0, 25)),
-            back=(scenes.block(), scenes.mm(0, 50, 25)),
-            part=(scenes.block(), scenes.mm(0, 0, 25)),
-        )
-    )
-    assert found.state == ContactState(0, 3, 0)
-    assert [(m.name, m.direction.tolist()) for m in found.macros] == [
-        ("move-to-contact", [0, 0, -1]),
-        ("slide-to-contact", [1, 0, 0]),
-        ("slide-to-contact", [0, 1, 0]),
-    ]
-    assert (found.line.direction.tolist(), found.line.travel_m, found.free) == ([0, 0, -1], 0.03, True)
-
-
 def between(height_mm: float = 80.0) -> tuple[Assembly, dict[str, Array]]:
     return assembly(
         {"left": ("py-ny",), "right": ("ny-py",)},
@@ -163,18 +139,6 @@ def slot(*more: tuple[str, Sequence[str], Solid, Array]) -> tuple[Assembly, dict
     parts = {name: (solid, T) for name, _, solid, T in more}
     at = scenes.mm(0, 0, 40)
     return assembly(contacts, castle=(scenes.castle(), np.eye(4)), part=(scenes.stick(), at), **parts)
-
-
-def test_a_stick_in_a_slot_against_a_stop() -> None:
-    stop = scenes.cuboid("stop", (10, 10, 10))
-    found = arrival(slot(("stop", ("px-nx",), stop, scenes.mm(120, 0, 40))))
-    assert found.state.letter == "G"
-    assert [(m.name, m.direction.tolist()) for m in found.macros] == [
-        ("insert-into-slot", [0, 0, -1]),
-        ("move-to-contact", [0, 0, -1]),
-        ("slide-to-contact", [1, 0, 0]),
-    ]
-    assert [m.direction.tolist() for m in found.departs] == [[-1, 0, 0], [0, 0, 1]]
 
 
 def test_a_slot_under_a_roof_is_entered_from_its_end() -> None:
@@ -206,22 +170,3 @@ def test_the_end_of_a_hole_that_is_free_is_taken() -> None:
     assert not arrival(hole(*stops)).free
     assert arrival(hole(), Preference(-X)).line.direction.tolist() == [-1, 0, 0]
     assert arrival(hole(), Preference(None, 0.2)).line.travel_m == 0.2
-
-
-def test_a_blind_hole_is_entered_to_its_bottom() -> None:
-    bottom = scenes.cuboid("bottom", (10, 25, 25))
-    found = arrival(hole(("bottom", ("px-nx",), bottom, scenes.mm(120, 0, 0))))
-    assert found.state.letter == "H"
-    assert [(m.name, m.direction.tolist()) for m in found.macros] == [
-        ("insert-into", [1, 0, 0]),
-        ("move-to-bottom", [1, 0, 0]),
-    ]
-    assert found.free
-
-
-def test_what_is_held_on_all_sides_is_locked() -> None:
-    ends = [
-        (f"end{s}", (f"{f}x-{g}x",), scenes.block(), scenes.mm(135 * s, 0, 0)) for s, f, g in ((1, *"pn"), (-1, *"np"))
-    ]
-    found = arrival(hole(*ends))
-    assert (found.state.letter, found.chain.locked, found.free, found.macros) == ("I", True, False, ())

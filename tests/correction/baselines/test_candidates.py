@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from apo_bench import Assembly, load_scenario
+from apo_bench import Assembly
 from apo_bench.assembly import Operation, Relation
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.baselines.track import candidates
@@ -33,11 +31,7 @@ def _named(relation: Relation, given: str) -> bool:
 
 def chosen(assembly: Assembly, *failing: str) -> tuple[int, ...]:
     """Candidates counted from 1, as in the paper."""
-    return counted(candidates(assembly, arcs(assembly, *failing)))
-
-
-def counted(operations: Iterable[int]) -> tuple[int, ...]:
-    return tuple(k + 1 for k in operations)
+    return tuple(k + 1 for k in candidates(assembly, arcs(assembly, *failing)))
 
 
 PAPER = {
@@ -48,19 +42,13 @@ PAPER = {
     "fixture": (("stick-castle1", "stick-castle2"), (5, 3, 2, 1)),
     "pockets": (("cube2-table 6", "cube3-table 6"), (6, 5, 3, 2, 1)),
 }
-FILES = {"subassembly_on_castles": "carried_bridge", "fixture": "vanished_fixture", "pockets": "pocket_table"}
 
 
 @pytest.mark.parametrize("name", PAPER)
 def test_candidates_of_the_paper(name: str) -> None:
     failing, expected = PAPER[name]
     assert chosen(scenes.ALL[name]().assembly, *failing) == expected
-
-
-@pytest.mark.parametrize("name", FILES)
-def test_candidates_of_the_scenario_files(name: str) -> None:
-    failing, expected = PAPER[name]
-    assert chosen(load_scenario(FILES[name]).assembly, *failing) == expected
+    assert chosen(scenes.ALL[name]().assembly) == ()
 
 
 def test_a_stable_object_connects_nothing() -> None:
@@ -77,11 +65,6 @@ def test_a_part_that_was_never_moved_connects_nothing() -> None:
     assert chosen(assembly, "A-C") == (1,)
 
 
-def test_nothing_fails_nothing_is_chosen() -> None:
-    for build in scenes.ALL.values():
-        assert chosen(build().assembly) == ()
-
-
 def test_a_fixture_that_is_taken_away_stays_connected() -> None:
     assembly = scenes.fixture_alignment().assembly
     assert chosen(assembly, "A-B") == (2, 1)
@@ -89,7 +72,7 @@ def test_a_fixture_that_is_taken_away_stays_connected() -> None:
 
 
 @given(st.integers(0, 10**6))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=30, deadline=None)
 def test_what_is_chosen_is_closed_and_no_larger_than_it_must_be(seed: int) -> None:
     """Equations with a candidate hold candidates only; those of any other operation hold none; more failures, more."""
     scene = random_scene(seed)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -17,8 +16,7 @@ from apo_bench import Correction, InputError, Observation, correct
 from apo_bench.assembly import Equations, Step, Try, largest_gap
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.baselines.paper import paper
-from apo_bench.correction.baselines.track import solve_own_contacts
-from apo_bench.correction.solvers.newton import LENGTH_M, SINGULAR_CUT_OFF, Solution, descend, least_step, solve_newton
+from apo_bench.correction.solvers.newton import LENGTH_M, Solution, solve_newton
 from apo_bench.geometry import Array, is_rigid, pose
 from apo_bench.records import CODES
 from tests import scenes
@@ -96,11 +94,10 @@ def test_what_remains_for_each_freed_set(name: str, wrong: list[int], error: Err
         ("pockets", (5, 4, 3, 2, 1, 0), 28),
     ],
 )
-@pytest.mark.parametrize("level", [0.5, 1.0, 2.0])
-def test_all_at_once_from_noise(name: str, freed: tuple[int, ...], rank: int, level: float) -> None:
+def test_all_at_once_from_noise(name: str, freed: tuple[int, ...], rank: int) -> None:
     scene = scenes.ALL[name]()
     rng = np.random.default_rng(3)
-    for _ in range(5):
+    for level in (0.5, 1.0, 2.0):
         seen = scenes.seen(scene, scenes.noisy(scene.goals, rng, level, level))
         found = paper(seen)
         assert (found.status, found.freed, found.rank) == ("converged", freed, rank)
@@ -120,13 +117,6 @@ def test_the_trace_ends_at_rest() -> None:
     assert 3 <= len(found.trace) <= 6
 
 
-def test_goals_that_hold_are_returned_as_they_were_seen() -> None:
-    scene = scenes.stick_in_tower()
-    found = paper(scenes.seen(scene, scene.goals))
-    assert found.ok
-    assert_array_equal(found.goals, scene.goals)
-
-
 def test_the_world_frame_does_not_matter() -> None:
     scene = scenes.stick_in_tower()
     goals = scenes.noisy(scene.goals, np.random.default_rng(2), 2.0, 1.0)
@@ -136,11 +126,11 @@ def test_the_world_frame_does_not_matter() -> None:
     assert_allclose(there.goals, W @ paper(scenes.seen(scene, goals)).goals, atol=1e-9)
 
 
-def drift(scene: scenes.Scene, seen: Array, how: Callable[..., Solution] = solve_newton) -> float:
+def drift(scene: scenes.Scene, seen: Array) -> float:
     """How far the solver moved what no contact fixes, over 2 mm; rotations as the way of a point 40 mm away."""
     n = len(seen)
     system = equations(scene.assembly, scene.start, seen)
-    found = how(system, seen, range(n))
+    found = solve_newton(system, seen, range(n))
     assert found.gap_m < NOTHING_M
     unit = np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], n)
     _, w, Vt = np.linalg.svd(system.linearised(found.goals)[1] / unit)
@@ -148,45 +138,12 @@ def drift(scene: scenes.Scene, seen: Array, how: Callable[..., Solution] = solve
     return float(np.linalg.norm(free @ (pose.log(pose.inverse(seen) @ found.goals).ravel() * unit))) / 2e-3
 
 
-@pytest.mark.parametrize("name", ["bridge", "stick_on_castles", "fixture", "pockets"])
+@pytest.mark.parametrize("name", ["stick_on_castles", "pockets"])
 def test_free_directions_stay_where_they_were_seen(name: str) -> None:
     scene = scenes.ALL[name]()
     rng = np.random.default_rng(7)
-    drifts = [drift(scene, scenes.noisy(scene.goals, rng, 2.0, 1.0)) for _ in range(25)]
+    drifts = [drift(scene, scenes.noisy(scene.goals, rng, 2.0, 1.0)) for _ in range(10)]
     assert max(drifts) < 0.2
-
-
-def test_the_rank_counts_where_the_solver_rests_not_where_it_begins() -> None:
-    scene = scenes.stick_in_tower()
-    rng = np.random.default_rng(7)
-    seen = [scenes.noisy(scene.goals, rng, 2.0, 1.0) for _ in range(100)]
-    units = np.tile([1.0, 1.0, 1.0, LENGTH_M, LENGTH_M, LENGTH_M], 3)
-    ranks = []
-    for goals in seen:
-        e, J = equations(scene.assembly, scene.start, goals).linearised(goals)
-        ranks.append(least_step(J / units, e, SINGULAR_CUT_OFF)[1])
-    assert max(ranks) > 13
-    misled = [goals for goals, rank in zip(seen, ranks, strict=True) if rank > 13]
-    assert max(drift(scene, goals, descend) for goals in misled) > 1.0
-    assert max(drift(scene, goals) for goals in misled + seen[:20]) < 0.2
-
-
-def test_a_tiny_cut_off_moves_free_directions_and_looks_just_as_good() -> None:
-    scene = scenes.stick_on_castles()
-    rng = np.random.default_rng(7)
-    seen = [scenes.noisy(scene.goals, rng, 2.0, 1.0) for _ in range(25)]
-    assert max(drift(scene, goals) for goals in seen) < 0.2
-    drifts = [drift(scene, goals, partial(descend, cut_off=1e-6)) for goals in seen]
-    assert np.median(drifts) > 0.5
-    assert max(drifts) > 3.0
-
-
-def test_metres_and_radians_without_scale_fail() -> None:
-    scene = scenes.stick_on_castles()
-    goals = scenes.noisy(scene.goals, np.random.default_rng(0), 1.0, 1.0)
-    system = equations(scene.assembly, scene.start, goals)
-    assert solve_newton(system, goals, range(3), length_m=LENGTH_M).gap_m < NOTHING_M
-    assert solve_newton(system, goals, range(3), length_m=1e-3).gap_m > 1e-4
 
 
 def contradiction() -> Observation:
@@ -209,9 +166,6 @@ def test_contacts_that_contradict_each_other_are_inconsistent() -> None:
     assert (found.status, found.sentence) == ("inconsistent", CODES["inconsistent"])
     assert not found.ok
     assert found.gap_after_m == pytest.approx(0.005)
-
-
-def test_gap_threshold_decides() -> None:
     assert paper(replace(contradiction(), gap_m=0.0051)).ok
 
 
@@ -245,12 +199,6 @@ def test_numbers_that_overflow_are_not_finite() -> None:
     assert_array_equal(found.goals, goals)
 
 
-def test_nothing_to_correct() -> None:
-    scene = scenes.scene([scenes.table(), scenes.block()], [scenes.Operation("block")], [scenes.mm(0, 0, 25)])
-    found = paper(scenes.seen(scene, scene.goals))
-    assert (found.status, found.freed, found.rank, found.gap_after_m) == ("converged", (), 0, 0.0)
-
-
 # What is freed, and what is only settled
 
 
@@ -264,7 +212,7 @@ def test_nothing_to_correct() -> None:
     ],
 )
 @given(size=st.floats(1.5, 4.0), sign=st.sampled_from([-1, 1]), low=st.sampled_from([0.0, 0.25]))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=6, deadline=None)
 def test_a_careless_human_frees_the_candidates_of_the_paper(
     name: str, freed: tuple[int, ...], size: float, sign: int, low: float
 ) -> None:
@@ -295,20 +243,12 @@ def test_a_goal_that_is_no_candidate_is_settled_for_what_it_makes() -> None:
     assert np.degrees(np.arctan2(*found.goals[3, [1, 0], 0])) == pytest.approx(3.0, abs=1e-3)
 
 
-def test_without_a_gap_above_the_threshold_nothing_is_freed_and_all_is_settled() -> None:
-    scene = scenes.fixture()
-    found = paper(scenes.seen(scene, tilted(scene, 3, 0.04, 0.04)))
-    assert (found.status, found.freed, found.rank) == ("converged", (), 0)
-    assert 5e-5 < found.gap_before_m < 1e-4
-    assert found.gap_after_m < NOTHING_M
-
-
 def test_a_tilt_above_the_threshold_makes_a_candidate() -> None:
     scene = scenes.fixture()
     assert paper(scenes.seen(scene, tilted(scene, 3, 0.2, 0.0))).freed == (3,)
 
 
-@pytest.mark.parametrize("name", scenes.ALL)
+@pytest.mark.parametrize("name", ["subassembly_on_castles", "pockets"])
 def test_settling_opens_no_contact_that_held(name: str) -> None:
     """Levels about the threshold, where a goal that is put right can put a later one wrong."""
     scene = scenes.ALL[name]()
@@ -317,19 +257,6 @@ def test_settling_opens_no_contact_that_held(name: str) -> None:
         found = paper(scenes.seen(scene, scenes.noisy(scene.goals, rng, level, level)))
         assert found.ok
         assert found.gap_after_m <= 1e-4
-
-
-def test_what_settling_would_open_stays_as_it_is() -> None:
-    """Castles and stick lie a little high: the first castle cannot go down alone, the stick can."""
-    scene = scenes.stick_on_castles()
-    goals = scene.goals.copy()
-    goals[:, 2, 3] += 9e-5
-    goals[2, 2, 3] += 5e-5
-    system = equations(scene.assembly, scene.start, goals)
-    assert_array_equal(solve_own_contacts(system, goals, 0, 1e-4), goals)
-    lower = solve_own_contacts(system, goals, 2, 1e-4)
-    assert_allclose(lower[2, 2, 3] - goals[2, 2, 3], -5e-5, atol=1e-12)
-    assert_array_equal(lower[:2], goals[:2])
 
 
 # correct(): any corrector, by name or as an object
@@ -355,13 +282,6 @@ def test_bare_goals_are_measured_and_wrapped() -> None:
     assert found.gap_before_m == largest_gap(seen.assembly, seen.start, seen.goals)
     assert found.gap_after_m < NOTHING_M
     assert correct(seen, lambda observation: observation.goals).freed == ()
-
-
-def test_bare_goals_that_are_not_finite_are_a_result() -> None:
-    seen = noisy_tower()
-    found = correct(seen, lambda observation: np.full((3, 4, 4), np.nan))
-    assert found.status == "not_finite"
-    assert_array_equal(found.goals, seen.goals)
 
 
 def reflected(seen: Observation) -> Array:
@@ -399,27 +319,13 @@ def returning(**changed: Any) -> Callable[[Observation], Correction]:
     return returned
 
 
-def test_plain_pairs_are_steps() -> None:
-    found = correct(noisy_tower(), returning(schedule=[(0, False), (1,), [2, np.False_]]))
-    assert found.schedule == steps("1 2 3")
-
-
 @pytest.mark.parametrize(
     ("changed", "message"),
     [
-        (
-            {"schedule": (0, "1", 2)},
-            "schedule of Correction must be a list (each entry a Step), got a tuple with 0 in it",
-        ),
-        ({"schedule": (Step(0.5), Step(1), Step(2))}, "got a tuple with 0.5 in it"),
         ({"schedule": "1 2 3"}, "schedule of Correction must be a list (each entry a Step), got '1 2 3'"),
-        ({"schedule": ((0, False, 3),)}, "got a tuple with a tuple in it"),
         ({"freed": (99, -5)}, "returned the operation 99 in `freed`; return whole numbers from 0 to 2"),
-        ({"freed": "abc"}, "freed of Correction must be a list (each entry a whole number), got 'abc'"),
         ({"gap_after_m": None}, "gap_after_m of Correction must be a number, got None"),
-        ({"tried": ("x",)}, "tried of Correction must be a list (each entry a Try), got a tuple with 'x' in it"),
         ({"tried": (Try(7, (0,), 0.0),)}, "returned the operation 7 in `tried`"),
-        ({"tried": (Try(1, (0,), "much"),)}, "got a tuple with 'much' in it"),
         (
             {"schedule": steps("1 2 3"), "targets": np.tile(np.eye(4), (3, 1, 1))},
             "returned a last target for operation 1 that is not its goal",
@@ -441,23 +347,14 @@ def other_status(seen: Observation) -> Correction:
     ("given", "message"),
     [
         ("papr", "unknown corrector 'papr'; did you mean 'paper'"),
-        ("apo_bench.correction.baselines.paper:papers", "did you mean 'paper'"),
         ("no_such_module:f", "cannot be imported"),
-        (3, "is an int; give a function"),
-        (dict, "is a class; give a function"),
         (lambda seen: None, "returned None; return a Correction or goals of shape (3, 4, 4)"),
-        (lambda seen: "goals", "returned a str"),
         (lambda seen: seen.goals[:2], "returned an array of shape (2, 4, 4)"),
-        (lambda seen: [[1.0], [1.0, 2.0]], "returned a list"),
         (reflected, "the corrector 'reflected' returned a goal for operation 2 that is not a rigid pose"),
         (other_status, "returned the status 'fine'; return one of converged, not_seen"),
-        (lambda seen: replace(paper(seen), goals=seen.goals[:1]), "returned an array of shape (1, 4, 4)"),
         (scheduled("1 2"), "returned a schedule that leaves operation 3 undone; do operations in order"),
         (scheduled("1 2 4"), "returned a schedule that names operation 4, where 3 are known"),
-        (scheduled("1 2 0"), "returned a schedule that names operation 0, where 3 are known"),
         (scheduled("1 -2 2 3"), "returned a schedule that undoes operation 2, which is not done"),
-        (scheduled("1 2 -2 -2 2 3"), "returned a schedule that undoes operation 2, which is not done"),
-        (scheduled("1 2 2 3"), "returned a schedule that does operation 2 again, which is done"),
         (scheduled("1 2 3 -2"), "returned a schedule that undoes operation 2 before operation 3"),
         (scheduled("1 2 3", mirrored=True), "returned a target for step 3 of its schedule that is not a rigid pose"),
         (lambda seen: replace(paper(seen), targets=np.zeros((0, 4, 4))), "returned targets and no schedule"),

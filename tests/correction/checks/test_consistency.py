@@ -10,11 +10,11 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import kstest
 
-from apo_bench import Assembly, ContactCorrector, Correction, InputError, Observation, correct
+from apo_bench import Assembly, ContactCorrector, Correction, InputError, Observation, correct, correct_many
 from apo_bench.assembly import Consistency, Contact, PartFace
 from apo_bench.correction.checks.status import p_value
 from apo_bench.correction.contact.contact import MOST_SUSPECTS
-from apo_bench.geometry import Array, Face, pose
+from apo_bench.geometry import Face, pose
 from benchmarks.corrector_bench.problems import problem
 from tests import scenes
 from tests.correction.solvers.test_large import fence
@@ -63,26 +63,29 @@ def consistency_of(made: Correction) -> Consistency:
     return made.test
 
 
+def p_values(scene: scenes.Scene, draws: int, times: float = 1.0) -> list[float]:
+    """Of draws at 1 mm and 1 degree, whose noise is `times` what is stated."""
+    looks = [
+        scenes.seen(scene, scenes.noisy(scene.goals, np.random.default_rng(seed), 1.0, 1.0)) for seed in range(draws)
+    ]
+    stated = [replace(seen, covariance=seen.covariance / times**2) for seen in looks]
+    return [consistency_of(made).p_value for made in correct_many(stated, ContactCorrector("apply"))]
+
+
 @pytest.mark.parametrize("name", ["stick_on_castles", "bridge"])
 def test_p_values_are_uniform_where_everything_is_right(name: str) -> None:
-    scene = scenes.ALL[name]()
-    p = [consistency_of(correct(look(scene, seed), "contact")).p_value for seed in range(300)]
+    p = p_values(scenes.ALL[name](), 300)
     assert kstest(p, "uniform").pvalue > 0.01
     assert np.mean(np.array(p) < 0.01) <= 0.03
 
 
 def test_p_values_notice_noise_that_is_stated_too_small() -> None:
-    scene = scenes.stick_on_castles()
-    p = []
-    for seed in range(60):
-        seen = look(scene, seed)
-        p.append(consistency_of(correct(replace(seen, covariance=seen.covariance / 1.5**2), "contact")).p_value)
-    assert kstest(p, "uniform").pvalue < 1e-4
+    assert kstest(p_values(scenes.stick_on_castles(), 60, 1.5), "uniform").pvalue < 1e-4
 
 
 def test_chi_square_is_the_squared_length_of_the_correction() -> None:
     scene = scenes.stick_in_tower()
-    for seed in range(5):
+    for seed in range(2):
         seen = look(scene, seed)
         made = correct(seen, "contact")
         xi = pose.log(pose.inverse(seen.goals) @ made.goals)
@@ -100,7 +103,7 @@ def off(contact: str) -> str:
 @pytest.mark.parametrize("kind", ALONG)
 def test_a_relation_that_is_wrong_by_far_is_named(kind: str) -> None:
     relation, contact = ALONG[kind]
-    for seed in range(8):
+    for seed in range(2):
         for by_mm in (10.0, -10.0):
             seen = look(SCENES[kind](), seed, {contact: by_mm})
             made = correct(seen, "contact")
@@ -168,7 +171,7 @@ def test_what_is_left_out_no_longer_counts() -> None:
 
 def test_two_wrong_relations_are_left_out_one_after_the_other() -> None:
     both = {"stick.py on castle1.spy": 10.0, "stick.py on castle2.spy": 12.0}
-    for seed in range(5):
+    for seed in range(2):
         made = ContactCorrector("drop")(look(scenes.stick_on_castles(), seed, both))
         assert made.ok
         first, second = both
@@ -195,28 +198,6 @@ def test_of_very_many_relations_the_likeliest_are_tried() -> None:
     assert [suspect.relation for suspect in test.ambiguous] == ["R41"]
 
 
-def resting(scene: scenes.Scene, rng: np.random.Generator, play_mm: float) -> Array:
-    """Goals with the stick anywhere in its slots, lying on their floor."""
-    goals = np.array(scene.goals)
-    goals[2, 1, 3] += 1e-3 * rng.uniform(-play_mm, play_mm)
-    goals[2, 2, 3] -= 1e-3 * play_mm
-    return goals
-
-
-def test_play_is_no_reason_for_an_alarm() -> None:
-    scene = scenes.stick_on_castles()
-    alarms = {0.0: 0, 0.25: 0}
-    for seed in range(60):
-        rng = np.random.default_rng(seed)
-        goals = scenes.noisy(resting(scene, rng, 0.25), rng, 0.05, 0.05)
-        covariance = np.tile(np.diag(np.repeat([0.05e-3, np.radians(0.05)], 3) ** 2), (3, 1, 1))
-        for play_mm in alarms:
-            seen = replace(scenes.seen(scene, goals), covariance=covariance, play_m=1e-3 * play_mm)
-            alarms[play_mm] += not consistency_of(correct(seen, "contact")).passes
-    assert alarms[0.0] >= 40
-    assert alarms[0.25] <= 2
-
-
 def test_play_leaves_the_goals_as_they_are() -> None:
     seen = look(scenes.stick_in_tower(), 0)
     loose = replace(seen, play_m=0.25e-3)
@@ -233,13 +214,10 @@ def test_the_level_decides() -> None:
     assert (above.status, consistency_of(above).level) == ("doubtful", p + 1e-3)
 
 
-@pytest.mark.parametrize("level", [0.0, 1.0, -0.1, 5.0, float("nan"), float("inf")])
-def test_a_level_that_is_none_is_refused(level: float) -> None:
-    with pytest.raises(InputError, match=r"^a test level of .* was given; a number between 0 and 1 is allowed\.$"):
-        ContactCorrector(level=level)
-
-
-def test_a_policy_that_is_none_is_refused() -> None:
+def test_a_level_or_a_policy_that_is_none_is_refused() -> None:
+    for level in (0.0, float("nan")):
+        with pytest.raises(InputError, match=r"^a test level of .* was given; a number between 0 and 1 is allowed\.$"):
+            ContactCorrector(level=level)
     with pytest.raises(InputError, match=r"must be one of 'apply', 'warn', 'refuse', 'drop', got 'hope'\.$"):
         ContactCorrector("hope")  # type: ignore[arg-type]
 
@@ -253,9 +231,8 @@ def test_a_covariance_that_is_not_positive_definite_is_refused(fault: float) -> 
         covariance[1, 0, 1] = covariance[1, 1, 0] = fault
     else:
         covariance[1, 2, 2] = fault
-    for name in ("contact", "contact-refuse", "contact-drop"):
-        with pytest.raises(InputError, match=r"^the covariance of operation 2 is not positive definite; .*\.$"):
-            correct(replace(seen, covariance=covariance), name)
+    with pytest.raises(InputError, match=r"^the covariance of operation 2 is not positive definite; .*\.$"):
+        correct(replace(seen, covariance=covariance), "contact")
 
 
 def test_nothing_to_test() -> None:
@@ -263,15 +240,6 @@ def test_nothing_to_test() -> None:
     scene = scenes.stick_in_tower()
     bare = replace(scene.assembly, operations=tuple(replace(o, contacts=()) for o in scene.assembly.operations))
     made = correct(replace(look(scene, 0), assembly=bare), "contact")
-    assert (consistency_of(made).chi_square, consistency_of(made).freedom, consistency_of(made).p_value) == (
-        0.0,
-        0,
-        1.0,
-    )
+    test = consistency_of(made)
+    assert (test.chi_square, test.freedom, test.p_value) == (0.0, 0, 1.0)
     assert (p_value(np.inf, 3), p_value(np.nan, 3), p_value(0.0, 0)) == (0.0, 0.0, 1.0)
-
-
-def test_what_was_not_seen_is_not_tested() -> None:
-    seen = look(scenes.stick_in_tower(), 0)
-    made = correct(replace(seen, seen=np.array([True, False, True])), "contact")
-    assert (made.status, made.test, made.covariance) == ("not_seen", None, None)

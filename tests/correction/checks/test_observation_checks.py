@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import apo_bench
 from apo_bench import Correction, InputError, Observation, correct, correct_many
 from apo_bench.assembly import largest_gap
 from apo_bench.correction.contact.contact import contact
@@ -36,10 +35,6 @@ def stretched(goals: Array) -> None:
     goals[1, :3, :3] *= 1.3
 
 
-def mirrored(goals: Array) -> None:
-    goals[2, :3, 0] *= -1.0
-
-
 def far(goals: Array) -> None:
     goals[0, 0, 3] = 1e200
 
@@ -50,22 +45,19 @@ def lopsided(covariance: Array) -> None:
 
 WRONG: dict[str, tuple[Callable[[], Any], str]] = {
     "stretched": (lambda: edited("goals", stretched), "the goal of operation 2 in the observation is not a rigid pose"),
-    "mirrored": (lambda: edited("goals", mirrored), "the goal of operation 3 in the observation is not a rigid pose"),
     "far": (lambda: edited("goals", far), "the goal of operation 1 in the observation has a position of 1e+200 m"),
     "lopsided": (
         lambda: edited("covariance", lopsided),
         "the covariance of operation 2 in the observation is not symm",
     ),
     "play nan": (lambda: replace(seen(), play_m=float("nan")), "states play_m=nan; a finite length from 0 is needed"),
-    "play negative": (lambda: replace(seen(), play_m=-1e-3), "states play_m=-0.001"),
-    "gap nan": (lambda: replace(seen(), gap_m=float("nan")), "states gap_m=nan; a finite length above 0 is needed"),
     "gap zero": (lambda: replace(seen(), gap_m=0.0), "states gap_m=0.0"),
     "no start": (lambda: replace(seen(), start={}), "the observation has no start of the part"),
 }
 
 
 @pytest.mark.parametrize("case", WRONG)
-@pytest.mark.parametrize("corrector", ["contact", "paper", lambda seen: seen.goals])
+@pytest.mark.parametrize("corrector", ["contact", lambda seen: seen.goals])
 def test_an_observation_that_makes_no_sense_is_blamed_itself(case: str, corrector: Any) -> None:
     make, message = WRONG[case]
     with pytest.raises(InputError) as refused:
@@ -75,21 +67,14 @@ def test_an_observation_that_makes_no_sense_is_blamed_itself(case: str, correcto
     assert "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize("case", WRONG)
-def test_of_many_the_one_is_named(case: str) -> None:
-    make, message = WRONG[case]
-    with pytest.raises(InputError) as refused:
-        correct_many([seen(), make()])
-    if case != "no start":
-        assert message.replace("the observation", "observation 2") in str(refused.value)
-
-
 def test_many_needs_a_list_and_a_corrector_of_its_kind() -> None:
     for given in (seen(), None, [seen(), None]):
         with pytest.raises(InputError, match=r"correct_many must be a list \(each entry an Observation\)"):
             correct_many(given)  # type: ignore[arg-type]
     with pytest.raises(InputError, match="must be a ContactCorrector or a RobustCorrector, got 'paper'"):
         correct_many([seen()], "paper")  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="the goal of operation 2 in observation 2 is not a rigid pose"):
+        correct_many([seen(), edited("goals", stretched)])
 
 
 def lying(seen: Observation, **changed: Any) -> Correction:
@@ -115,11 +100,8 @@ def test_the_gaps_that_a_corrector_claims_are_measured() -> None:
     ("changed", "message"),
     [
         ({"sentence": None}, "sentence of Correction must be a text, got None"),
-        ({"sentence": " "}, "returned ' ' as its sentence"),
         ({"sentence": "a\nb"}, "as its sentence"),
-        ({"test": 3}, "test of Correction must be a Consistency or None, got 3"),
         ({"dropped": ("R99",)}, "returned 'R99' in `dropped`; return a tuple of relations, such as 'R1'"),
-        ({"dropped": ([],)}, "dropped of Correction must be a list (each entry a text), got a tuple with a list in it"),
     ],
 )
 def test_words_that_nobody_can_read_are_refused(changed: dict[str, Any], message: str) -> None:
@@ -138,8 +120,3 @@ def test_poses_far_beyond_everything_are_refused() -> None:
         with pytest.raises(InputError, match=r"returned a goal for operation 2 with a position of 1e\+200 m; return"):
             correct(seen(), corrector)
     assert correct(seen(), lambda seen: np.full((3, 4, 4), np.inf)).status == "not_finite"
-
-
-def test_what_is_exported_is_there() -> None:
-    assert apo_bench.correct_many([seen()])[0].ok
-    assert apo_bench.ContactCorrector("drop")(seen()).ok

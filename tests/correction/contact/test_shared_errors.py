@@ -14,13 +14,11 @@ from apo_bench import (
     InputError,
     Observation,
     correct,
-    correct_many,
     draw_layout,
     explain,
     load_scenario,
 )
-from apo_bench.assembly import Gap, SharedError
-from apo_bench.correction.contact.contact import contact
+from apo_bench.assembly import SharedError
 from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise
@@ -44,7 +42,7 @@ def test_a_view_error_leaves_parts_to_each_other_as_they_were_seen() -> None:
     """pocket_table: contacts with the fixed table tell where the camera is; taken alone, operations are torn apart."""
     joint = []
     alone = []
-    for seed in range(8):
+    for seed in range(4):
         observation, truth = seen("bias-view", seed=seed)
         for given, errors in ((observation, joint), (replace(observation, shared=()), alone)):
             made = correct(given, "contact")
@@ -53,7 +51,7 @@ def test_a_view_error_leaves_parts_to_each_other_as_they_were_seen() -> None:
     assert np.mean(joint) < 0.15 * np.mean(alone)
 
 
-@pytest.mark.parametrize("model", ["bias", "bias-view", "correlated"])
+@pytest.mark.parametrize("model", ["bias-view", "correlated"])
 def test_the_test_and_the_posterior_are_those_of_the_joint_covariance(model: str) -> None:
     """Of 30 draws 95 % regions cover 28.5 but for chance (binomial, 4 sigma), and p is uniform on average.
 
@@ -71,13 +69,14 @@ def test_the_test_and_the_posterior_are_those_of_the_joint_covariance(model: str
     assert np.mean(p) == pytest.approx(0.5, abs=4 / np.sqrt(12 * 30))
 
 
-@pytest.mark.parametrize("model", ["heavy-tailed", "megapose-tless-inliers"])
-def test_the_test_and_the_regions_are_those_of_the_tails(model: str) -> None:
+def test_the_test_and_the_regions_are_those_of_the_tails() -> None:
     """Of 50 draws, alarms at a nominal 10 % and regions of 95 % as chance makes them (binomial, 4 sigma)."""
     p = []
     covered = []
     for seed in range(50):
-        observation, truth = seen(model, ["pocket_table", "stick_in_tower"][seed % 2], seed, level=0.5)
+        observation, truth = seen(
+            "megapose-tless-inliers", ["pocket_table", "stick_in_tower"][seed % 2], seed, level=0.5
+        )
         made = correct(observation, "contact")
         p.append(made.test.p_value)
         covered.append(contains_truth(observation, made, truth))
@@ -97,27 +96,10 @@ def test_a_shared_error_of_none_of_the_size_changes_nothing() -> None:
     assert other.test.chi_square == pytest.approx(one.test.chi_square, rel=1e-6)
 
 
-def test_many_are_corrected_as_one_after_the_other() -> None:
-    observation, _ = seen("bias-view")
-    made = correct_many([observation, replace(observation, shared=())], contact)
-    for one, given in zip(made, (observation, replace(observation, shared=())), strict=True):
-        assert_allclose(one.goals, correct(given, "contact").goals, atol=1e-9)
-
-
-def test_walls_between_operations_that_share_errors_are_kept() -> None:
-    """What overlaps by play stays within it, and the joint estimate is nearer than the separate one."""
-    observation, truth = seen("bias-view")
-    between = dict.fromkeys((relation.contact for relation in observation.assembly.relations()), Gap("clearance"))
-    walls = replace(observation, assembly=replace(observation.assembly, gaps=between), play_m=2e-3)
-    made = correct(walls, "contact")
-    assert made.ok
-    assert np.linalg.norm(made.goals[:, :3, 3] - truth[:, :3, 3], axis=1).max() < 4e-3
-
-
 def test_what_is_known_of_the_camera_is_said() -> None:
-    """The estimate of the shared twist is within its own posterior: squared lengths of 40 are chi-square of six."""
+    """The estimate of the shared twist is within its own posterior: squared lengths of 15 are chi-square of six."""
     square = []
-    for seed in range(40):
+    for seed in range(15):
         observation, truth = seen("bias-view", seed=seed)
         found = explain(observation, correct(observation, "contact").goals)
         (one,) = found.shared
@@ -139,7 +121,7 @@ def test_a_shared_error_above_its_covariance_is_refused() -> None:
 def test_an_outlier_beside_an_error_of_the_view_is_left_out_and_the_rest_solved_jointly() -> None:
     joint = []
     alone = []
-    for seed in range(4):
+    for seed in range(2):
         observation, truth = seen("bias-view", seed=seed)
         (camera,) = observation.shared
         goals = np.array(observation.goals)

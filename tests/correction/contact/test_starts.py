@@ -5,18 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from apo_bench import ContactCorrector, correct, correct_many
+from apo_bench import ContactCorrector, correct
 from apo_bench.assembly import largest_gap, looking_away
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.solvers.compact import compact_equations
 from apo_bench.correction.solvers.gauss_newton import descended, nearest_goals
 from apo_bench.correction.solvers.whitened import correction_to, scales
 from apo_bench.geometry import pose
 from tests.correction.robust.test_robust import fixed_error_mm, look, shown
-from tests.shipped import BOXES
-
-UPSIDE_DOWN = ([135, 0, 0], [180, 0, 0], [0, 135, 0], [0, 180, 0])
 
 
 def turned(name, k, turn, seed=0):
@@ -31,8 +27,8 @@ def length(observation, goals):
     return np.linalg.norm(correction_to(observation.goals, scales(observation.covariance), goals))
 
 
-@pytest.mark.parametrize(("name", "k"), [("block_on_block", 1), ("bridge_cycle", 2), ("pocket_table", 3)])
-@pytest.mark.parametrize("turn", UPSIDE_DOWN)
+@pytest.mark.parametrize(("name", "k"), [("block_on_block", 1), ("pocket_table", 3)])
+@pytest.mark.parametrize("turn", [[135, 0, 0], [0, 180, 0]])
 def test_a_part_seen_upside_down_is_turned_back(name, k, turn):
     seen = turned(name, k, turn)
     found = correct(seen, "contact")
@@ -42,7 +38,7 @@ def test_a_part_seen_upside_down_is_turned_back(name, k, turn):
     assert fixed_error_mm(name, 0, found) < 3.0
 
 
-@pytest.mark.parametrize("name", BOXES)
+@pytest.mark.parametrize("name", ["block_on_block", "pocket_table", "vanished_fixture"])
 def test_far_away_no_correction_is_longer_than_the_one_to_the_truth(name):
     """At 40 mm and degrees half of the corrections that begin with what was seen are, or end nowhere."""
     _, layout, _ = shown(name, 3)
@@ -54,19 +50,12 @@ def test_far_away_no_correction_is_longer_than_the_one_to_the_truth(name):
 
 
 def test_other_starts_change_nothing_where_the_first_one_leads_to_goals_nearby():
-    for name in BOXES:
+    for name in ("bridge_cycle", "carried_bridge"):
         seen = look(name, 1, 4.0)
         one = correct(seen, "contact")
         other = correct(seen, ContactCorrector(elsewhere=False))
         assert one.goals.tolist() == other.goals.tolist()
         assert one.sentence == other.sentence
-
-
-def test_many_at_once_find_the_same():
-    seen = [turned("bridge_cycle", 2, turn) for turn in UPSIDE_DOWN]
-    for many, one in zip(correct_many(seen, contact), (correct(one, "contact") for one in seen), strict=True):
-        assert (many.status, many.sentence) == (one.status, one.sentence)
-        assert many.goals.tolist() == one.goals.tolist()
 
 
 def test_where_contacts_bend_newton_ends_where_small_steps_would():

@@ -10,19 +10,19 @@ from functools import partial
 import numpy as np
 import pytest
 
-from apo_bench import Assembly, ContactCorrector, Correction, Observation, correct, correct_many, load_scenario
+from apo_bench import ContactCorrector, Observation, correct, correct_many, load_scenario
 from apo_bench.assembly.equations import equations
-from apo_bench.correction.contact.contact import Doubt, contact
+from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.solvers import kernels
 from apo_bench.correction.solvers.compact import CompactEquations, compact_equations
 from apo_bench.correction.solvers.gauss_newton import NearestGoals, nearest_goals
 from apo_bench.correction.solvers.linear_step import DenseStep
 from apo_bench.correction.solvers.whitened import coordinates_of
 from apo_bench.geometry import Array, pose
-from tests import scenes
+from tests.correction.test_many import check_same
 
 by_kernels = partial(nearest_goals, kernels=kernels.kernels())
-SCENARIOS = ("bridge_cycle", "stick_on_castles", "carried_bridge", "vanished_fixture", "pocket_table")
+SCENARIOS = ("stick_on_castles", "vanished_fixture", "pocket_table")
 LEVELS = {(2.0, 1.0): 1e-12, (10.0, 8.0): 1e-9}
 """Noise in mm and degrees, and how far goals may differ, [m]. At the larger one rounding grows on the way: the plain
 solver differs from itself by up to 2e-10 m when the contacts come in another order."""
@@ -59,22 +59,17 @@ def _numba() -> None:
 @pytest.mark.parametrize("level", LEVELS)
 @pytest.mark.parametrize("name", SCENARIOS)
 def test_the_same_goals_after_as_many_turns(name: str, level: tuple[float, float]) -> None:
-    for seed in range(6):
+    for seed in range(3):
         given = drawn(name, *level, seed)
         alike(nearest_goals(*given), by_kernels(*given), LEVELS[level])
 
 
 @pytest.mark.numeric
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_soft_contacts_are_the_same_too(name: str) -> None:
+def test_soft_contacts_are_the_same_too() -> None:
     for seed in range(3):
-        system, goals, L = drawn(name, 2.0, 1.0, seed)
+        system, goals, L = drawn("vanished_fixture", 2.0, 1.0, seed)
         soft_m = np.repeat(np.arange(len(system)) % 2 * 5e-5, 3)
-        alike(
-            nearest_goals(system, goals, L, soft_m),
-            by_kernels(system, goals, L, soft_m),
-            1e-12,
-        )
+        alike(nearest_goals(system, goals, L, soft_m), by_kernels(system, goals, L, soft_m), 1e-12)
 
 
 @pytest.mark.numeric
@@ -101,34 +96,11 @@ def test_what_is_not_finite_is_said_and_left_alone() -> None:
     assert np.array_equal(found.goals[1], three[1], equal_nan=True)
     assert not found.z[1].any()
     assert np.array_equal(found.goals[0], by_kernels(system, goals, L).goals)
-    endless = goals.copy()
-    endless[1, 1, 3] = np.inf
-    with np.errstate(invalid="ignore"):
-        assert not by_kernels(system, endless, L).finite
 
 
-def test_no_contacts_ask_for_nothing() -> None:
-    system, goals, L = drawn("bridge_cycle", 2.0, 1.0, 0)
-    none = system.among(np.zeros(len(system), dtype=np.bool_))
-    found = by_kernels(none, goals, L)
-    alike(nearest_goals(none, goals, L), found, 0.0)
-    assert np.array_equal(found.goals, goals)
-
-
-@pytest.mark.parametrize("name", ["contact"])
-def test_no_operations_make_no_goals(name: str) -> None:
-    built = scenes.bridge()
-    none = Assembly(built.assembly.solids, (), frozenset(built.assembly.solids))
-    seen = Observation(none, built.start, np.zeros((0, 4, 4)), np.zeros((0, 6, 6)), np.zeros(0, dtype=np.bool_))
-    made = correct(seen, name)
-    assert made.ok
-    assert made.goals.shape == (0, 4, 4)
-
-
-@pytest.mark.parametrize("seed", range(4))
-def test_contradictory_contacts_end_with_a_gap(seed: int) -> None:
+def test_contradictory_contacts_end_with_a_gap() -> None:
     """There is no point to rest on: the plain solver's own end depends on the order of the contacts."""
-    system, goals, L = drawn("stick_on_castles", 2.0, 1.0, seed)
+    system, goals, L = drawn("stick_on_castles", 2.0, 1.0, 0)
     plane = system.plane.copy()
     plane[-1, 3] += 3e-3
     for nearest in (nearest_goals, by_kernels):
@@ -146,32 +118,12 @@ def observed(name: str, mm: float, degrees: float, seed: int, play_m: float = 0.
     return Observation(given.assembly, given.start, goals, L @ np.swapaxes(L, 1, 2), seen, play_m=play_m)
 
 
-def check_same(expected: Correction, actual: Correction) -> None:
-    """All that a correction says, but for rounding; goals within 1e-9 mm."""
-    for name in ("status", "sentence", "freed", "rank", "dropped"):
-        assert getattr(actual, name) == getattr(expected, name)
-    np.testing.assert_allclose(actual.goals, expected.goals, rtol=0, atol=1e-12)
-    lengths = [(made.gap_before_m, made.gap_after_m) for made in (expected, actual)]
-    np.testing.assert_allclose(lengths[1], lengths[0], rtol=0, atol=1e-12)
-    assert len(actual.trace) == len(expected.trace)
-    assert expected.test is not None
-    assert actual.test is not None
-    assert (actual.test.freedom, actual.test.level) == (expected.test.freedom, expected.test.level)
-    assert actual.test.chi_square == pytest.approx(expected.test.chi_square, rel=1e-6)
-    assert actual.test.p_value == pytest.approx(expected.test.p_value, rel=1e-6)
-    assert [s.relation for s in actual.test.suspects] == [s.relation for s in expected.test.suspects]
-    assert (actual.covariance is None) == (expected.covariance is None)
-    if actual.covariance is not None and expected.covariance is not None:
-        np.testing.assert_allclose(actual.covariance, expected.covariance, rtol=0, atol=1e-12)
-
-
 @pytest.mark.numeric
 @pytest.mark.parametrize("play_m", [0.0, 2.5e-4])
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_contact_is_compiled_by_default_and_says_what_it_says_uncompiled(name: str, play_m: float) -> None:
-    seen = [observed(name, 2.0, 1.0, seed, play_m) for seed in range(4)]
-    for one in seen:
-        check_same(correct(one, ContactCorrector(compiled=False)), correct(one, "contact"))
+def test_contact_is_compiled_by_default_and_says_what_it_says_uncompiled(play_m: float) -> None:
+    for name in SCENARIOS:
+        one = observed(name, 2.0, 1.0, 0, play_m)
+        check_same((correct(one, "contact"),), [correct(one, ContactCorrector(compiled=False))])
 
 
 def test_many_at_once_are_bit_for_bit_what_they_are_alone() -> None:
@@ -185,14 +137,6 @@ def test_many_at_once_are_bit_for_bit_what_they_are_alone() -> None:
         assert made.test == alone.test
 
 
-@pytest.mark.parametrize("doubt", ["apply", "refuse", "drop"])
-def test_doubts_are_the_same_compiled(doubt: Doubt) -> None:
-    """Three times the noise that is stated: the test fails."""
-    one = observed("stick_on_castles", 2.0, 1.0, 1)
-    one = replace(one, covariance=one.covariance / 9.0)
-    check_same(ContactCorrector(doubt, compiled=False)(one), ContactCorrector(doubt)(one))
-
-
 @pytest.fixture
 def no_numba(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     kernels.kernels.cache_clear()
@@ -202,15 +146,14 @@ def no_numba(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("no_numba")
-@pytest.mark.parametrize("name", ["contact"])
-def test_without_numba_contact_is_not_compiled(name: str) -> None:
+def test_without_numba_contact_is_not_compiled() -> None:
     one = observed("bridge_cycle", 2.0, 1.0, 0)
     uncompiled = correct(one, ContactCorrector(compiled=False))
-    assert np.array_equal(correct(one, name).goals, uncompiled.goals)
+    assert np.array_equal(correct(one, "contact").goals, uncompiled.goals)
     np.testing.assert_allclose(correct_many([one], contact)[0].goals, uncompiled.goals, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("turn", [0.0, 1e-9, 0.3, 0.999, 1.001, 3.0])
+@pytest.mark.parametrize("turn", [0.0, 1e-9, 0.3, 3.0])
 def test_kernels_run_as_they_stand(turn: float) -> None:
     """Uncompiled, with goals turned little and far: what differs from the twins is rounding alone."""
     system, goals, L = drawn("carried_bridge", 2.0, 1.0, 0)

@@ -17,7 +17,6 @@ from apo_bench.observation.noise import Level, make_noise
 from benchmarks.corrector_bench.draws import draw
 from benchmarks.corrector_bench.problems import chain
 from tests.correction.robust.test_robust import look, shown
-from tests.shipped import BOXES
 
 PLAY_M = 0.25e-3
 
@@ -39,7 +38,7 @@ def test_each_fit_on_the_way_adds_its_play():
     assert pocket["cube2.py on table.A_py"] == pytest.approx(3.0)
 
 
-@pytest.mark.parametrize("name", BOXES)
+@pytest.mark.parametrize("name", ["block_on_block", "pocket_table"])
 def test_deviations_are_those_of_the_covariance(name):
     assembly = shown(name)[0].assembly
     S = fit_covariance(assembly, PLAY_M)
@@ -103,6 +102,6 @@ def test_a_stick_that_hangs_as_deep_as_play_lets_it_is_no_alarm():
     human = Demonstration(scenario.assembly, layout.start, goals, layout.start, np.zeros((5, 6, 6)), play_m=PLAY_M)
     rng = np.random.default_rng(0)
     noise = make_noise("isotropic", Level(0.05, 0.05))
-    seen = [observe(human, noise, rng) for _ in range(200)]
+    seen = [observe(human, noise, rng) for _ in range(100)]
     refused = sum(made.status == "doubtful" for made in correct_many(seen, contact_refuse))
-    assert refused <= 8
+    assert refused <= 4

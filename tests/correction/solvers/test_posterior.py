@@ -11,15 +11,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from apo_bench import Correction, Observation, correct, correct_many, load_scenario
-from apo_bench.assembly import Gap, Operation
-from apo_bench.assembly.equations import equations
+from apo_bench import Correction, Observation, correct, correct_many
+from apo_bench.assembly import Operation
 from apo_bench.correction.contact.contact import contact
 from apo_bench.correction.region import contains_truth
-from apo_bench.correction.solvers.compact import compact_equations
 from apo_bench.correction.solvers.gauss_newton import nearest_goals
-from apo_bench.correction.solvers.kernels import PLAIN
-from apo_bench.correction.solvers.posterior import freedom_of, jacobian_rank, marginals, projections, settled_basis
+from apo_bench.correction.solvers.posterior import freedom_of, jacobian_rank, projections, settled_basis
 from apo_bench.geometry import Array, pose
 from tests import scenes
 from tests.correction.solvers.test_manifold import RANKS, crooked, jacobian, scales, system_of, twisted
@@ -78,24 +75,12 @@ def test_freedom_of_nothing() -> None:
         assert (known.rank, known.redundant, known.spectral_gap) == (0, 0, np.inf)
         assert_allclose(known.free, np.eye(shape[0]), rtol=0, atol=0)
     assert freedom_of(np.zeros((606, 3))) is None
+    full = freedom_of(np.eye(6)[:, :4])
+    assert full is not None
+    assert (full.rank, full.redundant, full.spectral_gap) == (4, 0, np.inf)
 
 
-def test_every_row_that_counts_leaves_no_gap() -> None:
-    known = freedom_of(np.eye(6)[:, :4])
-    assert known is not None
-    assert (known.rank, known.redundant, known.spectral_gap) == (4, 0, np.inf)
-
-
-def test_without_contacts_it_is_the_noise_that_is_left() -> None:
-    scene = scenes.stick_in_tower()
-    L = crooked(3, np.random.default_rng(0))
-    system = system_of(scene, scene.goals)
-    found = nearest_goals(system.among(np.zeros(len(system), dtype=np.bool_)), scene.goals, L)
-    assert_allclose(marginals(found.B[None], np.eye(18)[None])[0], L @ np.swapaxes(L, 1, 2), rtol=1e-12, atol=1e-20)
-
-
-@pytest.mark.parametrize("correlated", [False, True])
-@pytest.mark.parametrize("name", ["stick_in_tower", "pockets"])
+@pytest.mark.parametrize(("name", "correlated"), [("stick_in_tower", False), ("pockets", True)])
 def test_the_stated_covariance_is_that_of_draws(name: str, correlated: bool) -> None:
     """Errors of corrected goals over 400 draws; what is stated to be fixed is fixed."""
     scene = scenes.ALL[name]()
@@ -118,18 +103,6 @@ def test_the_stated_covariance_is_that_of_draws(name: str, correlated: bool) -> 
     assert np.abs(errors[:, fixed]).max() <= 1e-9
 
 
-def test_contacts_take_uncertainty_away_and_add_none() -> None:
-    """The stated noise minus what is left is positive semidefinite, up to the curvature of a correction this small."""
-    scene = scenes.stick_in_tower()
-    L = crooked(3, np.random.default_rng(2), 0.01, 0.01)
-    seen = look(scene, L, 0)
-    made = correct(seen, "contact")
-    assert made.covariance is not None
-    scaled = np.linalg.inv(L) @ (seen.covariance - made.covariance) @ np.swapaxes(np.linalg.inv(L), 1, 2)
-    assert np.linalg.eigvalsh(scaled).min() >= -1e-2
-    assert np.linalg.eigvalsh(scaled).max() > 0.99
-
-
 @cache
 def corrected_towers() -> tuple[scenes.Scene, list[Observation], tuple[Correction, ...]]:
     """300 draws of one tower, for every level."""
@@ -146,17 +119,6 @@ def test_regions_hold_the_truth_as_often_as_they_say(level: float, low: float, h
     assert len(held) == 300
     assert None not in held
     assert low <= np.mean(np.array(held, dtype=float)) <= high
-
-
-def test_regions_of_noise_that_is_stated_too_small_do_not() -> None:
-    scene = scenes.stick_in_tower()
-    L = scales(3, 1.0, 1.0)
-    held = []
-    for seed in range(60):
-        seen = look(scene, L, seed)
-        seen = replace(seen, covariance=seen.covariance / 4.0)
-        held.append(contains_truth(seen, correct(seen, "contact"), scene.goals))
-    assert np.mean(np.array(held, dtype=float)) < 0.5
 
 
 def test_only_free_directions_count() -> None:
@@ -217,39 +179,13 @@ def test_where_nothing_is_free_the_covariance_is_zero_and_there_is_no_region() -
     assert contains_truth(seen, made, scene.goals) is None
 
 
-def test_walls_fix_nothing() -> None:
-    """Of contacts with a clearance only the exact ones enter the posterior."""
-    scene = pocketed()
-    gaps = {contact: Gap("clearance", -1e-3, 1e-3) for contact in scene.assembly.operations[0].contacts[1:]}
-    seen = replace(look(scene, scales(1, 0.1, 0.1), 0), assembly=replace(scene.assembly, gaps=gaps))
-    made = correct(seen, "contact")
-    assert (made.ok, made.rank) == (True, 3)
-    assert made.covariance is not None
-    assert np.linalg.matrix_rank(made.covariance[0], tol=1e-12) == 3
-    assert contains_truth(seen, made, scene.goals) is True
-
-
-@pytest.mark.parametrize("free", [1, 3, 9, 20])
+@pytest.mark.parametrize("free", [1, 9])
 def test_a_settled_basis_is_of_the_span_alone(free: int) -> None:
     """Whatever basis a decomposition returns, and whatever its last digits are."""
     rng = np.random.default_rng(free)
-    for _ in range(20):
+    for _ in range(5):
         N = np.linalg.qr(rng.standard_normal((30, free)))[0]
         turned = N @ np.linalg.qr(rng.standard_normal((free, free)))[0]
         settled = settled_basis(N)
         assert_allclose(settled @ settled.T, N @ N.T, rtol=0, atol=1e-12)
         assert_allclose(settled_basis(turned + 1e-15), settled, rtol=0, atol=1e-9)
-
-
-def test_free_directions_are_the_same_compiled_or_not() -> None:
-    """The plan that fits is sought along them: rounding must not turn them."""
-    of = load_scenario("stick_in_tower")
-    rng = np.random.default_rng(4)
-    for _ in range(10):
-        n = len(of.assembly)
-        L = np.tile(np.diag(np.repeat([16e-3, np.radians(16.0)], 3)), (n, 1, 1))
-        seen = of.goals @ pose.exp((L @ rng.standard_normal((n, 6, 1)))[..., 0])
-        system = compact_equations(equations(of.assembly, of.start, seen), n)
-        bases = [freedom_of(nearest_goals(system, seen, L, kernels=by).Jt) for by in (None, PLAIN)]
-        plain, looped = (known.free for known in bases if known is not None)
-        assert_allclose(looped, plain, rtol=0, atol=1e-6)

@@ -1,20 +1,17 @@
-"""The forward model of a robot that is wrong: each block of its derivative, and its parts against each other."""
+"""The forward model of a robot that is wrong: its parts against each other."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from apo_bench.correction.touches.robust_estimate import (
-    HAND_EYE,
-    TOOL,
     Places,
     grasp_in,
     hand_eye_displacement,
-    joints_in,
     part_poses,
     tip_displacement,
 )
@@ -24,13 +21,6 @@ pytestmark = pytest.mark.numeric
 
 JOINTS = 6
 UNKNOWNS = grasp_in(JOINTS, 1).stop
-BLOCKS = {
-    "hand_eye": HAND_EYE,
-    "tool": TOOL,
-    "joints": joints_in(JOINTS),
-    "first grasp": grasp_in(JOINTS, 0),
-    "second grasp": grasp_in(JOINTS, 1),
-}
 
 
 def anywhere(rng: np.random.Generator) -> Array:
@@ -43,21 +33,7 @@ def some_places(rng: np.random.Generator) -> Places:
     return Places(B, rng.uniform(-1.0, 1.0, (3, 6, JOINTS)), held, np.array([1, 0, -1]))
 
 
-@given(seed=st.integers(0, 10**6), block=st.sampled_from(sorted(BLOCKS)), size=st.sampled_from([0.0, 1e-3, 0.3]))
-def test_each_block_of_the_derivative_is_that_of_finite_differences(seed: int, block: str, size: float) -> None:
-    rng = np.random.default_rng(seed)
-    unknowns = size * rng.standard_normal(UNKNOWNS)
-    middle = rng.uniform(-1.0, 1.0, 3)
-    places = some_places(rng)
-    T, D = part_poses(unknowns, middle, places)
-    step = 1e-5
-    for column in range(UNKNOWNS)[BLOCKS[block]]:
-        d = step * np.eye(UNKNOWNS)[column]
-        ahead, behind = (pose.log(pose.inverse(T) @ part_poses(unknowns + s * d, middle, places)[0]) for s in (1, -1))
-        # what central differences leave out is of the order of the square of the step
-        assert_allclose(D[:, :, column], (ahead - behind) / (2.0 * step), atol=1e-8)
-
-
+@settings(deadline=None, max_examples=20)
 @given(seed=st.integers(0, 10**6))
 def test_a_part_is_where_its_factors_put_it(seed: int) -> None:
     rng = np.random.default_rng(seed)
