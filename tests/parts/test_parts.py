@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from apo_bench import InputError, build_scene, load_scenario
-from apo_bench.geometry import Box, face_area
+from apo_bench.geometry import Box, face_area, union_mesh
 from apo_bench.parts import load_part, part_names, part_path
 from apo_bench.parts.allowed import LARGEST_PART_BYTES, MOST_FACES
 from apo_bench.parts.faces import SIDES, unite
