@@ -14,9 +14,6 @@ import numpy as np
 import pytest
 import trimesh
 
-from apo_bench import load_scenario
-from apo_bench.files.json_forms import observation_form, write_form
-from apo_bench.files.observation import read_observation
 from apo_bench.geometry import pose
 from benchmarks.recording_forms import FORMS, Tracked
 from tests import bop_made
@@ -31,7 +28,6 @@ COMMANDS = {
     "graph stick_in_tower --out graph.svg": "graph.svg",
     "scene block_on_block --out scene.xml": "scene.xml",
     f"plan stick_in_tower --observation {ROOT}/docs/seen.csv --robot robot.json": "robot.json",
-    "noise card isotropic --out card.png": "card.png",
     "noise fit --estimates estimates.csv --truth truth.csv --out fit.toml --residuals fit.csv --picture fit.png": (
         "fit.toml fit.csv fit.png"
     ),
@@ -41,7 +37,6 @@ COMMANDS = {
     "recording import block.csv --format csv --camera stands.toml --objects blocks.toml --out block_seen.csv": (
         "block_seen.csv"
     ),
-    "noise learn observations --out learned.toml": "learned.toml",
     "explain stick_in_tower --out explained.png": "explained.png",
     f"correct stick_in_tower --observation {ROOT}/docs/seen.csv --out plan.json": "plan.json",
     f"correct stick_in_tower --observation {ROOT}/docs/seen.csv --out plan.csv": "plan.csv",
@@ -123,15 +118,6 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
         '[[pose]]\npart = "block"\nname = "lower"\nat_mm = [300, 100, 35]\n'
     )
     trimesh.creation.cylinder(8.0, 40.0, sections=48).export(folder / "pin.stl")
-    (folder / "observations").mkdir()
-    rng = np.random.default_rng(3)
-    form = observation_form(
-        read_observation(ROOT / "docs" / "seen.csv", load_scenario("stick_in_tower")), "stick_in_tower"
-    )
-    for k in range(6):
-        for operation in form["operations"]:
-            operation["position_mm"] = (np.array(operation["position_mm"]) + rng.normal(size=3)).tolist()
-        write_form(form, folder / "observations" / f"{k}.json")
     (folder / "entries").mkdir()
     (folder / "entries" / "one.json").write_bytes(msgspec.json.encode(entry("one", given=track(a="10"))))
     write(folder / "rows", [row("contact", k, k < 2) for k in range(3)])
