@@ -11,7 +11,7 @@ Design: 15 shipped scenarios and 20 generated assemblies, seeds 0, 1 and 2; some
 
 - observation, each scenario and seed (105): demonstrated poses, error of the observed ones, covariance. Seed 0 has
   isotropic noise, the noise models take turns in seeds 1 and 2. detection: the contacts that are found in it.
-- correction, each observation by each of `CORRECTORS` (840): all that the corrector returns.
+- correction, each observation by each of `CORRECTORS` (735): all that the corrector returns.
 - trial, each scenario and seed by each of `METHODS` (840). Fidelities alternate over seeds, so that each scenario has
   each method in both. Noise is 1, 2 and 0.5 mm and degrees in seeds 0, 1 and 2.
 - trial, each of `OPTIONS` in turn, two a seed of shipped scenarios, one a seed of generated ones (150, each option four
