@@ -50,11 +50,7 @@ ASKED = [("paper-track", 1.0), ("none", 1.0), ("paper", 1.0), ("paper", 0.5), ("
 
 @pytest.mark.parametrize(
     ("fidelity", "grasp", "asked"),
-    [
-        ("contact", "friction", ASKED),
-        ("full", "friction", [*ASKED[:2], ASKED[-1]]),
-        ("full", "weld", [*ASKED[:2], ASKED[-1]]),
-    ],
+    [("contact", "friction", ASKED), ("full", "weld", [*ASKED[:2], ASKED[-1]])],
 )
 def test_shared_beginnings_change_no_byte(fidelity, grasp, asked):
     cache = ReplayCache()
@@ -85,10 +81,9 @@ def test_marks_differ_where_anything_that_led_there_differs():
     assert not set(a) & set(cache_keys(scene(), elsewhere, "full", moves(plan, scene())))
 
 
-@pytest.mark.parametrize("name", ["stick_in_tower", "vanished_fixture"])
-def test_nothing_touches_on_what_is_left_out(monkeypatch, name):
+def test_nothing_touches_on_what_is_left_out(monkeypatch):
     """A full replay, in which every stretch that `contact` would leave out is looked at for contacts of what moves."""
-    its = scene(name)
+    its = scene("vanished_fixture")
     met = []
     left_out: list[tuple[float, float]] = []
     follow = Robot.follow
@@ -128,7 +123,7 @@ def test_nothing_touches_on_what_is_left_out(monkeypatch, name):
     monkeypatch.setattr(Robot, "follow", looked_at)
     monkeypatch.setattr(ForceSensors, "hold", holding)
     monkeypatch.setattr(robot, "TICK_S", 0.005)
-    layout = shown(name).layout
+    layout = shown("vanished_fixture").layout
     done = replay(Plan(its.scenario.assembly, layout.start, layout.goals), its, feel)
     assert done.outcome.code == "ok"
     assert met == []
@@ -291,9 +286,8 @@ def test_what_rocks_on_is_followed_in_parts_of_a_step_with_bounded_patience():
     assert soon.parts == [1] * 4, "two looks at rest in a row"
 
 
-@pytest.mark.parametrize(("method", "level", "seed"), [("contact", 4.0, 1), ("paper", 2.0, 64)])
-def test_sticks_that_rocked_for_ever_come_to_rest(method, level, seed):
-    spec = TrialSettings("stick_in_tower", level, level, 1.0, method=method, seed=seed)
+def test_a_stick_that_rocked_for_ever_comes_to_rest():
+    spec = TrialSettings("stick_in_tower", 4.0, 4.0, 1.0, method="contact", seed=1)
     assert run_trial(spec, scene())["failure_code"] != "not_at_rest"
 
 

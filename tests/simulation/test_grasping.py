@@ -96,13 +96,6 @@ def test_a_part_beside_another_is_taken_where_there_is_room_for_the_fingers(fixt
     assert abs(grasp.across[0]) == 1.0
 
 
-def test_a_clear_preferred_grasp_is_kept(fixture: Scene) -> None:
-    plan = nominal(fixture)
-    preferred = Grasp(np.array([0.0, 0.0, 0.008]), np.array([0.0, 1.0, 0.0]))
-    place = RestingPart(plan.start["cube"], obstacles(plan.assembly.solids, plan.start, ("cube",)))
-    assert grasp_at(fixture, "cube", preferred, [place]) is preferred
-
-
 def test_the_tip_looks_down_however_the_part_lies() -> None:
     for turn in ((0, 0, 30), (180, 0, 0), (0, 90, 0)):
         T = pose.at((0, 0, 0), turn)

@@ -16,7 +16,7 @@ from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, OFFSETS, Guard, Load, WristSensor, hand_load
 from apo_bench.simulation.scene.world import wrist_felt
 
-ARMS = ("six_axis", "ur5e_primitive", "panda_primitive")
+ARMS = ("six_axis", "ur5e_primitive")
 POSES = (((0.1, 0.16, 0.2), (0, 0, 0)), ((0.2, -0.1, 0.25), (20, 0, 0)), ((0.1, 0.1, 0.22), (0, -25, 40)))
 
 
@@ -59,7 +59,7 @@ def test_noise_is_white_at_a_thousand_readings_a_second_and_behind_the_low_pass_
         assert np.corrcoef(felt[:-k, 0], felt[k:, 0])[0, 1] == pytest.approx(part**k, abs=0.03)
 
 
-@pytest.mark.parametrize("bandwidth_hz", [8.0, 16.0, 50.0])
+@pytest.mark.parametrize("bandwidth_hz", [8.0, 50.0])
 def test_a_sine_at_the_bandwidth_is_felt_at_seven_tenths(tower: Scene, bandwidth_hz: float) -> None:
     made = wrist(tower, WrenchNoise(0.0, 0.0), bandwidth_hz=bandwidth_hz)
     axis = made.sensor._sensor()[:3, 0]
@@ -71,7 +71,7 @@ def test_a_sine_at_the_bandwidth_is_felt_at_seven_tenths(tower: Scene, bandwidth
     assert np.ptp(felt[-round(2000 / bandwidth_hz) :]) / 2 == pytest.approx(np.sqrt(0.5), rel=0.09)
 
 
-@pytest.mark.parametrize("step_s", [0.0005, 0.00025, 0.0001])
+@pytest.mark.parametrize("step_s", [0.0005, 0.0001])
 def test_a_blow_and_the_noise_are_felt_alike_whatever_the_step(tower: Scene, step_s: float) -> None:
     """0.03 Ns in a millisecond, in one step or in ten: each reading is a mean, and has the same noise."""
     felt = []
