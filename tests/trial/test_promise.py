@@ -243,14 +243,6 @@ def test_a_plan_that_abstains_says_less_than_what_was_asked() -> None:
     assert abstained(0.6999, 0.7).sentence.endswith(": 0.6999, where 0.7 is asked")
 
 
-def test_what_promises_enough_is_carried_out_as_without_abstaining(
-    scene: Scene, simulated: SimulatedDemonstration
-) -> None:
-    usual = row(scene, simulated)
-    same = row(scene, simulated, abstain=usual["promised"])
-    assert {name for name in usual if usual[name] != same[name]} == {"abstain", "spec_hash"}  # type: ignore[literal-required]
-
-
 def test_an_abstained_trial_counts_as_no_success_in_every_rate(scene: Scene, simulated: SimulatedDemonstration) -> None:
     done = row(scene, simulated, abstain=0.01)
     kept = done | {
