@@ -28,7 +28,6 @@ from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.noise_file import noise_text, presets, read_noise
 from apo_bench.trial.fingerprint import spec_hash
 from apo_bench.trial.inputs import noise_content
-from apo_bench.trial.planning import apply_method
 from tests import bop_made as made_of
 from tests import scenes
 from tests.bop_made import Known
@@ -64,7 +63,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.fixture(params=["megapose-lmo", "megapose-tless", "empirical"])
+@pytest.fixture(params=["megapose-lmo", "empirical"])
 def names(request: pytest.FixtureRequest, folder: Path) -> tuple[str, str]:
     """A noise model, and the same without outliers and misses."""
     if request.param == "empirical":
@@ -163,17 +162,6 @@ def test_levels_that_make_no_sense_are_refused(names: tuple[str, str]) -> None:
         seen = see(names[1], 0, Level(*(min(x, most) for x in level)))
         assert (np.abs(seen.covariance) <= np.outer(LARGEST_DEVIATION, LARGEST_DEVIATION)).all()
         assert np.sqrt(seen.covariance.max()) > 0.7 * (0.4 if unit == "mm" else 2.0)
-
-
-def test_what_is_seen_reaches_the_robot_and_misses_do_not(names: tuple[str, str]) -> None:
-    for seed in range(30):
-        seen = see(names[0], seed)
-        planned = apply_method("none", seen, TOWER.goals)
-        assert (planned.plan is not None) == bool(seen.seen.all())
-        if planned.plan is not None:
-            assert planned.plan.goals.tobytes() == seen.goals.tobytes()
-        again = see(names[0], seed)
-        assert again.goals.tobytes() + again.covariance.tobytes() == seen.goals.tobytes() + seen.covariance.tobytes()
 
 
 def test_nothing_of_the_truth_is_in_what_was_missed(names: tuple[str, str]) -> None:
@@ -300,11 +288,7 @@ GOOD = noise_text(read_noise(presets()["megapose-lmo"])[0])
     [
         ('"apo-bench/noise/2"', '"apo-bench/noise/9"', 'schema: "apo-bench/noise/2" is needed'),
         ("missed_rate = 0.16609", "missed_rate = 1.5", "missed_rate: a number from 0 to 1 is needed, 1.5 was given"),
-        ("missed_rate = 0.16609", "mised_rate = 0.1", "unknown key 'mised_rate'; did you mean 'missed_rate'"),
-        ("along_scale_mm = 10.972", "along_scale_mm = 51", "along_scale_mm: a number from 0.0045 to 50 is needed"),
         ("along_scale_mm = 10.972\n", "", "the key 'along_scale_mm' is missing"),
-        ("along_degrees_of_freedom = 0.96916", "along_degrees_of_freedom = 0.1", "from 0.5 on, or inf, is needed"),
-        ("limit_mm = 50", "limit_mm = inf", "limit_mm: a number from 0.001 to 1000 is needed"),
         ("[turn]", "[turns]", "unknown key 'turns'; did you mean 'turn'"),
         ("[turn]", "[turn", "this is not TOML: .*line"),
     ],
@@ -325,7 +309,6 @@ def test_bad_noise_files_are_refused(
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("1,0,1,inlier,1,2,3,4,5", "line 2: 10 cells are needed"),
         (
             "1,0,1,good,1,2,3,4,5,6",
             "line 2, column kind: inlier, turned, outlier or missed is needed, 'good' was given",

@@ -2,7 +2,6 @@
 
 import json
 from functools import cache
-from itertools import groupby
 
 import mujoco
 import numpy as np
@@ -10,12 +9,11 @@ import pytest
 
 from apo_bench import InputError, Plan, TrialSettings, build_scene, load_scenario, replay, run_trial
 from apo_bench.geometry import intrusion_depths, pose
-from apo_bench.simulation.execution.controller import LOOK_S, PATIENCE_S, until_rest
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.execution.replay_cache import ReplayCache, cache_keys
 from apo_bench.simulation.robot import obstacles, robot
 from apo_bench.simulation.robot.in_hand import fast_forward
-from apo_bench.simulation.robot.paths import Trajectory, minimum_jerk, shifted, smooth
+from apo_bench.simulation.robot.paths import Trajectory, minimum_jerk, shifted
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.wrist import ForceSensors
 from apo_bench.simulation.scene.world import SLEEP, initial_state, part_pose, sleeping, timestep
@@ -165,34 +163,6 @@ def test_a_leap_moves_hand_and_parts_as_one_rigid_body():
     assert pose.inverse(later) @ part_pose(its.work, data, "stick") == pytest.approx(in_hand, abs=1e-7)
 
 
-def test_what_is_near_is_told_from_what_is_far():
-    its = scene()
-    data = initial_state(its.work, shown().layout.start)
-    stick = part_pose(its.work, data, "stick")
-    hand = [obstacles.Moving(its.pieces["stick"], np.eye(4))]
-    held = ("stick",)
-
-    def spans(start, end):
-        line = smooth(start, end, 0.3)
-        s = minimum_jerk(np.linspace(0.0, 1.0, 1 + round(line.seconds * 1e3)))
-        return obstacles.near_spans(its, data, hand, held, line, s), len(s) - 1
-
-    high = shifted(stick, (0.0, 0.0, 1.0), 0.2)
-    up, n = spans(stick, high)
-    assert [begin for begin, _ in up] == [0]
-    assert up[0][1] < n / 2
-    down, n = spans(high, stick)
-    assert [end for _, end in down] == [n]
-    assert down[0][0] > n / 2
-    assert spans(high, shifted(high, (1.0, 0.0, 0.0), 0.1))[0] == []
-    turned = high @ pose.at((0.0, 0.0, 0.0), (0.0, 0.0, 40.0))
-    assert spans(high, turned)[0] == []
-    tip = pose.at((0.0, 0.0, 0.0), (0.0, 40.0, 0.0))
-    low = shifted(stick, (0.0, 0.0, 1.0), 0.02)
-    assert spans(high, high @ tip)[0] == []
-    assert spans(low, low @ tip)[0] == [(0, spans(low, low @ tip)[1])], "an end of it may come down"
-
-
 def test_no_turn_that_comes_near_anything_is_left_out():
     its = scene()
     rng = np.random.default_rng(5)
@@ -255,35 +225,6 @@ def test_sleep_ends_with_the_replay():
 def test_contact_is_refused_for_the_ideal_gripper():
     with pytest.raises(InputError, match="'contact' was given together with the grasp 'weld'"):
         TrialSettings("stick_in_tower", grasp="weld", fidelity="contact")
-
-
-class Restless:
-    """A robot beside parts that move for so many waits."""
-
-    def __init__(self, waits: float):
-        self.scene = scene()
-        self.data = initial_state(scene().work, shown().layout.start)
-        self.waits = waits
-        self.parts = []
-        self.data.qvel[self.scene.work.dof["stick"]] = 1.0
-
-    def wait(self, seconds, parts=1):
-        assert seconds == LOOK_S
-        self.parts.append(parts)
-        if len(self.parts) >= self.waits:
-            self.data.qvel[:] = 0.0
-
-
-def test_what_rocks_on_is_followed_in_parts_of_a_step_with_bounded_patience():
-    forever = Restless(np.inf)
-    soon = Restless(3)
-    for case in (forever, soon):
-        until_rest(case)
-    assert len(forever.parts) == round(PATIENCE_S / LOOK_S)
-    lengths = [parts for parts, _ in groupby(forever.parts)]
-    assert lengths == [1, 4, 8, 2, 3]
-    assert forever.parts.count(1) * LOOK_S == pytest.approx(0.32)
-    assert soon.parts == [1] * 4, "two looks at rest in a row"
 
 
 def test_a_stick_that_rocked_for_ever_comes_to_rest():
