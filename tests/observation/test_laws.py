@@ -207,7 +207,7 @@ def test_carelessness_is_stated_but_not_drawn(name: str) -> None:
     assert_allclose(loose.covariance - plain.covariance, careless, atol=1e-17)
 
 
-@pytest.mark.parametrize("name", ["isotropic", "bias-view"])
+@pytest.mark.parametrize("name", NAMES)
 def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A whole trial up to the robot: what `none` has it carry out are the model's goals for this seed, bit for bit."""
     scenario = load_scenario("carried_bridge")
@@ -240,7 +240,7 @@ def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPat
     assert np.abs(expected.goals - layout.goals).max() > 1e-4
 
 
-@pytest.mark.parametrize("name", ["isotropic", "outliers"])
+@pytest.mark.parametrize("name", NAMES)
 def test_what_was_not_seen_is_never_carried_out(name: str) -> None:
     """Of forty seeds: a plan of `none` exists exactly where everything was seen, and then holds what was seen."""
     simulated = SimulatedDemonstration(Layout(CYCLE.goals, CYCLE.start), scenes.shown(CYCLE))

@@ -28,6 +28,7 @@ from apo_bench.observation.noise import Level, make_noise
 from apo_bench.observation.noise_file import noise_text, presets, read_noise
 from apo_bench.trial.fingerprint import spec_hash
 from apo_bench.trial.inputs import noise_content
+from apo_bench.trial.planning import apply_method
 from tests import bop_made as made_of
 from tests import scenes
 from tests.bop_made import Known
@@ -162,6 +163,17 @@ def test_levels_that_make_no_sense_are_refused(names: tuple[str, str]) -> None:
         seen = see(names[1], 0, Level(*(min(x, most) for x in level)))
         assert (np.abs(seen.covariance) <= np.outer(LARGEST_DEVIATION, LARGEST_DEVIATION)).all()
         assert np.sqrt(seen.covariance.max()) > 0.7 * (0.4 if unit == "mm" else 2.0)
+
+
+def test_what_is_seen_reaches_the_robot_and_misses_do_not(names: tuple[str, str]) -> None:
+    for seed in range(30):
+        seen = see(names[0], seed)
+        planned = apply_method("none", seen, TOWER.goals)
+        assert (planned.plan is not None) == bool(seen.seen.all())
+        if planned.plan is not None:
+            assert planned.plan.goals.tobytes() == seen.goals.tobytes()
+        again = see(names[0], seed)
+        assert again.goals.tobytes() + again.covariance.tobytes() == seen.goals.tobytes() + seen.covariance.tobytes()
 
 
 def test_nothing_of_the_truth_is_in_what_was_missed(names: tuple[str, str]) -> None:
