@@ -43,7 +43,7 @@ def aside(folder: Path, mm: float) -> Path:
     return path
 
 
-@pytest.mark.parametrize("name", ["pocket_table", "gearbox", "wedge_under_roof"])
+@pytest.mark.parametrize("name", ["gearbox", "wedge_under_roof"])
 def test_a_scenario_is_explained(capsys: pytest.CaptureFixture[str], name: str) -> None:
     code, out, err = run(capsys, "explain", name, "--json")
     assert (code, err, out.count("\n")) == (0, "", 1)
@@ -210,9 +210,7 @@ def test_any_corrector_may_be_asked(capsys: pytest.CaptureFixture[str], tmp_path
     [
         (("--if-doubtful", "maybe"), "apply, warn, refuse or drop is allowed"),
         (("--if-doubtful", "drop", "--method", "paper"), "only contact can be told what to do"),
-        (("--method", "contakt"), "did you mean 'contact'?"),
         (("--deviation-mm", "0"), "deviation_mm 0 was given; a number from 0.0001 to 10000 is allowed"),
-        (("--deviation-deg", "nan"), "deviation_deg nan was given"),
     ],
 )
 def test_a_wrong_request_is_said_in_one_sentence(

@@ -12,11 +12,9 @@ from apo_bench.cli.app import main
 @pytest.mark.parametrize(
     "words",
     [
-        "recognise block_on_block --noise leaving:leave",
         "recognise block_on_block --noise leaving:Leaves",
         "recognise block_on_block --noise leaving_module:any",
         "arm check leaving:leave block_on_block --layouts 1",
-        "replay block_on_block --relations leaving:leave --fidelity contact",
     ],
 )
 def test_code_that_leaves_is_one_sentence(

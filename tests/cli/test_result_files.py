@@ -14,10 +14,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from apo_bench.geometry import pose
-from benchmarks.recording_forms import FORMS, Tracked
 from tests import bop_made
-from tests.recorded import CAMERA, seen
 from tests.scoring.test_entry import entry, track
 from tests.statistics.test_rates import row, write
 
@@ -26,25 +23,17 @@ ROOT = Path(__file__).parent.parent.parent
 LOG = f"{ROOT}/docs/recording.csv --format csv --camera camera.toml"
 COMMANDS = {
     "graph stick_in_tower --out graph.svg": "graph.svg",
-    "scene block_on_block --out scene.xml": "scene.xml",
     f"plan stick_in_tower --observation {ROOT}/docs/seen.csv --robot robot.json": "robot.json",
+    f"noise still {LOG} --out still.toml --picture still.png": "still.toml still.png",
+    "arm check six_axis block_on_block --layouts 1 --out arm.png": "arm.png",
     "noise fit --estimates estimates.csv --truth truth.csv --out fit.toml --residuals fit.csv --picture fit.png": (
         "fit.toml fit.csv fit.png"
     ),
-    f"noise still {LOG} --out still.toml --picture still.png": "still.toml still.png",
     f"recording import {LOG} --objects objects.toml --scenario stick_in_tower --out seen.json --picture seen.png "
     "--paths seen_paths.csv": "seen.json seen.png seen_paths.csv",
-    "recording import block.csv --format csv --camera stands.toml --objects blocks.toml --out block_seen.csv": (
-        "block_seen.csv"
-    ),
-    "explain stick_in_tower --out explained.png": "explained.png",
-    f"correct stick_in_tower --observation {ROOT}/docs/seen.csv --out plan.json": "plan.json",
     f"correct stick_in_tower --observation {ROOT}/docs/seen.csv --out plan.csv": "plan.csv",
-    "eye block_on_block --out eye.png": "eye.png",
-    "show block_on_block --out show.png": "show.png",
     "replay block_on_block --save-observation saved.json --video film.gif --fidelity contact": "saved.json film.gif",
-    "part import pin.stl --unit mm --out parts": "parts/pin.xml parts/pin.toml parts/pin.png parts/pin.drawn.npz",
-    "arm check six_axis block_on_block --layouts 1 --out arm.png": "arm.png",
+    "part import pin.stl --unit mm --out parts": "parts/pin.xml parts/pin.toml parts/pin.png",
     "scenario new --parts block --poses poses.toml --fixed lower --out pile.toml --overwrite": "pile.toml",
     "leaderboard entries --out page.md": "page.md page.png",
     "report rows --pictures 0": (
@@ -106,13 +95,6 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> dict[str, dict[str, Any]]:
     ids = 'castle1 = { id = "11" }\ncastle2 = { id = "12" }\n'
     ids += 'stick = { id = "13", frame = { at_mm = [0, 0, -10], turn_deg = [0, 0, 90] } }\n'
     (folder / "objects.toml").write_text(f'schema = "apo-bench/objects/1"\n[objects]\n{ids}')
-    parts = seen("block_on_block", 0.3)
-    FORMS["csv-wxyz"].write({p: Tracked(p, np.eye(4), x.t, x.T) for p, x in parts.items()}, folder / "block.csv")
-    packed = pose.pack(CAMERA)
-    stands = f"at_mm = {(packed[:3] * 1e3).tolist()}\nquaternion_wxyz = {packed[3:].tolist()}"
-    (folder / "stands.toml").write_text(f'schema = "apo-bench/camera/1"\n[pose]\n{stands}\n')
-    ids = "".join(f'{part} = {{ id = "{part}" }}\n' for part in parts)
-    (folder / "blocks.toml").write_text(f'schema = "apo-bench/objects/1"\n[objects]\n{ids}')
     (folder / "poses.toml").write_text(
         '[[pose]]\npart = "block"\nname = "upper"\nat_mm = [300, 100, 85]\n'
         '[[pose]]\npart = "block"\nname = "lower"\nat_mm = [300, 100, 35]\n'

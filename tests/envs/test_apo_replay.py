@@ -78,21 +78,15 @@ def test_reset_fits_the_spaces(env: APOReplay) -> None:
     assert {key: value.shape for key, value in seen.items()} == {"goals": (3, 7), "covariance": (3, 6, 6), "seen": (3,)}
     assert all(np.isfinite(box.low).all() and np.isfinite(box.high).all() for box in _boxes(env))
     assert env.action_space.shape == (3, 6)
+    np.testing.assert_array_equal(seen["goals"], pose.pack(env.seen.goals))
+    np.testing.assert_array_equal(seen["covariance"], env.seen.covariance)
+    assert env.seen.assembly is env.assembly
     assert info == {"demonstration": "ok"}
     assert env.trial == SEED
 
 
 def _boxes(env: APOReplay) -> list[Any]:
     return [env.action_space, env.observation_space["goals"], env.observation_space["covariance"]]
-
-
-def test_what_is_returned_is_what_was_seen(watched: APOReplay) -> None:
-    seen, _ = watched.reset(seed=SEED)
-    np.testing.assert_array_equal(seen["goals"], pose.pack(watched.seen.goals))
-    np.testing.assert_array_equal(seen["covariance"], watched.seen.covariance)
-    assert seen["seen"].tolist() == [1, 1, 1]
-    assert watched.seen.assembly is watched.assembly
-    assert [operation.main for operation in watched.assembly.operations] == ["castle1", "castle2", "stick"]
 
 
 def test_a_learner_may_write_into_what_it_was_given(env: APOReplay) -> None:
@@ -317,7 +311,7 @@ def test_one_step_is_one_episode(watched: APOReplay) -> None:
         watched.step(zeros(watched))
 
 
-@pytest.mark.parametrize("action", [np.zeros((3, 5)), np.full((3, 6), np.nan), np.full((3, 6), 0.6), np.zeros(18)])
+@pytest.mark.parametrize("action", [np.full((3, 6), np.nan), np.full((3, 6), 0.6), np.zeros(18)])
 def test_an_action_outside_the_space_is_refused(watched: APOReplay, action: Any) -> None:
     watched.reset(seed=SEED)
     with pytest.raises(InputError, match=r"action of shape"):
@@ -400,17 +394,9 @@ def test_poses_may_be_measured_in_depth_images() -> None:
     ("arguments", "words"),
     [
         ({"scenario": "stick_in_towr"}, "did you mean 'stick_in_tower'"),
-        ({"eye": "rang"}, "did you mean 'range'"),
         ({"level": "1"}, "level of APOReplay must be a number or a list"),
-        ({"level": True}, "level of APOReplay must be a number or a list"),
-        ({"level": -1}, "level in mm of -1"),
         ({"level": (1, 2, 3)}, "a pair of mm and degrees"),
-        ({"careless": float("nan")}, "carelessness of nan"),
         ({"noise": "isotropc"}, "did you mean 'isotropic'"),
-        ({"grasp": "glue"}, "unknown grasp 'glue'"),
-        ({"clearance_mm": -1.0}, "clearance of -1"),
-        ({"arm": "seven_axis"}, "did you mean 'six_axis'"),
-        ({"fidelity": "ful"}, "did you mean 'full'"),
         ({"fidelity": "contact", "grasp": "weld"}, "the fidelity 'contact' was given together with the grasp 'weld'"),
         ({"render_mode": "ansi"}, "use rgb_array, rgb_array_list, human or None"),
     ],
@@ -454,20 +440,6 @@ def test_a_picture_without_a_display(small: APOReplay) -> None:
     assert small._rendering.state is not None
     assert small._rendering.state.shape == small._scene.work.model.qpos0.shape
     assert np.abs(before.astype(int) - after.astype(int)).max() > 50
-
-
-def test_a_film_of_the_replay() -> None:
-    made = gymnasium.make("APOReplay-v0", scenario="block_on_block", grasp="weld", render_mode="rgb_array_list")
-    made.reset(seed=SEED)
-    (before,) = made.render()
-    made.step(zeros(made))
-    frames = made.render()
-    assert len(frames) > 20
-    assert {frame.shape for frame in (before, *frames)} == {(240, 320, 3)}
-    assert np.abs(frames[0].astype(int) - frames[-1].astype(int)).max() > 50
-    assert len(copy.deepcopy(made.unwrapped).render()) == len(frames)
-    made.reset(seed=SEED)
-    assert len(made.render()) == 1
 
 
 def test_the_fidelity_is_that_of_the_replay(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -546,19 +518,6 @@ def test_gymnasium_finds_nothing_to_warn_of() -> None:
         made = gymnasium.make("APOReplay-v0")
         made.reset(seed=0)
         made.step(np.full((3, 6), 0.05))
-
-
-@pytest.mark.slow
-def test_vector_environments_are_the_same_trials(small: APOReplay) -> None:
-    many = gymnasium.make_vec(
-        "APOReplay-v0", num_envs=2, vectorization_mode="async", scenario="block_on_block", grasp="weld"
-    )
-    try:
-        seen, _ = many.reset(seed=[SEED, SEED + 1])
-        for i in range(2):
-            np.testing.assert_array_equal(seen["goals"][i], small.reset(seed=SEED + i)[0]["goals"])
-    finally:
-        many.close()
 
 
 def test_record_video_films_the_whole_replay_when_it_is_asked_to_render(

@@ -232,20 +232,6 @@ def test_an_environment_without_a_simulation_has_no_physics() -> None:
         _ = to_dm_env(_Endless()).physics
 
 
-@needs_dm_control
-def test_it_runs_in_the_wrapper_of_dm_control_that_scales_actions() -> None:
-    from dm_control.suite.wrappers import action_scale
-
-    env = action_scale.Wrapper(to_dm_env(short(), seed=2), minimum=-1.0, maximum=1.0)
-    assert env.action_spec().maximum.max() == 1.0
-    step = env.reset()
-    steps = 0
-    while not step.last():
-        step = env.step(np.zeros(env.action_spec().shape))
-        steps += 1
-    assert (steps, step.reward) == (1, 1.0)
-
-
 def test_truncation_is_no_failure() -> None:
     """An episode that is cut off keeps its discount, so that a learner does not take it for an end."""
     env = to_dm_env(gymnasium.wrappers.TimeLimit(_Endless(), max_episode_steps=2))

@@ -64,7 +64,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.fixture(params=["megapose-lmo", "megapose-tless", "empirical"])
+@pytest.fixture(params=["megapose-lmo", "empirical"])
 def names(request: pytest.FixtureRequest, folder: Path) -> tuple[str, str]:
     """A noise model, and the same without outliers and misses."""
     if request.param == "empirical":
@@ -300,11 +300,7 @@ GOOD = noise_text(read_noise(presets()["megapose-lmo"])[0])
     [
         ('"apo-bench/noise/2"', '"apo-bench/noise/9"', 'schema: "apo-bench/noise/2" is needed'),
         ("missed_rate = 0.16609", "missed_rate = 1.5", "missed_rate: a number from 0 to 1 is needed, 1.5 was given"),
-        ("missed_rate = 0.16609", "mised_rate = 0.1", "unknown key 'mised_rate'; did you mean 'missed_rate'"),
-        ("along_scale_mm = 10.972", "along_scale_mm = 51", "along_scale_mm: a number from 0.0045 to 50 is needed"),
         ("along_scale_mm = 10.972\n", "", "the key 'along_scale_mm' is missing"),
-        ("along_degrees_of_freedom = 0.96916", "along_degrees_of_freedom = 0.1", "from 0.5 on, or inf, is needed"),
-        ("limit_mm = 50", "limit_mm = inf", "limit_mm: a number from 0.001 to 1000 is needed"),
         ("[turn]", "[turns]", "unknown key 'turns'; did you mean 'turn'"),
         ("[turn]", "[turn", "this is not TOML: .*line"),
     ],
@@ -325,7 +321,6 @@ def test_bad_noise_files_are_refused(
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("1,0,1,inlier,1,2,3,4,5", "line 2: 10 cells are needed"),
         (
             "1,0,1,good,1,2,3,4,5,6",
             "line 2, column kind: inlier, turned, outlier or missed is needed, 'good' was given",

@@ -192,12 +192,6 @@ def test_a_card_of_noise_that_sees_nothing_says_so(tmp_path: Path, capsys: pytes
     assert capsys.readouterr().out.endswith("\nNothing was seen: every operation of stick_in_tower was missed.\n")
 
 
-def test_help_says_that_noise_may_be_measured(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["replay", "--help"]) == 0
-    output = " ".join(capsys.readouterr().out.split())
-    assert "FILE.toml, empirical:FILE.csv, or package.module:name" in output
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -38,8 +38,6 @@ def test_numbers_are_those_of_their_kinds() -> None:
             "the robot error 'tool:1/2' was given; standard deviations in mm from 0 to 20 are allowed: tool:0.5.",
         ),
         ("hand_eye", "the robot error 'hand_eye' was given; standard deviations in mm and degrees from 0 to 20"),
-        ("hand_eye:nan", "the robot error 'hand_eye:nan' was given;"),
-        ("joints:21", "the robot error 'joints:21' was given; standard deviations in degrees from 0 to 20"),
     ],
 )
 def test_what_is_no_robot_error_is_one_sentence(given: str, said: str) -> None:
@@ -69,14 +67,7 @@ def test_what_a_robot_is_told_is_what_is_drawn_nothing_or_something_else(
     ("given", "said"),
     [
         ("drwan", "unknown stated error 'drwan'; did you mean 'drawn'?"),
-        ("", "unknown stated error ''."),
-        ("drawn+tool:1", "unknown stated error 'drawn+tool:1'"),
         ("tool:1+elbow:2", "unknown stated error 'tool:1+elbow:2'"),
-        (
-            "tool:1/2",
-            "the stated error 'tool:1/2' was given; standard deviations in mm from 0 to 20 are allowed: tool:0.5",
-        ),
-        ("tool:1+tool:2", "the stated error 'tool:1+tool:2' was given, which has tool twice; say it once."),
     ],
 )
 def test_what_is_no_stated_error_is_one_sentence(given: str, said: str) -> None:

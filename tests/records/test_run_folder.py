@@ -55,7 +55,7 @@ def line(seed: int) -> bytes:
     return json.dumps(row(seed)).encode() + b"\n"
 
 
-@pytest.mark.parametrize("what", ["folder", "file", "other"])
+@pytest.mark.parametrize("what", ["folder", "other"])
 def test_files_that_are_removed_meanwhile_are_put_back(what: str, tmp_path: Path) -> None:
     folder = tmp_path / "deep" / "run"
     with RunFolder(folder, run()) as store:
@@ -63,8 +63,6 @@ def test_files_that_are_removed_meanwhile_are_put_back(what: str, tmp_path: Path
             store.append(row(seed), {"seed": seed})
             if what == "folder" and seed in (1, 3):
                 shutil.rmtree(folder.parent)
-            elif what == "file" and seed == 2:
-                (folder / "trials.jsonl").unlink()
             elif what == "other" and seed == 2:
                 (folder / "trials.jsonl").replace(folder / "elsewhere")
                 (folder / "trials.jsonl").write_text("forged")
@@ -73,18 +71,6 @@ def test_files_that_are_removed_meanwhile_are_put_back(what: str, tmp_path: Path
     assert (folder / "timing.jsonl").read_bytes().count(b"\n") == 4
     with RunFolder(folder, run()) as store:
         assert len(store.finished) == 4
-
-
-def test_rows_are_put_back_where_the_current_folder_is_gone_too(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "here").mkdir()
-    monkeypatch.chdir(tmp_path / "here")
-    with RunFolder(Path("run"), run()) as store:
-        store.append(row(0), {})
-        shutil.rmtree(tmp_path / "here")
-        assert [one["seed"] for one in store.rows()] == [0]
-    assert (tmp_path / "here" / "run" / "trials.jsonl").read_bytes() == line(0)
 
 
 def test_rows_that_are_cut_off_meanwhile_are_said_to_be_lost(tmp_path: Path) -> None:
@@ -184,7 +170,7 @@ def test_timing_does_not_matter(tmp_path: Path) -> None:
     assert seeds == [0, 3, 4]
 
 
-@pytest.mark.parametrize("room", [0, 1, 700, 1500, 3000])
+@pytest.mark.parametrize("room", [0, 1500])
 def test_a_full_disk_takes_back_half_a_row(room: int, tmp_path: Path) -> None:
     write(tmp_path, range(2))
     size = (tmp_path / "trials.jsonl").stat().st_size
@@ -266,14 +252,8 @@ def test_run_json_is_the_old_one_or_the_new_one(tmp_path: Path, monkeypatch: pyt
             "(code: apo_bench/simulation/execution/attach.py changed)",
         ),
         ({"code": {**CODE, "new.py": "1", "a.py": "2"}}, "(code: apo_bench/a.py and 1 more changed)"),
-        ({"code": {}}, "(code: apo_bench/judging/verdict.py and 1 more changed)"),
-        (
-            {"content": CONTENT | {"block_on_block, part cube": "0"}},
-            "(inputs changed: block_on_block, part cube)",
-        ),
         ({"content": CONTENT | {"method mine:fit": "0"}}, "(inputs changed: method mine:fit)"),
         ({"grids": [GRID | {"levels": [2.0]}]}, "(grid: levels was [1.0], now [2.0])"),
-        ({"grids": [GRID | {"trials": 59}]}, "(grid: trials was 60, now 59)"),
         ({"grids": [GRID, GRID]}, "(it had 1 grids, now 2)"),
     ],
 )
@@ -291,16 +271,12 @@ def test_what_changed_is_said(changed: dict[str, Any], words: str, tmp_path: Pat
     ("name", "text", "words"),
     [
         ("run.json", "{", "has trials but no readable run.json"),
-        ("run.json", "[]", "has trials but no readable run.json"),
         ("run.json", '{"schema": "apo-bench/run/2"}', "'apo-bench/run/3' is needed"),
-        ("run.json", '{"schema": "apo-bench/run/3"}', "it had 0 grids, now 1"),
         (
             "trials.jsonl",
             json.dumps(row(1) | {"schema": "apo-bench/row/10"}) + "\n",
             "'apo-bench/row/10' was given; only apo-bench/row/9 can be read",
         ),
-        ("trials.jsonl", "{}\n", "line 1, field schema: it is missing"),
-        ("trials.jsonl", "[1, 2]\n", "line 1: an object is needed, a list was given"),
         ("trials.jsonl", "\xff\n", "line 1: this is not a row of a sweep"),
     ],
 )

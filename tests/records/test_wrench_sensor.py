@@ -5,29 +5,22 @@ from __future__ import annotations
 import pytest
 
 from apo_bench import InputError
-from apo_bench.records import USUAL_WRENCH, checked_wrench, wrench_noise
+from apo_bench.records import checked_wrench, wrench_noise
 
 
 @pytest.mark.parametrize(
     ("given", "spelled", "noise"),
     [
         ("ideal", "ideal", (0.0, 0.0)),
-        ("0", "ideal", (0.0, 0.0)),
-        ("external", "external", (0.1, 0.005)),
         ("0.10", "external", (0.1, 0.005)),
         (".2/.01", "external-coarse", (0.2, 0.01)),
         ("cobot", "cobot", (3.5, 0.2)),
         ("0.5", "0.5/0.025", (0.5, 0.025)),
-        ("1.0/0.02", "1/0.02", (1.0, 0.02)),
     ],
 )
 def test_a_name_is_spelled_in_one_way_that_reads_back(given: str, spelled: str, noise: tuple[float, float]) -> None:
     assert checked_wrench(given) == spelled == checked_wrench(spelled)
     assert wrench_noise(given) == noise == wrench_noise(spelled)
-
-
-def test_the_usual_sensor_is_a_good_one_between_arm_and_hand() -> None:
-    assert wrench_noise(USUAL_WRENCH) == (0.1, 0.005)
 
 
 @pytest.mark.parametrize(
@@ -37,14 +30,8 @@ def test_the_usual_sensor_is_a_good_one_between_arm_and_hand() -> None:
             "cobott",
             "unknown wrench sensor 'cobott'; did you mean 'cobot'? Known: cobot, external, external-coarse, ide",
         ),
-        ("", "unknown wrench sensor ''. Known: cobot, external, external-coarse, ideal. Or give its noise in N and Nm"),
-        ("nan", "unknown wrench sensor 'nan'"),
         ("-1", "the wrench sensor '-1' was given; standard deviations from 0 to 10 N and from 0 to 5 Nm are allowed"),
-        ("0.1/0.005/1", "the wrench sensor '0.1/0.005/1' was given;"),
         ("0.1/nan", "the wrench sensor '0.1/nan' was given;"),
-        ("0.1N", "the wrench sensor '0.1N' was given;"),
-        ("10.5/1", "the wrench sensor '10.5/1' was given;"),
-        ("1e400", "the wrench sensor '1e400' was given;"),
     ],
 )
 def test_what_is_no_wrench_sensor_is_one_sentence(given: str, said: str) -> None:

@@ -41,13 +41,7 @@ WRONG = {
         '<worldbody><flexcomp name="f" type="grid" count="3 3 3" spacing="1 1 1" radius="0.1" dim="3"/>',
         "has flexes; an arm has rigid bodies",
     ),
-    "a field of heights": (
-        END,
-        '<asset><hfield name="h" nrow="2" ncol="2" size="1 1 1 1"/></asset></mujoco>',
-        "has hfields",
-    ),
     "a mocap body": (WORLD, '<worldbody><body name="led" mocap="true"/>', "'led' of the arm is a mocap body"),
-    "a free body": (WORLD, f"<worldbody>{BALL.format('<freejoint/>')}", "neither turns nor slides"),
     "a ball joint": (WORLD, "<worldbody>" + BALL.format("<joint type='ball'/>"), "neither turns nor slides"),
     "a second arm": (WORLD, f"<worldbody>{BALL.format('<joint/>')}", "2 bodies that move on their own"),
     "tied to the world": (

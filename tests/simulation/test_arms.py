@@ -84,7 +84,8 @@ def test_what_is_measured_of_a_known_gripper_is_what_its_file_says(six_axis_file
 
     Fingers at rest stand up to 20 um beside each other, and so does the middle between them.
     """
-    arm = read_arm(six_axis_file)
+    arm = find_arm(str(six_axis_file))
+    assert arm.files[0] == six_axis_file
     known = find_arm("six_axis")
     assert arm.hand is not None
     assert arm.control == "own position actuators"
@@ -179,33 +180,20 @@ GRIPPER = '[gripper]\nmjcf = "ARMS/linkage_gripper.xml"\n'
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("", "the key 'schema' is missing"),
         ('schema = "apo-bench/arm/9"\nmjcf = "a.xml"', "is needed"),
         (GOOD + "joint = 1", "unknown key 'joint'; did you mean 'joints'"),
-        (GOOD + "payload_kg = -1", "payload_kg"),
-        (GOOD + "speed_deg_s = [0, 1]", "above 0"),
         (GOOD + "[gripper]\nspeed_mm_s = 0", "above 0"),
-        (GOOD + "[gripper]\nforce_n = 500", "force_n"),
         (GOOD + "[gripper]\nopen = [1]", "'open' and 'closed' are given together"),
         ('schema = "apo-bench/arm/1"\nmjcf = "no.xml"', "the model file of the arm is missing"),
-        ('schema = "apo-bench/arm/1"\nmjcf = "/dev/zero"', "the model file of the arm is missing"),
-        ('schema = "apo-bench/arm/1"\nmjcf = "broken.xml"', "MuJoCo cannot read this model file of the arm"),
-        ('schema = "apo-bench/arm/1"\nmjcf = "meshes.xml"', r"the mesh file .*link.stl of the arm is missing"),
         (GOOD + 'flange = "flnge"\n' + GRIPPER, "unknown flange 'flnge'; did you mean 'flange'"),
         (GOOD + 'joints = ["joint1"]\n' + GRIPPER, "between base and flange lie joint1, joint2"),
         (GOOD + "home_deg = [1, 2]\n" + GRIPPER, "'home_deg' has 2 numbers; the arm has 6 joints"),
         (GOOD, "the gripper has no joint"),
-        (GOOD + GRIPPER + 'actuators = ["grab"]', "there is no actuator"),
         (GOOD + GRIPPER + 'pads = ["left_pad", "nothing"]', "nothing that could touch a part is called"),
         (GOOD + "base = { at_mm = [1900, 0, 0] }\n" + GRIPPER, "the tip does not reach"),
     ],
 )
 def test_what_is_wrong_in_a_file_is_said_in_one_sentence(tmp_path: Path, text: str, words: str) -> None:
-    (tmp_path / "broken.xml").write_text("<mujoco><worldbody><geom/></worldbody>")
-    (tmp_path / "meshes.xml").write_text(
-        '<mujoco><asset><mesh file="link.stl"/></asset><worldbody><body><geom type="mesh" mesh="link"/></body>'
-        "</worldbody></mujoco>"
-    )
     path = tmp_path / "arm.toml"
     path.write_text(text.replace("ARMS", str(ARMS)))
     with pytest.raises(InputError, match=words) as found:
@@ -387,11 +375,6 @@ def described(folder: Path, said: str) -> Path:
     return path
 
 
-def test_an_arm_can_be_given_as_a_file(six_axis_file: Path) -> None:
-    assert isinstance(find_arm(str(six_axis_file)), Arm)
-    assert find_arm(str(six_axis_file)).files[0] == six_axis_file
-
-
 STATED = """schema = "apo-bench/arm/1"
 mjcf = "MODEL"
 flange = "gripper"
@@ -452,17 +435,11 @@ def test_the_base_of_a_stated_arm_may_be_turned(tmp_path: Path) -> None:
     ("changes", "said"),
     [
         ([("opening_mm = 46\n", "")], "'tip', 'slides', 'opening_mm' and 'actuators' are given together"),
-        ([('actuators = ["grip"]\n', "")], "'tip', 'slides', 'opening_mm' and 'actuators' are given together"),
         ([("opening_mm = 46", "opening_mm = 46\nforce_n = 20")], "force_n: a gripper whose 'slides' are stated"),
         ([('"grip"', '"grip", "j1"')], "one of 'actuators' drives all 'slides'; 2 were given"),
-        ([('tip = "tip"', 'tip = "tap"')], "did you mean 'tip'"),
-        ([('"left_finger"', '"left_thumb"')], "unknown slide 'left_thumb'. Known: left_finger, right_finger"),
         ([('"right_finger"', '"j1"')], "unknown slide 'j1'"),
-        ([('"grip"', '"grap"')], "did you mean 'grip'"),
-        ([("home_deg = [0, 11, 52, 0, 27, 0]\n", "")], "'home_deg' needs 6 numbers"),
         ([("[0, 11, 52, 0, 27, 0]", "[0, 11, 52]")], "'home_deg' needs 6 numbers"),
         ([("[gripper]", "torque_nm = 100\n[gripper]")], "'torque_nm' is for an arm whose gripper is measured"),
-        ([("[gripper]", "speed_deg_s = [1, 2]\n[gripper]")], "'speed_deg_s' has 2 numbers; the arm has 6 joints"),
     ],
 )
 def test_what_is_wrong_with_a_stated_gripper_is_one_sentence(

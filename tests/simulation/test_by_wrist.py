@@ -40,8 +40,7 @@ def push_on_table(scene: Scene, robot: Robot) -> float:
     return float(np.linalg.norm(total))
 
 
-@pytest.mark.parametrize("arm", ["six_axis", "ur5e_primitive"])
-@pytest.mark.parametrize("asleep", [True, False])
+@pytest.mark.parametrize(("arm", "asleep"), [("six_axis", True), ("ur5e_primitive", False)])
 def test_an_empty_hand_that_presses_on_the_table_is_stopped(arm: str, asleep: bool) -> None:
     """By its base, which cannot move either, the arm felt nothing of the table, and pressed with 320 N."""
     scene = build_scene(load_scenario("stick_in_tower"), arm=arm)

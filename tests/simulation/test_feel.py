@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from apo_bench import Plan, build_scene, load_scenario
-from apo_bench.geometry import extent, pose
+from apo_bench.geometry import pose
 from apo_bench.records import wrench_noise
-from apo_bench.simulation.execution.beside import Flush
 from apo_bench.simulation.execution.controller import replay
-from apo_bench.simulation.execution.feel.feeling import ACTS, Feeling, touch_guard
-from apo_bench.simulation.execution.feel.places import floor_places, opposite_places, wall_places
-from apo_bench.simulation.execution.feel.touching import _Laying, _stand_off, averaged_s, find_out
+from apo_bench.simulation.execution.feel.feeling import Feeling, touch_guard
+from apo_bench.simulation.execution.feel.places import floor_places, wall_places
+from apo_bench.simulation.execution.feel.touching import _stand_off, find_out
 from apo_bench.simulation.execution.prepare import moves
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.robot_error import RobotError
@@ -118,48 +117,6 @@ def test_walls_that_recede_are_expected_where_they_are():
     assert widths == pytest.approx([0.0505] * 4, abs=1e-9)
 
 
-def test_opposite_sides_of_the_fingers_touch_the_same_wall():
-    first, second = opposite_places(plan("peg_in_hole"), scene("peg_in_hole"))
-    assert first.normal == pytest.approx(second.normal)
-    assert first.T_world_tip[:3, 0] == pytest.approx(-second.T_world_tip[:3, 0])
-    assert not opposite_places(plan("stick_in_tower"), scene("stick_in_tower"))
-
-
-def test_what_is_inserted_level_lies_flat_first():
-    felt = moves(plan("stick_in_tower"), scene("stick_in_tower"), True, ("lay", "square"))
-    assert [move.transfer.flush is not None for move in felt] == [False, False, True]
-    flush = felt[-1].transfer.flush
-    pieces = scene("stick_in_tower").pieces["stick"]
-    assert flush.T[2, 3] + extent(pieces, flush.T[2, :3])[0] == pytest.approx(0.0, abs=1e-12)
-    assert pose.apply(flush.T, flush.feet)[:, 2] == pytest.approx(0.0, abs=1e-12)
-    assert len(flush.feet) == 4
-    assert np.ptp(flush.feet, axis=0).max() > 0.1
-
-
-def test_what_is_inserted_from_above_touches_a_wall_low_and_high():
-    """Leaned towards the wall the peg touches its upper edge first, with the pads along the way of the touch."""
-    plate, peg = (move.transfer for move in moves(plan("peg_in_hole"), scene("peg_in_hole"), True, ACTS))
-    assert not plate.beside
-    low, high = peg.beside
-    assert high.point[2] - low.point[2] > 0.01
-    for place in peg.beside:
-        touched = pose.apply(place.T, place.point[None])[0]
-        assert touched - place.edge == pytest.approx(0.004 * place.normal, abs=1e-9)
-        assert np.linalg.norm(place.point[:2]) == pytest.approx(0.005, abs=1e-5)
-        assert np.degrees(np.arccos(place.T[2, 2])) == pytest.approx(3.0)
-        assert place.T[:3, 2] @ place.way == pytest.approx(np.sin(np.radians(3.0)))
-        along_pads = (place.T @ peg.grips[0].T_part_tip)[:3, 1]
-        assert abs(along_pads @ place.way) == pytest.approx(np.cos(np.radians(3.0)))
-    assert not any(move.transfer.beside for move in moves(plan("stick_in_tower"), scene("stick_in_tower"), True, ACTS))
-
-
-def test_what_is_felt_for_begins_before_the_first_mouth():
-    """The peg goes into the plate 40 mm before its goal, and into the base 20 mm before it."""
-    blind, felt = (moves(plan("peg_in_hole"), scene("peg_in_hole"), True, acts)[-1].transfer for acts in ((), ACTS))
-    assert felt.mouths == pytest.approx((0.04, 0.02))
-    assert blind.slow < felt.mouths[0] < felt.slow < felt.begins
-
-
 def test_a_round_peg_that_slipped_and_tipped_in_the_hand_is_known_by_its_side():
     """Turned by 1.7 degrees between the pads: laid on its small foot it is known to a degree, by a wall much better."""
     name = "peg_in_hole"
@@ -178,34 +135,6 @@ def test_a_robot_that_does_not_feel_does_nothing_besides():
         assert move.transfer.flush is None
         assert not move.transfer.beside
         assert not move.transfer.in_last
-
-
-@pytest.mark.parametrize("half", [0.08, 0.005])
-def test_a_part_that_is_pressed_on_comes_to_lie(half):
-    """Two feet on springs: tilted by 1 degree, it turns until both carry."""
-    feet = np.array([[-half, 0.0, 0.0], [half, 0.0, 0.0], [0.0, -half, 0.0], [0.0, half, 0.0]])
-    law = _Laying(Flush(np.eye(4), np.array([0.0, 0.0, 1.0]), feet), 0.1)
-    tilt, wrench, offset = np.radians(1.0), np.zeros(6), np.zeros(6)
-    while (wanted := law(wrench)) is not None:
-        offset = wanted
-        turned = tilt + offset[4]
-        heights = 0.002 + offset[2] - turned * feet[:, 0] + offset[3] * feet[:, 1]
-        pushes = 20_000.0 * np.maximum(0.0, -heights)
-        wrench = np.array([0.0, 0.0, pushes.sum(), feet[:, 1] @ pushes, -feet[:, 0] @ pushes, 0.0])
-    assert law.lies
-    assert abs(tilt + offset[4]) < np.radians(0.1)
-
-
-def test_a_sensor_is_averaged_until_it_tells_lying():
-    """The torque of 3 N on a foot 5 mm off is 15 mNm: an external sensor tells it, an arm's own one does not."""
-    small, long = (
-        Flush(np.eye(4), np.array([0.0, 0.0, 1.0]), np.array([[-r, 0, 0], [r, 0, 0]])) for r in (0.005, 0.08)
-    )
-    external, own = (0.0224, 0.00112), (0.78, 0.045)
-    assert averaged_s(long, external) == 0.1
-    assert 0.1 < averaged_s(small, external) < 1.0
-    assert 1.0 < averaged_s(long, own) < 3.0
-    assert averaged_s(small, own) > 100.0
 
 
 def test_touches_tell_where_the_base_and_the_tool_are():

@@ -18,18 +18,6 @@ def test_a_blow_shows_its_impulse_whatever_the_step(step_s: float) -> None:
     assert wrist([0.0, 0.0, 0.06 / step_s], step_s)[2] == pytest.approx(3.0)
 
 
-def test_a_steady_push_is_shown_as_it_is_and_fades() -> None:
-    wrist = LowPass(WRIST_S)
-    for _ in range(20):
-        wrist([1.0, -2.0, 5.0], 0.001)
-    # (1 - 1/20)^20 = 0.358 are missing after one time constant.
-    assert wrist.force == pytest.approx([0.642, -1.283, 3.208], abs=2e-3)
-    for _ in range(200):
-        wrist([1.0, -2.0, 5.0], 0.001)
-    assert wrist.force == pytest.approx([1.0, -2.0, 5.0], abs=1e-3)
-    assert wrist([0.0, 0.0, 0.0], WRIST_S) == [0.0, 0.0, 0.0]
-
-
 def test_the_peak_of_a_replay_hardly_depends_on_the_step(tower: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     layout = draw_layout(tower.scenario, np.random.default_rng([2, 0]), tower.clearance_mm)
     plan = Plan(tower.scenario.assembly, layout.start, layout.goals)

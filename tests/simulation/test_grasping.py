@@ -17,7 +17,6 @@ from apo_bench.simulation.execution.grasping import (
     grasp_at,
     half_width,
     obstacles,
-    tip_frame,
 )
 from apo_bench.simulation.execution.prepare import Move, moves
 from apo_bench.simulation.execution.transfer import is_tilted
@@ -88,31 +87,6 @@ def test_pulling_out_is_pushing_in_backwards(pockets: Scene) -> None:
     np.testing.assert_allclose(out.T_world_goal, into.T_world_start)
 
 
-def test_a_part_beside_another_is_taken_where_there_is_room_for_the_fingers(fixture: Scene) -> None:
-    plan = nominal(fixture)
-    poses = placements(plan.assembly, plan.start, plan.goals)[2]
-    place = RestingPart(poses["cube"], obstacles(plan.assembly.solids, poses, ("cube",)))
-    grasp = grasp_at(fixture, "cube", Grasp(np.array([0.0, 0.0, 0.008]), np.array([0.0, 1.0, 0.0])), [place])
-    assert abs(grasp.across[0]) == 1.0
-
-
-def test_a_clear_preferred_grasp_is_kept(fixture: Scene) -> None:
-    plan = nominal(fixture)
-    preferred = Grasp(np.array([0.0, 0.0, 0.008]), np.array([0.0, 1.0, 0.0]))
-    place = RestingPart(plan.start["cube"], obstacles(plan.assembly.solids, plan.start, ("cube",)))
-    assert grasp_at(fixture, "cube", preferred, [place]) is preferred
-
-
-def test_the_tip_looks_down_however_the_part_lies() -> None:
-    for turn in ((0, 0, 30), (180, 0, 0), (0, 90, 0)):
-        T = pose.at((0, 0, 0), turn)
-        across = T[:3, :3].T @ np.array([0.6, 0.8, 0.0])
-        tip = T @ tip_frame(Grasp(np.zeros(3), across), T)
-        np.testing.assert_allclose(tip[:3, 2], [0, 0, -1], atol=1e-12)
-        np.testing.assert_allclose(tip[:3, 0], [0.6, 0.8, 0], atol=1e-12)
-        assert np.linalg.det(tip[:3, :3]) == pytest.approx(1.0)
-
-
 def test_side_contacts_are_slid_onto_and_left_sideways_and_a_fixture_comes_back_the_same_way(fixture: Scene) -> None:
     schedule = (*(Step(k) for k in range(4)), Step(3, undo=True))
     done = moves(nominal(fixture, schedule), fixture)
@@ -133,15 +107,6 @@ def fixture_side(scene: Scene) -> Array:
     return nominal(scene).goals[2][:3, 1]
 
 
-def test_a_part_that_matters_both_ways_is_centred_once_more(pockets: Scene) -> None:
-    """Cube 2 of Fig. 6: its place along the stick and across it; cube 3 is settled by fingers and slide."""
-    done = moves(nominal(pockets), pockets)
-    assert [len(move.transfer.centring) for move in done] == [0, 1, 0, 0, 0, 0]
-    held = done[1].transfer.grips[0].T_part_tip
-    centred = done[1].transfer.centring[0].T_part_tip
-    assert abs(held[:3, 0] @ centred[:3, 0]) < 1e-9
-
-
 def test_a_part_is_centred_across_walls_that_are_along_none_of_its_axes(tmp_path: Path) -> None:
     """A block with sides turned by 30 degrees in its frame: held across two, centred across those that will touch."""
     turn = pose.at((0, 0, 0), (0, 0, -30))[:2, :2]
@@ -158,13 +123,6 @@ def test_a_part_is_centred_across_walls_that_are_along_none_of_its_axes(tmp_path
     scene = build_scene(scenario(tmp_path, {"first": block, "second": block}, operations, goals, start, grasps))
     (centring,) = moves(nominal(scene), scene)[0].transfer.centring
     assert abs(centring.T_part_tip[:3, 0] @ x) == pytest.approx(1.0)
-
-
-def test_a_group_is_lifted_not_pulled_out(pockets: Scene) -> None:
-    done = moves(nominal(pockets), pockets)
-    assert done[5].transfer.carried == ("cube2", "cube3")
-    assert not done[5].transfer.out.level
-    assert done[5].transfer.weight_n == pytest.approx(9.81 * (0.0528 + 2 * 0.063), rel=0.06)
 
 
 def test_undoing_and_doing_again_at_once_is_one_move(fixture: Scene) -> None:

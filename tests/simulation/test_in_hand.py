@@ -37,15 +37,11 @@ def carried_mm(scene: Scene) -> list[float]:
     return [1e3 * each.carried_m for each in result.in_hand]
 
 
-@pytest.mark.parametrize("shape", ["boxes", "round"])
-def test_what_is_carried_does_not_creep(
-    shape: str, tower: Scene, round_scene: Scene, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_is_carried_does_not_creep(round_scene: Scene, monkeypatch: pytest.MonkeyPatch) -> None:
     """The documentation says by how much it would; where it would not, this file is no longer needed."""
-    scene = tower if shape == "boxes" else round_scene
-    assert max(carried_mm(scene)) < STAYS_MM
+    assert max(carried_mm(round_scene)) < STAYS_MM
     monkeypatch.setattr(Robot, "steady", lambda robot, on: None)
-    alone = carried_mm(scene)
+    alone = carried_mm(round_scene)
     assert all(0.15 < each < 0.85 for each in alone)
 
 

@@ -48,7 +48,7 @@ def names(scenario: Scenario) -> list[list[str]]:
     return [list(each.names) for each in nominal_operations(scenario)]
 
 
-@pytest.mark.parametrize("short_mm", [0.0, 1.0, -2.0])
+@pytest.mark.parametrize("short_mm", [1.0, -2.0])
 def test_a_bottom_is_felt(tmp_path: Path, short_mm: float) -> None:
     """Through one cube into a blind hole: pushed on until the bottom is met, also where it was planned elsewhere."""
     contacts = f'{HOLE.format("cube")}, {HOLE.format("holder")}, ["px", "holder.bottom"]'
@@ -58,13 +58,12 @@ def test_a_bottom_is_felt(tmp_path: Path, short_mm: float) -> None:
     assert done(scenario, (-short_mm, 0, 0)).verdict.as_demonstrated
 
 
-@pytest.mark.parametrize("short_mm", [0.0, 3.0])
-def test_the_end_of_a_slot_is_felt(tmp_path: Path, short_mm: float) -> None:
+def test_the_end_of_a_slot_is_felt(tmp_path: Path) -> None:
     stand = {"castle": ("castle", (0, 0, 0)), "stop": ("block", (135, 0, 25))}
     goal = f'goal = {{ at_mm = [0, 0, 40] }}\ncontacts = [{SLOT}, ["px", "stop.nx"]]'
     scenario = own(tmp_path, goal, **stand)
     assert names(scenario) == [["insert-into-slot", "move-to-contact", "slide-to-contact"]]
-    assert done(scenario, (-short_mm, 0, 0)).verdict.as_demonstrated
+    assert done(scenario, (-3.0, 0, 0)).verdict.as_demonstrated
 
 
 def test_a_slot_may_be_entered_from_its_end(tmp_path: Path) -> None:
@@ -95,8 +94,7 @@ def test_undoing_puts_a_stick_back_into_its_hole(tmp_path: Path) -> None:
     assert done(scenario, schedule=(Step(0), Step(1), Step(1, True), Step(1))).verdict.as_demonstrated
 
 
-@pytest.mark.parametrize("off_mm", [0.0, 2.0])
-def test_a_corner_is_felt_from_both_sides(tmp_path: Path, off_mm: float) -> None:
+def test_a_corner_is_felt_from_both_sides(tmp_path: Path) -> None:
     """Into the corner, out of it sideways and away, back into it, and away again; planned 2 mm inside of the walls."""
     text = 'schema = 1\ntitle = "own"\n[parts.table]\nfile = "table"\nfixed = true\n'
     for name, x, y in (("left", 75, 0), ("back", 0, 50)):
@@ -111,7 +109,7 @@ def test_a_corner_is_felt_from_both_sides(tmp_path: Path, off_mm: float) -> None
     slides = ["slide-to-contact", "slide-to-contact"]
     assert names(scenario) == [["move-to-contact", *slides], ["depart", "depart", "move-to-contact"]]
     schedule = (Step(0), Step(1), Step(1, True), Step(1))
-    tried = done(scenario, (off_mm, off_mm, 0), schedule)
+    tried = done(scenario, (2.0, 2.0, 0), schedule)
     assert tried.result.outcome.code == "ok"
     assert [
         c.contact.environment.part for c in tried.verdict.demonstrated.contacts if c.operation == 0 and c.strict

@@ -88,8 +88,7 @@ def felt(robot: Robot, wrist: WristSensor, about: Array, seconds: float = 0.1) -
     return np.mean(out, axis=0)
 
 
-@pytest.mark.parametrize("grasp", ["friction", "weld"])
-@pytest.mark.parametrize("along", [0.0, 0.06])
+@pytest.mark.parametrize(("grasp", "along"), [("friction", 0.06), ("weld", 0.0)])
 def test_in_free_air_a_held_part_is_not_felt(grasp: str, along: float) -> None:
     robot, wrist, _ = with_stick(grasp, "ideal", along)
     home = robot.T
@@ -106,8 +105,7 @@ def test_in_free_air_a_held_part_is_not_felt(grasp: str, along: float) -> None:
     assert felt(robot, wrist, robot.T[:3, 3])[2] == pytest.approx(-0.492, abs=0.01)
 
 
-@pytest.mark.parametrize("asleep", [True, False])
-@pytest.mark.parametrize("arm", ["six_axis", "ur5e_primitive", "panda_primitive"])
+@pytest.mark.parametrize(("arm", "asleep"), [("six_axis", True), ("ur5e_primitive", False), ("panda_primitive", True)])
 def test_a_press_stops_where_the_hand_touches(arm: str, asleep: bool) -> None:
     scene = scene_of(arm)
     with sleeping(scene.work, asleep):
@@ -146,8 +144,7 @@ class Pushing:
         return None if self.left < 0 else np.array([0.0, 0.0, self.z, 0.0, 0.0, 0.0])
 
 
-@pytest.mark.parametrize("newton", [2.0, 5.0])
-@pytest.mark.parametrize("arm", ["six_axis", "ur5e_primitive", "panda_primitive"])
+@pytest.mark.parametrize(("arm", "newton"), [("six_axis", 2.0), ("ur5e_primitive", 5.0), ("panda_primitive", 2.0)])
 def test_a_push_on_the_table_is_felt_as_the_contacts_exert_it(arm: str, newton: float) -> None:
     """Force and torque about the tip, against the contact sensor and the sum over all contacts, within 5 mN, 1 mNm."""
     scene = scene_of(arm)
@@ -179,13 +176,12 @@ def by_contacts(robot: Robot, about: Array) -> Array:
     return total
 
 
-@pytest.mark.parametrize("newton", [2.0, 5.0])
-def test_half_the_time_step_changes_what_is_felt_by_little(newton: float) -> None:
+def test_half_the_time_step_changes_what_is_felt_by_little() -> None:
     """In the first tenth of a second of a touch by 0.3 N and 25 mNm, then by 0.1 N; where it rests by 5 mN ahead."""
     series = []
     for step_s in (0.001, 0.0005):
         robot, wrist = empty_hand(scene_of(step_s=step_s), "external", 0.0105)
-        law = Pushing(newton, 2.0)
+        law = Pushing(5.0, 2.0)
         comply(robot, law, robot.T[:3, 3], wrist)
         series.append(np.array(law.felt))
     off = np.abs(series[1] - series[0])
@@ -214,8 +210,9 @@ class Levelling(Pushing):
         return offset
 
 
-@pytest.mark.parametrize("tilt_deg", [1.0, -1.0])
-@pytest.mark.parametrize(("grasp", "along"), [("friction", 0.0), ("friction", 0.04), ("weld", 0.04)])
+@pytest.mark.parametrize(
+    ("grasp", "along", "tilt_deg"), [("friction", 0.0, 1.0), ("friction", 0.04, -1.0), ("weld", 0.04, 1.0)]
+)
 def test_a_part_that_is_pressed_at_its_edge_tilts_the_right_way(grasp: str, along: float, tilt_deg: float) -> None:
     """To within 0.01 degrees along the stick of 220 mm, behind noise of 0.1 N and 5 mNm."""
     robot, wrist, _ = with_stick(grasp, "external", along, 0.004)

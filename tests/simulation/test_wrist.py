@@ -13,10 +13,10 @@ from apo_bench.geometry import pose
 from apo_bench.records import WrenchNoise
 from apo_bench.simulation.robot.by_wrist import reading, wrist_of, zero
 from apo_bench.simulation.robot.robot import Robot
-from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, OFFSETS, Guard, Load, WristSensor, hand_load
+from apo_bench.simulation.robot.wrist import BANDWIDTH_HZ, OFFSETS, Guard, WristSensor
 from apo_bench.simulation.scene.world import wrist_felt
 
-ARMS = ("six_axis", "ur5e_primitive", "panda_primitive")
+ARMS = ("six_axis", "ur5e_primitive")
 POSES = (((0.1, 0.16, 0.2), (0, 0, 0)), ((0.2, -0.1, 0.25), (20, 0, 0)), ((0.1, 0.1, 0.22), (0, -25, 40)))
 
 
@@ -39,13 +39,6 @@ def of_weights(made: SimpleNamespace) -> np.ndarray:
     return made.sensor._weights @ made.sensor._sensor()[2, :3]
 
 
-def test_the_hand_is_known_by_the_model_of_the_arm(tower: Scene) -> None:
-    """0.8 kg at 30 mm and two fingers of 0.05 kg at 90 mm, the tip at 125 mm."""
-    load = hand_load(tower.kinematics, tower.arm, 0.02)
-    assert load.mass_kg == pytest.approx(0.9)
-    assert load.center == pytest.approx([0.0, 0.0, (0.8 * 0.03 + 0.1 * 0.09) / 0.9 - 0.125], abs=1e-9)
-
-
 def test_noise_is_white_at_a_thousand_readings_a_second_and_behind_the_low_pass_as_stated(tower: Scene) -> None:
     made = wrist(tower, WrenchNoise(0.1, 0.005))
     felt = shown(made, 60_000)[100:]
@@ -59,7 +52,7 @@ def test_noise_is_white_at_a_thousand_readings_a_second_and_behind_the_low_pass_
         assert np.corrcoef(felt[:-k, 0], felt[k:, 0])[0, 1] == pytest.approx(part**k, abs=0.03)
 
 
-@pytest.mark.parametrize("bandwidth_hz", [8.0, 16.0, 50.0])
+@pytest.mark.parametrize("bandwidth_hz", [8.0, 50.0])
 def test_a_sine_at_the_bandwidth_is_felt_at_seven_tenths(tower: Scene, bandwidth_hz: float) -> None:
     made = wrist(tower, WrenchNoise(0.0, 0.0), bandwidth_hz=bandwidth_hz)
     axis = made.sensor._sensor()[:3, 0]
@@ -71,7 +64,7 @@ def test_a_sine_at_the_bandwidth_is_felt_at_seven_tenths(tower: Scene, bandwidth
     assert np.ptp(felt[-round(2000 / bandwidth_hz) :]) / 2 == pytest.approx(np.sqrt(0.5), rel=0.09)
 
 
-@pytest.mark.parametrize("step_s", [0.0005, 0.00025, 0.0001])
+@pytest.mark.parametrize("step_s", [0.0005, 0.0001])
 def test_a_blow_and_the_noise_are_felt_alike_whatever_the_step(tower: Scene, step_s: float) -> None:
     """0.03 Ns in a millisecond, in one step or in ten: each reading is a mean, and has the same noise."""
     felt = []
@@ -125,17 +118,6 @@ def test_force_and_torque_are_those_of_the_surroundings_about_the_point_that_is_
     assert made.sensor.stops(Guard(np.array([0.0, 0.0, -1.0]), 4.9))
     assert not made.sensor.stops(Guard(np.array([0.0, 0.0, -1.0]), 5.1))
     assert not made.sensor.stops(None)
-
-
-def test_a_part_that_is_said_to_be_held_weighs_at_its_centre(tower: Scene) -> None:
-    made = wrist(tower, WrenchNoise(0.0, 0.0))
-    made.signal[:] = of_weights(made)
-    made.sensor.hold(Load(0.5, np.array([0.02, 0.0, 0.0])))
-    made.sensor.take(0.001)
-    tip = tower.kinematics.forward(np.array(tower.arm.home))
-    felt = made.sensor.wrench(tip[:3, :3] @ [0.02, 0.0, 0.0] + tip[:3, 3])
-    # The sensor shows the hand alone, so something holds the part up: 0.5 kg at its centre.
-    assert felt == pytest.approx([0, 0, 0.5 * 9.81, 0, 0, 0], abs=1e-9)
 
 
 @pytest.mark.parametrize("arm", ARMS)

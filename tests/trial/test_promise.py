@@ -12,7 +12,7 @@ import pytest
 from apo_bench import Scene, TrialSettings, build_scene, load_scenario, run_trial
 from apo_bench.assembly import Hypothesis, Observation
 from apo_bench.correction.correctors import correct
-from apo_bench.geometry import Array, pose
+from apo_bench.geometry import pose
 from apo_bench.records import Row
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.statistics import tally
@@ -20,12 +20,11 @@ from apo_bench.trial import trial
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.promise import Explanation, abstained, drawn_truths, promised_success
 from apo_bench.trial.promise_table import RATES, SCORES
-from apo_bench.trial.robot_draws import brought, left_after_feeling
+from apo_bench.trial.robot_draws import brought
 from apo_bench.trial.stages import (
     SimulatedDemonstration,
     draw_robot_error,
     observe_demonstration,
-    robot_error_of,
     simulate_demonstration,
 )
 from apo_bench.trial.trial import noise_of
@@ -100,24 +99,6 @@ def test_a_robot_that_is_further_off_promises_less(scene: Scene, simulated: Simu
     assert promised[0] > promised[-1]
 
 
-def test_what_feeling_leaves_is_how_parts_slip_and_less_of_what_lies_flat(
-    scene: Scene, simulated: SimulatedDemonstration
-) -> None:
-    seen = observe_demonstration(simulated, noise_of(asked(), scene, simulated), SEED)
-    plan = correct(seen, "contact").plan(seen)
-    drawn = robot_error_of(
-        "hand_eye:1/0.2+joints:0.05+tool:0.5+in_hand:0.5/1", scene, lambda which, shape: np.ones(shape)
-    )
-    left = left_after_feeling(plan, scene, drawn, 1.0)
-    np.testing.assert_array_equal(left.hand_eye, np.eye(4))
-    np.testing.assert_array_equal(left.tool, np.eye(4))
-    assert not left.joints.any()
-    before, after = (np.array([pose.log(T) for T in error.in_hand]) for error in (drawn, left))
-    np.testing.assert_allclose(after[:2], before[:2], atol=1e-12)  # blocks that are put on others
-    assert after[2, :3] == pytest.approx(0.0, abs=1e-12), "laid flat, and searched for along the pads"
-    assert 0.0 < after[2, 3] < 0.1 * before[2, 3]
-
-
 def test_a_robot_that_feels_promises_as_a_right_one_unless_parts_slip(
     scene: Scene, simulated: SimulatedDemonstration
 ) -> None:
@@ -132,25 +113,6 @@ def test_a_robot_that_feels_promises_as_a_right_one_unless_parts_slip(
     right = promised("none")
     assert promised("hand_eye:1/0.2+tool:0.5") == right
     assert promised("in_hand:0/20") < right
-
-
-def test_a_right_robot_brings_parts_to_their_goals_and_a_shifted_one_beside_them(
-    scene: Scene, simulated: SimulatedDemonstration
-) -> None:
-    seen = observe_demonstration(simulated, noise_of(asked(), scene, simulated), SEED)
-    plan = correct(seen, "contact").plan(seen)
-    mains = [operation.main for operation in plan.assembly.operations]
-
-    def off(error: str) -> Array:
-        drawn = robot_error_of(error, scene, lambda which, shape: np.random.default_rng([1, which]).normal(size=shape))
-        put = [state[main] for state, main in zip(brought(plan, scene, drawn), mains, strict=True)]
-        return np.asarray((np.array(put) - plan.goals)[:, :3, 3])
-
-    floats = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.5e-3 * scene.clearance_mm]])
-    np.testing.assert_allclose(off("tool:0"), floats, atol=1e-9)
-    shifted = np.linalg.norm(off("hand_eye:1") - floats, axis=1)
-    assert (shifted > 0.0).all()
-    assert (shifted < 10e-3).all(), "taken wrongly, and put wrongly"
 
 
 def test_a_robot_with_errors_brings_parts_where_physics_says() -> None:
@@ -241,14 +203,6 @@ def test_a_plan_that_abstains_says_less_than_what_was_asked() -> None:
     assert abstained(0.9472, 0.95).sentence.endswith(": 0.947, where 0.95 is asked")
     assert abstained(0.9472, 1).sentence.endswith(": 0.95, where 1 is asked")
     assert abstained(0.6999, 0.7).sentence.endswith(": 0.6999, where 0.7 is asked")
-
-
-def test_what_promises_enough_is_carried_out_as_without_abstaining(
-    scene: Scene, simulated: SimulatedDemonstration
-) -> None:
-    usual = row(scene, simulated)
-    same = row(scene, simulated, abstain=usual["promised"])
-    assert {name for name in usual if usual[name] != same[name]} == {"abstain", "spec_hash"}  # type: ignore[literal-required]
 
 
 def test_an_abstained_trial_counts_as_no_success_in_every_rate(scene: Scene, simulated: SimulatedDemonstration) -> None:

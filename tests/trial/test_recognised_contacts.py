@@ -109,13 +109,6 @@ def test_a_report_shows_what_was_recognised(tmp_path: Path, capsys: pytest.Captu
     capsys.readouterr()
 
 
-def test_the_command_prints_the_evidence(capsys: pytest.CaptureFixture[str]) -> None:
-    assert cli.main(["recognise", "stick_in_tower", "--observation", SEEN]) == 0
-    said = capsys.readouterr().out
-    assert "castle1.bottom" in said
-    assert "all 9 contacts of the scenario were recognised, and no other" in said
-
-
 def test_the_command_says_how_sure_a_set_is(capsys: pytest.CaptureFixture[str]) -> None:
     asked = ["recognise", "stick_in_tower", "--observation", SEEN, "--relations", "recognised-jointly"]
     assert cli.main(asked) == 0
@@ -157,14 +150,10 @@ def test_the_command_says_what_differs_as_json(tmp_path: Path, capsys: pytest.Ca
     [
         (["recognise", "stick_in_tower", "--relations", "given"], "unknown way of recognising 'given'"),
         (["recognise", "stick_in_tower", "--observation", SEEN, "--level", "1"], "--level, which draws a trial"),
-        (["recognise", "stick_in_tower", "--deviation-mm", "1"], "--deviation-mm, which is for files"),
-        (["recognise", "stick_in_tower", "--observation", "nowhere.csv"], "nowhere.csv"),
-        (["recognise", "nowhere"], "unknown scenario 'nowhere'"),
         (
             ["replay", "stick_in_tower", "--observation", SEEN, "--relations", "missed"],
             "--relations was given together",
         ),
-        (["replay", "stick_in_tower", "--relations", "recognized"], "unknown kind of relations"),
     ],
 )
 def test_wrong_requests_get_one_sentence(arguments: list[str], words: str, capsys: pytest.CaptureFixture[str]) -> None:

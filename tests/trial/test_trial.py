@@ -25,41 +25,16 @@ from apo_bench.assembly import Consistency, Step, Suspect, Try, relation_graph
 from apo_bench.cli.trial_text import print_row
 from apo_bench.geometry import pose
 from apo_bench.observation.noise import Level, make_noise
-from apo_bench.records import ENV_ID, ROW, level_pair, outcomes
+from apo_bench.records import ENV_ID, ROW, ROW_FIELDS, level_pair, outcomes
 from apo_bench.records.settings import LARGEST_SEED
 from apo_bench.resources import folder
 from apo_bench.trial import stages
 from apo_bench.trial.fingerprint import content_hash, spec_hash
 from apo_bench.trial.planning import apply_method
-from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration, stream
+from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, simulate_demonstration
 from apo_bench.trial.trial import nominal_where_seen, run_measured
 
 SPEC = TrialSettings("stick_in_tower", grasp="weld", method="none", seed=5)
-KEYS = (
-    *("schema", "env_id", "spec_hash", "scenario", "level", "careless", "clearance_mm", "noise", "grasp"),
-    *("relations", "method", "seed", "timestep_s", "thresholds", "demonstration", "success", "loose_success"),
-    *("failure_stage", "failure_code", "conditions", "freed", "gap_before_mm", "gap_after_mm", "reached"),
-    *(
-        "tried",
-        "extra_operations",
-        "predicted",
-        "pose_error_fixed_mm",
-        "pose_error_free_mm",
-        "peak_force_n",
-        "sim_seconds",
-    ),
-    *(
-        "chi_square",
-        "chi_square_freedom",
-        "p_value",
-        "test_passes",
-        "suspects",
-        "dropped",
-        "wrong_relation",
-        "inside_95",
-    ),
-    *("planned_error_fixed_mm", "planned_error_free_mm"),
-)
 
 
 @pytest.fixture(scope="module")
@@ -95,7 +70,7 @@ def rebuilds(seen: Observation) -> Correction:
 
 def test_every_row_has_every_key_and_is_json(rows: dict[str, dict[str, Any]]) -> None:
     keys = list(rows["oracle"])
-    assert set(KEYS) <= set(keys)
+    assert set(keys) == set(ROW_FIELDS)
     for row in rows.values():
         assert list(row) == keys
         assert json.loads(json.dumps(row, allow_nan=False)) == row
@@ -197,14 +172,17 @@ def test_the_row_says_how_far_the_plan_is_from_the_truth(rows: dict[str, dict[st
     assert rows["paper"]["planned_error_free_mm"] > 0.5
 
 
-def test_wrong_relations_are_told_and_noted(scene: Scene, shown: SimulatedDemonstration) -> None:
+def test_wrong_relations_are_told_and_noted(
+    scene: Scene, shown: SimulatedDemonstration, rows: dict[str, dict[str, Any]]
+) -> None:
     """Correctors meet them, nothing else does; robot and judge keep the right ones."""
-    kinds = ("given", "missed", "false", "shifted:3")
+    kinds = ("missed", "false", "shifted:3")
     told = {k: run_trial(replace(SPEC, method="paper", relations=k), scene, simulated=shown) for k in kinds}
     assert [told[k]["relations"] for k in kinds] == list(kinds)
-    assert [told[k]["wrong_relation"] is None for k in kinds] == [True, True, False, False]
+    assert [told[k]["wrong_relation"] is None for k in kinds] == [True, False, False]
+    assert rows["paper"]["wrong_relation"] is None
     assert told["shifted:3"]["success"] is False
-    raw = [run_trial(replace(SPEC, relations=k), scene, simulated=shown) for k in ("given", "shifted:3")]
+    raw = [rows["none"], run_trial(replace(SPEC, relations="shifted:3"), scene, simulated=shown)]
     apart = {key for key in raw[0] if raw[0][key] != raw[1][key]}
     assert apart == {"relations", "spec_hash"}
 
@@ -218,10 +196,6 @@ def test_reached_poses_are_in_mm_and_wxyz(rows: dict[str, dict[str, Any]]) -> No
     assert z == pytest.approx(80.0, abs=0.1)
     assert np.linalg.norm(q) == pytest.approx(1.0)
     assert abs(q[0]) < 0.1  # upside down: no real part
-
-
-def test_methods_share_layout_and_hand(rows: dict[str, dict[str, Any]]) -> None:
-    assert len({row["spec_hash"] for row in rows.values()}) == 1
 
 
 def test_the_hash_names_what_may_be_counted_together(scene: Scene) -> None:
@@ -303,25 +277,6 @@ def test_a_demonstration_that_failed_is_excluded(scene: Scene, shown: SimulatedD
         assert row["failure_stage"] == "demonstrate"
 
 
-def test_noise_reaches_the_robot(scene: Scene, shown: SimulatedDemonstration) -> None:
-    """Level 0 replays exactly what was shown; other levels scale the same draws."""
-    goals = {L: observed(scene, shown, L).goals for L in (0.0, 1.0, 2.0)}
-    np.testing.assert_array_equal(goals[0.0], shown.demonstration.goals)
-    one, two = (pose.log(pose.inverse(goals[0.0]) @ goals[L]) for L in (1.0, 2.0))
-    assert np.abs(one).max() > 1e-4
-    np.testing.assert_allclose(two, 2 * one, rtol=1e-6, atol=1e-12)
-    raw = apply_method("none", observed(scene, shown), None).plan
-    assert raw is not None
-    np.testing.assert_array_equal(raw.goals, goals[1.0])
-
-
-def test_streams_are_apart_and_the_key_is_seed_and_stage() -> None:
-    draws = {(k, s): float(stream(k, s).random()) for k in (0, 1, 2) for s in range(4)}
-    assert len(set(draws.values())) == 12
-    assert draws[1, stages.OBSERVATION] == float(np.random.default_rng([1, 2]).random())
-    assert (stages.LAYOUT, stages.DEMONSTRATION, stages.OBSERVATION, stages.ARM) == (0, 1, 2, 3)
-
-
 def test_returning_the_nominal_goals_is_not_what_was_shown(scene: Scene, shown: SimulatedDemonstration) -> None:
     """The truth varies: a corrector that knows the scenario by heart builds it elsewhere on the table."""
     planned = apply_method(lambda seen: scene.scenario.goals, observed(scene, shown), shown.layout.goals)
@@ -329,12 +284,6 @@ def test_returning_the_nominal_goals_is_not_what_was_shown(scene: Scene, shown: 
     assert planned.gap_after_m < 1e-9
     verdict = stages.replay_and_judge(planned.plan, scene, shown.layout.goals).verdict
     assert (verdict.as_demonstrated, verdict.demonstrated.code) == (False, "overlap")
-
-
-def test_a_measured_observation_is_judged_where_it_was_seen(scene: Scene, shown: SimulatedDemonstration) -> None:
-    seen = observed(scene, shown)
-    row = run_measured(replace(SPEC, method="paper"), scene, seen, "text of the file")
-    assert row["success"] is True
 
 
 def test_a_measured_observation_has_no_truth(scene: Scene, shown: SimulatedDemonstration) -> None:
@@ -360,11 +309,7 @@ def test_nominal_goals_are_put_where_the_first_part_was_seen(scene: Scene, shown
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"level_mm": -1.0}, "level in mm of -1"),
         ({"level_deg": float("nan")}, "level in degrees of nan"),
-        ({"careless": float("inf")}, "carelessness of inf"),
-        ({"clearance_mm": 9.0}, "clearance of 9"),
-        ({"seed": -1}, "seed of -1"),
         ({"seed": LARGEST_SEED + 1}, "whole numbers from 0"),
         ({"method": "papr"}, "did you mean 'paper'"),
         ({"relations": "recognized"}, "unknown kind of relations"),
@@ -396,7 +341,7 @@ def test_a_level_of_a_ray_is_one_number() -> None:
         TrialSettings("stick_in_tower", level_mm=51)
 
 
-@pytest.mark.parametrize("relations", ["recognised:3", "recognised-jointly:3", "given:1", "missed:2", "false:"])
+@pytest.mark.parametrize("relations", ["recognised-jointly:3", "false:"])
 def test_only_shifted_relations_have_a_size(relations: str) -> None:
     with pytest.raises(InputError, match="only shifted has a size, as in shifted:3"):
         TrialSettings("stick_in_tower", relations=relations)
