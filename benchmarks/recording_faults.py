@@ -15,7 +15,6 @@ from scipy.spatial.transform import Rotation
 
 from apo_bench.cli.app import main
 from apo_bench.geometry import Array, pose
-from apo_bench.recording.setup_files import MOST_POSES
 from benchmarks.recording_demos import Errors, first_places, tracked, watched
 from benchmarks.recording_forms import Tracked, camera_text, known_text, objects_text
 
@@ -191,10 +190,6 @@ def refusals() -> Iterator[tuple[str, str]]:
         yield "no such file", _refused(right, "file", "missing.csv")
         Path("noise.csv").write_bytes(np.random.default_rng(0).bytes(1000))
         yield "bytes that are no text", _refused(right, "bytes", "noise.csv")
-        with Path("huge.csv").open("w", encoding="utf-8") as stream:
-            stream.write(HEAD + "\n")
-            stream.writelines(f"{i / 1e3:.3f},11,0,0,900,1,0,0,0\n" for i in range(MOST_POSES + 1))
-        yield "a million rows and one", _refused(right, "huge", "huge.csv")
         yield "another format", _refused(right, "format", form="tum")
 
 
