@@ -47,6 +47,11 @@ class NoiseTable(Table, frozen=True, kw_only=True):
     stays_mm: Annotated[float, Meta(ge=0.0, le=100.0)]
     stays_deg: Annotated[float, Meta(ge=0.0, le=90.0)]
 
+    @property
+    def deviation(self) -> Array:
+        """(2,), [m, rad]."""
+        return np.array([self.stays_mm * 1e-3, np.radians(self.stays_deg)])
+
 
 class CameraTable(Table, frozen=True, kw_only=True):
     """What stands in the file."""
@@ -92,12 +97,11 @@ def read_camera(path: str | Path) -> CameraFile:
         f"{path}, log, euler: three axes are needed: small letters about fixed axes, such as xyz, capitals about "
         "moving ones.",
     )
-    noise = top.noise
     return CameraFile(
         conventions=top.log,
-        T_world_camera=top.pose and top.pose.matrix(f"{path}, pose"),
+        T_world_camera=None if top.pose is None else top.pose.matrix(f"{path}, pose"),
         known={part: _place(value, f"{path}, known, {part}") for part, value in (top.known or {}).items()},
-        stays=noise and np.array([noise.stays_mm * 1e-3, np.radians(noise.stays_deg)]),
+        stays=None if top.noise is None else top.noise.deviation,
     )
 
 

@@ -125,7 +125,7 @@ def _never_rests(part: str, track: PoseTrack, assembly: Assembly) -> str:
     if rests_of(PoseTrack(track.t, np.array(still))):
         spins = " but for a turn about its axis of revolution, which the tracker is to hold"
     return (
-        f"'{part}' never rests{spins}, so nothing is known of it (frames: {len(track.t)}, in {track.t[-1]:.2f} s); "
+        f"'{part}' never rests{spins}, so nothing is known of it (frames: {len(track.t)}, in {np.ptp(track.t):.2f} s); "
         f"give a log in which it lies still for {least_rest_s(track):.1f} s and more."
     )
 

@@ -103,7 +103,7 @@ def _flipped(stays: Stays, assembly: Assembly) -> Iterator[tuple[str, Stays]]:
             yield (
                 f"'{part}' seems to be flipped by {np.degrees(np.linalg.norm(pose.log(g)[3:])):.0f} deg, by which it "
                 f"looks the same, from {last.begins:.2f} s on: turn its poses back from there on",
-                {**stays, part: (*others, last.moved(lambda T, g=g: T @ g))},
+                {**stays, part: (*others, last.moved(partial(np.dot, b=g)))},
             )
 
 

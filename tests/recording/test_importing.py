@@ -20,7 +20,7 @@ from apo_bench.recording.tracks import PoseTrack
 from apo_bench.recording.unplanned import unplanned_recording
 from apo_bench.scenario.layout import layout_at
 from benchmarks.recording_demos import Errors, first_places, tracked, watched
-from tests.recorded import CAMERA, RATE_HZ, motion, seen
+from tests.recorded import CAMERA, seen
 
 NOTHING = Stated()
 GIVEN = CameraFile(Conventions(), CAMERA, {}, None)
@@ -158,9 +158,7 @@ MISTAKES = {
 def test_another_convention_that_fits_better_is_named(mistake: str) -> None:
     wrong = MISTAKES[mistake]
     tracks = {part: PoseTrack(t, wrong(T @ pose.inverse(MODEL)) @ MODEL) for part, (t, T) in seen(NAME, 0.3).items()}
-    with pytest.raises(
-        InputError, match=f"no contact fits .* another `{mistake}` in the camera file fits better"
-    ):
+    with pytest.raises(InputError, match=f"no contact fits .* another `{mistake}` in the camera file fits better"):
         import_recording(tracks, KNOWN, load_scenario(NAME), NOTHING, "log.csv", dict.fromkeys(tracks, MODEL))
 
 
@@ -174,9 +172,7 @@ def test_a_contact_that_is_open_by_more_than_noise_is_unclear() -> None:
 def test_parts_that_were_taken_for_each_other_are_no_recording_of_the_scenario() -> None:
     tracks = seen(NAME, 0.3)
     tracks["castle1"], tracks["stick"] = tracks["stick"], tracks["castle1"]
-    with pytest.raises(
-        InputError, match=r"'castle2', which operation 2 moves, comes to rest at 0\.00 s, 3\.\d+ s"
-    ):
+    with pytest.raises(InputError, match=r"'castle2', which operation 2 moves, comes to rest at 0\.00 s, 3\.\d+ s"):
         imported(tracks)
 
 
@@ -287,41 +283,20 @@ def test_a_part_that_is_not_tracked_or_not_there_is_named() -> None:
         imported({**tracks, "stik": tracks["stick"]})
 
 
-def test_the_recording_is_what_it_says() -> None:
-    t, T = motion(NAME)
-    assert np.array_equal(T["stick"][-1], goals(NAME)[2])
-    assert (np.diff(t) > 0).all()
-
-
-def test_a_part_that_a_hand_held_from_the_first_frame_starts_as_in_the_scenario() -> None:
-    tracks = seen(NAME, 0.3)
-    t, T = tracks["stick"]
-    held = T.copy()
-    first = t < 0.6
-    lifted = pose.at((0.0, 0.0, 0.11), (45.0, 0.0, 0.0))
-    start = CAMERA @ T[0]
-    up = pose.at(tuple(start[:3, 3])) @ lifted @ pose.at(tuple(-start[:3, 3]))
-    held[first] = pose.inverse(CAMERA) @ up @ CAMERA @ T[first]
-    whole = imported({**tracks, "stick": PoseTrack(t, held)})
-    # it is put down at 0.6 s, and taken from there
-    assert whole.stood["stick"] == "seen"
-    assert (
-        abs(whole.observation.start["stick"][2, 3] - layout_at(load_scenario(NAME), 0.1, 0.0, 0.3).start["stick"][2, 3])
-        < 1e-3
-    )
-    held[t < _taken(T)] = pose.inverse(CAMERA) @ up @ CAMERA @ T[t < _taken(T)]
-    never = imported({**tracks, "stick": PoseTrack(t, held)})
-    assert never.stood["stick"] == "in the hand"
-    planned = load_scenario(NAME)
-    assert np.allclose(
-        never.observation.start["stick"], layout_at(planned, 0, 0, 0, clearance_mm=planned.clearance_mm).start["stick"]
-    )
-
-
-def _taken(T: np.ndarray) -> float:
-    """When a part was first moved."""
-    moved = np.linalg.norm(T[:, :3, 3] - T[0, :3, 3], axis=1) > 0.01
-    return float(np.argmax(moved)) / RATE_HZ
+@pytest.mark.parametrize("put_down", [True, False])
+def test_a_part_that_a_hand_held_from_the_first_frame_starts_where_it_is_put_down_if_it_is(put_down: bool) -> None:
+    t, T = seen(NAME, 0.3)["stick"]
+    at = (CAMERA @ T[0])[:3, 3]
+    lifted = pose.at(at) @ pose.at((0.0, 0.0, 0.11), (45.0, 0.0, 0.0)) @ pose.at(-at)
+    taken = t[np.argmax(np.linalg.norm(T[:, :3, 3] - T[0, :3, 3], axis=1) > 0.01)]
+    held = np.where((t < (0.6 if put_down else taken))[:, None, None], pose.inverse(CAMERA) @ lifted @ CAMERA @ T, T)
+    found = imported({**seen(NAME, 0.3), "stick": PoseTrack(t, held)})
+    start = found.observation.start["stick"]
+    assert found.stood["stick"] == ("seen" if put_down else "in the hand")
+    scenario = load_scenario(NAME)
+    planned = layout_at(scenario, 0, 0, 0, clearance_mm=scenario.clearance_mm).start["stick"]
+    assert np.allclose(start[2, 3], planned[2, 3], atol=1e-3)
+    assert put_down or np.allclose(start, planned)
 
 
 def test_a_fixed_part_is_where_it_was_seen_or_stated_though_the_assembly_stands_elsewhere() -> None:
