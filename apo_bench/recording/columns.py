@@ -136,8 +136,8 @@ def _one_unit(kind: str, allowed: Collection[str], stated: str | None, names: Se
     for name, unit in units.items():
         require(
             unit is not None,
-            f"{numbers.file}: the unit of the column '{name}' is not known; name it {name}_{next(iter(allowed))}, or state "
-            f"`{kind}` in the camera file.",
+            f"{numbers.file}: the unit of the column '{name}' is not known; name it {name}_{next(iter(allowed))}, or "
+            f"state `{kind}` in the camera file.",
         )
     unit, *others = {str(unit) for unit in units.values()}
     require(

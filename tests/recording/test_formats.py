@@ -74,8 +74,8 @@ WRONG = [
     ("tum", "# t\n1 0 0 0.9 0 0 0 1 7", "timestamp tx ty tz qx qy qz qw; '1 0 0 0.9 0 0 0 1 7' was given"),
     ("tum", "# t\n1 0 0 x 0 0 0 1", "line 2: a finite number is needed, 'x' was given"),
     ("ros-json", '{"header": {"stamp": {"sec": 1}}}', "a field `pose` with position and orientation is needed"),
-    ("ros-json", MESSAGE % ('"a"', 1), "line 1, x: a finite number"),
-    ("ros-json", MESSAGE % (0, 2), "of length 1 is needed"),
+    ("ros-json", MESSAGE % ('{"x": "a", "y": 0, "z": 1}', 1), "line 1, x: a finite number"),
+    ("ros-json", MESSAGE % ('{"x": 0, "y": 0, "z": 1}', 2), "of length 1 is needed"),
     ("ros-json", "3", "a message with named fields is needed"),
 ]
 
