@@ -198,7 +198,7 @@ def _why_none(assembly: Assembly, stays: Stays, k: int) -> str:
     if flipped is not None:
         return f"'{main}' is turned at {flipped:.2f} s to where it looks the same, probably flipped by the tracker"
     rests = ", ".join(f"{stay.begins:.2f} s" for stay in stays[main])
-    return f"'{main}', which operation {k + 1} moves, comes to rest at {rests} only, not after the operations before it"
+    return f"'{main}', which operation {k + 1} moves, rests from {rests} on, and none of these follows the others"
 
 
 def taken(assembly: Assembly, stays: Stays, before: Sequence[Stay | None], stay: Stay) -> float:

@@ -172,7 +172,7 @@ def test_a_contact_that_is_open_by_more_than_noise_is_unclear() -> None:
 def test_parts_that_were_taken_for_each_other_are_no_recording_of_the_scenario() -> None:
     tracks = seen(NAME, 0.3)
     tracks["castle1"], tracks["stick"] = tracks["stick"], tracks["castle1"]
-    with pytest.raises(InputError, match=r"'castle2', which operation 2 moves, comes to rest at 0\.00 s, 3\.\d+ s"):
+    with pytest.raises(InputError, match=r"'castle2', which operation 2 moves, rests from 0\.00 s, 3\.\d+ s"):
         imported(tracks)
 
 
