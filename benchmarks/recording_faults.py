@@ -11,11 +11,9 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from apo_bench.cli.app import main
 from apo_bench.geometry import Array, pose
-from apo_bench.recording.setup_files import MOST_POSES
 from benchmarks.recording_demos import Errors, first_places, tracked, watched
 from benchmarks.recording_forms import Tracked, camera_text, known_text, objects_text
 
@@ -77,34 +75,6 @@ def timed(change: Callable[[Array], Array]) -> Change:
     return other
 
 
-def framed(change: Callable[[Array], Array]) -> Change:
-    """Other frames in the objects file."""
-
-    def other(files: Files) -> Files:
-        stated = {part: one._replace(T_model_part=change(one.T_model_part)) for part, one in files.found.items()}
-        return files._replace(objects=objects_text(stated))
-
-    return other
-
-
-def eulers(written: str, stated: str, unit: str = "deg") -> Change:
-    """A log of Euler angles about other axes than the camera file states, or in another unit than its columns say."""
-
-    def change(files: Files) -> Files:
-        R = Rotation.from_matrix(files.T[:, :3, :3])
-        rows = [
-            f"{t:.6f},{name}," + ",".join(f"{x:.9g}" for x in (*at, *angles))
-            for t, name, at, angles in zip(
-                files.t, files.ids, files.T[:, :3, 3], R.as_euler(written, degrees=unit == "deg"), strict=True
-            )
-        ]
-        text = "\n".join(["t_s,id,x_mm,y_mm,z_mm,e1_deg,e2_deg,e3_deg", *rows]) + "\n"
-        camera = files.camera.replace("[known]", f'[log]\neuler = "{stated}"\n\n[known]')
-        return files._replace(text=text, camera=camera)
-
-    return change
-
-
 def edited(key: str, old: str, new: str) -> Change:
     """A file in which a text is another one."""
 
@@ -134,6 +104,11 @@ def _flipped(axis: int) -> Callable[[Array], Array]:
     return lambda T: T * np.outer(flip, flip)
 
 
+def _without_frames(files: Files) -> Files:
+    stated = {part: one._replace(T_model_part=np.eye(4)) for part, one in files.found.items()}
+    return files._replace(objects=objects_text(stated))
+
+
 def _one_of_each(files: Files) -> Array:
     return np.unique(files.ids, return_index=True)[1]
 
@@ -141,22 +116,14 @@ def _one_of_each(files: Files) -> Array:
 CHANGES: Mapping[str, Change] = {
     "mm in columns named `x_m`": lambda files: files._replace(head=HEAD.replace("_mm", "_m")),
     "m in columns named `x_mm`": posed(_scaled(1e-3)),
-    "cm in columns named `x_mm`": posed(_scaled(1e-1)),
     "no unit in the names of the columns": lambda files: files._replace(head=HEAD.replace("_mm", "")),
     "milliseconds in the column `t_s`": timed(lambda t: 1e3 * t),
     "quaternions x, y, z, w in columns named w, x, y, z": posed(_reordered),
     "quaternions by number, order not stated": lambda files: files._replace(head="t_s,id,x_mm,y_mm,z_mm,q0,q1,q2,q3"),
-    "Euler angles about axes z, y, x, stated as x, y, z": eulers("ZYX", "XYZ"),
-    "radians in columns named `e1_deg`": eulers("xyz", "xyz", "rad"),
     "x mirrored": posed(_flipped(0)),
-    "y mirrored": posed(_flipped(1)),
-    "z mirrored": posed(_flipped(2)),
     "poses of the camera in the model": posed(_inverted),
-    "frames of the models in the parts": framed(pose.inverse),
-    "frames in the objects file forgotten": framed(lambda T: np.eye(4)),
+    "frames in the objects file forgotten": _without_frames,
     "time reversed": timed(lambda t: t.max() + t.min() - t),
-    "rows in reverse": picked(lambda files: np.arange(len(files.t))[::-1]),
-    "two rows swapped": picked(lambda files: np.r_[0:10, 40, 11:40, 10, 41 : len(files.t)]),
     "every row twice": picked(lambda files: np.repeat(np.arange(len(files.t)), 2)),
     "an id that is no part": lambda files: files._replace(ids=np.where(files.ids == "13", "99", files.ids)),
     "a part that is not of the scenario": edited("objects", "stick", "stik"),
@@ -165,9 +132,7 @@ CHANGES: Mapping[str, Change] = {
     ),
     "not a number": edited("text", "\n100.0", "\n100.0,11,nan,0,900,1,0,0,0\n100.0"),
     "an empty file": lambda files: files._replace(text=""),
-    "no rows": lambda files: files._replace(text=HEAD + "\n"),
     "one frame of each part": picked(_one_of_each),
-    "the log begins late": picked(lambda files: np.flatnonzero(files.t > 103.0)),
     "a column is missing": edited("text", "qz", "note"),
     "no column of ids": edited("text", "id", "note"),
     "the camera file renames a column that is not there": edited(
@@ -191,10 +156,6 @@ def refusals() -> Iterator[tuple[str, str]]:
         yield "no such file", _refused(right, "file", "missing.csv")
         Path("noise.csv").write_bytes(np.random.default_rng(0).bytes(1000))
         yield "bytes that are no text", _refused(right, "bytes", "noise.csv")
-        with Path("huge.csv").open("w", encoding="utf-8") as stream:
-            stream.write(HEAD + "\n")
-            stream.writelines(f"{i / 1e3:.3f},11,0,0,900,1,0,0,0\n" for i in range(MOST_POSES + 1))
-        yield "a million rows and one", _refused(right, "huge", "huge.csv")
         yield "another format", _refused(right, "format", form="tum")
 
 

@@ -22,10 +22,11 @@ import numpy as np
 
 from apo_bench.geometry import pose
 from apo_bench.judging.verdict import judge
+from apo_bench.recording.camera_file import read_camera
 from apo_bench.recording.formats import read_log
 from apo_bench.recording.importing import ImportedRecording, import_recording
+from apo_bench.recording.objects_file import name_tracks, read_objects
 from apo_bench.recording.ordering import Stated
-from apo_bench.recording.setup_files import part_tracks, read_camera, read_objects
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.trial.planning import apply_method
 from benchmarks.made_with import said_by, with_mujoco
@@ -84,7 +85,7 @@ def imported(truth: Truth, form: Form, errors: Errors, seed: int) -> ImportedRec
         path = write_recording(form, found, first_places(truth, found), folder, errors.stays or None)
         camera = read_camera(folder / "camera.toml")
         objects = read_objects(folder / "objects.toml")
-        tracks = part_tracks(read_log(path, form.format, camera.conventions), objects)
+        tracks = name_tracks(read_log(path, form.format, camera.conventions), objects)
     return import_recording(tracks, camera, truth.scene.scenario, Stated(), "log", objects.models)
 
 

@@ -99,9 +99,9 @@ def noise_still(
 ) -> None:
     """Measure a camera on parts that rest: how its frames scatter, how many are missing, how many are wrong."""
     from apo_bench.observation.fitting import fit
+    from apo_bench.recording.camera_file import read_camera
     from apo_bench.recording.formats import read_log
-    from apo_bench.recording.rests import still_residuals
-    from apo_bench.recording.setup_files import read_camera
+    from apo_bench.recording.still import still_residuals
     from apo_bench.show.fit_text import fit_form, fit_lines
 
     check_outputs([(out, "--out", (".toml",)), (picture, "--picture", (".png",))], (camera,))

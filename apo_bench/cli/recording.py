@@ -10,7 +10,7 @@ from apo_bench.cli.outputs import check_outputs
 from apo_bench.cli.printing import print_lines
 from apo_bench.cli.values import numbers, path_given, whole_numbers
 from apo_bench.errors import InputError, require
-from apo_bench.io import write_csv, write_file
+from apo_bench.io import write_csv
 from apo_bench.scenario.file import load_scenario
 
 recording = group("recording", "Logs of pose trackers.")
@@ -32,10 +32,11 @@ def recording_import(
     paths: Annotated[Path | None, typer.Option(help="Write the paths between rests: .csv.")] = None,
 ) -> None:
     """Turn the log of a pose tracker into an observation: frames, rests, the order of operations."""
+    from apo_bench.recording.camera_file import read_camera
     from apo_bench.recording.formats import read_log
-    from apo_bench.recording.setup_files import part_tracks, read_camera, read_objects
+    from apo_bench.recording.hands import find_hands
+    from apo_bench.recording.objects_file import name_tracks, read_objects
     from apo_bench.recording.show.text import reading_lines
-    from apo_bench.recording.stays import hands_of
 
     outputs = [(out, "--out", (".json", ".csv")), (picture, "--picture", (".png",)), (paths, "--paths", (".csv",))]
     check_outputs(outputs, (log, camera, objects))
@@ -46,8 +47,8 @@ def recording_import(
     stated = read_camera(camera)
     named = read_objects(objects)
     read = read_log(log, form, stated.conventions)
-    hands = hands_of(read, named)
-    tracks = part_tracks(read, named, hands)
+    hands = find_hands(read, named)
+    tracks = name_tracks(read, named, hands)
     print_lines(reading_lines(read, named, hands))
     if scenario is None:
         _import_unplanned(read, named, stated, tracks, out, picture)
@@ -91,9 +92,9 @@ def _import(
 
 
 def _import_unplanned(log: Any, objects: Any, camera: Any, tracks: Any, out: Path, picture: Path | None) -> None:
-    from apo_bench.recording.importing import goals_of, unplanned_recording
     from apo_bench.recording.show.drawing import draw_recording, unplanned_drawing
     from apo_bench.recording.show.text import put_lines
+    from apo_bench.recording.unplanned import goals_of, unplanned_recording
 
     recording = unplanned_recording(tracks, camera, log.file)
     parts = [put.part for put in recording.puts]
@@ -134,7 +135,7 @@ def _print_written(*paths: Path | None) -> None:
 def _write_table(path: Path, parts: list[str], rests: list[Any], goals: Any, camera: Any) -> None:
     """Write goals as CSV; an operation that the log does not show has no rest."""
     from apo_bench.recording.importing import deviations
-    from apo_bench.recording.show.text import observation_table
+    from apo_bench.recording.show.text import OBSERVATION_HEAD, observation_rows
 
     sizes = [(1.0, 1.0) if rest is None else deviations(rest, camera) for rest in rests]
-    write_file(path, observation_table(parts, goals, sizes, [rest is not None for rest in rests]))
+    write_csv(path, OBSERVATION_HEAD, observation_rows(parts, goals, sizes, [rest is not None for rest in rests]))

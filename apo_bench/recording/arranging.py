@@ -11,6 +11,7 @@ from apo_bench.assembly import Assembly, Poses
 from apo_bench.errors import require, unknown
 from apo_bench.geometry import Array, extent, frozen, pose
 from apo_bench.recording.averaging import Mean
+from apo_bench.recording.camera_file import CameraFile
 from apo_bench.recording.ordering import (
     ContactFit,
     Order,
@@ -21,7 +22,6 @@ from apo_bench.recording.ordering import (
     stated_order,
     world_poses,
 )
-from apo_bench.recording.setup_files import CameraFile
 from apo_bench.recording.stays import Stay, Stays
 
 _HIGH_M = 0.01

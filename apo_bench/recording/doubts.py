@@ -1,155 +1,25 @@
-"""What is wrong with a recording that does not fit, and what stays unclear of one that does, so that it can be stated.
+"""What stays unclear of a recording that fits, so that it can be stated: one sentence for each doubt."""
 
-Of a recording that does not fit each usual mistake is undone, and the one whose undoing mends it is named.
-"""
-
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
-from itertools import chain
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from apo_bench.assembly import Assembly
-from apo_bench.errors import InputError
-from apo_bench.geometry import Array, pose, symmetries
-from apo_bench.recording.arranging import Arrange, Arrangement, staying
+from apo_bench.geometry import Array
+from apo_bench.recording.arranging import Arrangement
 from apo_bench.recording.averaging import per_axis
 from apo_bench.recording.operations import SeenOperation
-from apo_bench.recording.ordering import NoOrder, moves_text
-from apo_bench.recording.setup_files import CameraFile
-from apo_bench.recording.stays import Stays, is_flip, is_near, mistakes, reversed_in_time
+from apo_bench.recording.ordering import moves_text
+from apo_bench.recording.stays import Stays
 
-_FITS_MM = 20.0
-"""A contact that is open by more, or a known place that is missed by more, is no noise; degrees count like mm."""
-_MENDS = 0.4
-"""What mends a recording leaves at most this part of what was wrong."""
 _MOVED_MM = 10.0
 """A part that moves by more during an operation of another one was not only adjusted."""
 _OPEN_MM = 3.0
 _OPEN = 5.0
 """Contacts are open if by more than this, and more than so many deviations; a degree counts like a millimetre."""
-_HELPLESS = (
-    "neither another order of the quaternions or of Euler angles, mirrored axes, inverted poses, another unit nor "
-    "reversed time mends it, so check the frames of the parts in the objects file, the ids, the pose of the camera, "
-    "that no part is flipped to where it looks the same, and that the log goes on until the last part was put down"
-)
-_FAR = 5.0
-"""A part that moved by more standard deviations did move."""
 
 
-def check_arrangement(
-    arrangement: Arrangement,
-    arrange: Arrange,
-    stays: Stays,
-    models: Mapping[str, Array],
-    camera: CameraFile,
-    assembly: Assembly,
-    file: str,
-) -> None:
-    """Refuse a recording in which no contact fits, with what would mend it.
-
-    Args:
-        models: Part -> where its frame lies in the tracker's model, (4, 4), [m]; the identity if it is missing.
-        camera: As it was stated.
-
-    Raises:
-        InputError: It does not fit.
-    """
-    if arrangement.wrong_mm <= _FITS_MM:
-        return
-    best = arrangement.wrong_mm * _MENDS
-    remedy = _HELPLESS
-    for sentence, mended in chain(mistakes(stays, models, camera), _flipped(stays, assembly)):
-        try:
-            wrong = arrange(mended).wrong_mm
-        except (NoOrder, np.linalg.LinAlgError):
-            continue
-        if wrong < min(best, _FITS_MM):
-            best = wrong
-            remedy = f"{sentence}; then all is within {wrong:.1f} mm"
-    solved = arrangement.camera
-    missed = f", known places are missed by up to {solved.off_mm:.0f} mm and {solved.off_deg:.0f} deg"
-    raise InputError(
-        f"{file}: no contact fits as it is stated (they are open by up to {1e3 * arrangement.fit.gap_m:.0f} mm and "
-        f"{np.degrees(arrangement.fit.angle_rad):.0f} deg{missed if solved.residuals else ''}); {remedy}."
-    )
-
-
-def _flipped(stays: Stays, assembly: Assembly) -> Iterator[tuple[str, Stays]]:
-    """What to do about each symmetry by which a part may be flipped at its last place, and the stays that it gives."""
-    for part, (*others, last) in stays.items():
-        for g in symmetries(assembly.solids[part])[1:]:
-            rests = tuple(replace(rest, mean=replace(rest.mean, T=rest.T @ g)) for rest in last.rests)
-            yield (
-                f"'{part}' seems to be flipped by {np.degrees(np.linalg.norm(pose.log(g)[3:])):.0f} deg, by which it "
-                f"looks the same, from {last.begins:.2f} s on: turn its poses back from there on",
-                {**stays, part: (*others, replace(last, rests=rests))},
-            )
-
-
-def check_moved(
-    stays: Stays, operations: Sequence[SeenOperation], camera: CameraFile, assembly: Assembly, file: str
-) -> None:
-    """Refuse a recording in which a part moved that should not have, by more than errors or an adjustment explain.
-
-    Args:
-        operations: As the log shows them.
-
-    Raises:
-        InputError: It names the part, the operation, by how much it moved and why that may be.
-    """
-    unseen = {part for k, each in enumerate(operations) if each.rest is None for part in assembly.operations[k].moves}
-    for k, operation in enumerate(operations):
-        for part, twist in {**operation.carried, **operation.adjusted}.items():
-            means = [rest.mean for stay in stays[part] for rest in stay.rests]
-            # Of the difference of two rests, each as uncertain as the least certain one.
-            deviation = np.sqrt(2.0 * np.max([np.diag(m.covariance + staying(camera, m)) for m in means], axis=0))
-            if part in unseen or is_near(twist) or np.abs(twist / deviation).max() <= _FAR:
-                continue
-            main = assembly.operations[k].main
-            moves = "carries along" if part in operation.carried else "does not move"
-            raise InputError(
-                f"{file}: '{part}' moved by {1e3 * np.linalg.norm(twist[:3]):.0f} mm and "
-                f"{np.degrees(np.linalg.norm(twist[3:])):.0f} deg"
-                f"{' in the hand' if part in operation.carried else ''} during operation {k + 1} ('{main}'), which "
-                f"{moves} it, {np.abs(twist / deviation).max():.0f} standard deviations of where it was seen; "
-                f"{_why_moved(stays, part, twist, assembly)}."
-            )
-
-
-def _why_moved(stays: Stays, part: str, twist: Array, assembly: Assembly) -> str:
-    """The likely cause, and what to do about it."""
-    if is_flip(assembly.solids[part], twist):
-        return "it looks the same turned so, and was probably flipped: turn its poses back, or leave them out"
-    unseen = next(hidden({part: stays[part]}), "it may have been hidden")
-    return f"{unseen}, or operations ended at other times: state them by --ends (moves in the log: {moves_text(stays)})"
-
-
-def hidden(stays: Stays) -> Iterator[str]:
-    """One sentence for each part that was not seen for a while after it had rested."""
-    for part, known in stays.items():
-        for rest in (rest for stay in known for rest in stay.rests if rest.gone > rest.ends):
-            yield f"'{part}' was hidden from {rest.ends:.2f} to {rest.gone:.2f} s"
-
-
-def check_direction(arrange: Arrange, stays: Stays, file: str) -> None:
-    """Refuse a recording that is played backwards.
-
-    Raises:
-        InputError: Played the other way it has the operations of the scenario, and contacts fit.
-    """
-    try:
-        wrong = arrange(reversed_in_time(stays)).wrong_mm
-    except NoOrder:
-        return
-    if wrong < _FITS_MM:
-        raise InputError(
-            f"{file}: time seems to run backwards: played the other way, all is within {wrong:.1f} mm of the scenario; "
-            "give the log as it was recorded."
-        )
-
-
-def unclear(
+def tell_doubts(
     stays: Stays,
     arrangement: Arrangement,
     operations: Sequence[SeenOperation],
@@ -172,6 +42,7 @@ def unclear(
             if arrangement.whence[part] == "otherwise"
         ),
         *_pauses(stays, arrangement, assembly),
+        *tell_hidden(stays),
     )
 
 
@@ -219,3 +90,10 @@ def _pauses(stays: Stays, arrangement: Arrangement, assembly: Assembly) -> Itera
             yield f"'{part}' also rested at {at}, on its way: taken as a pause; state --ends if it was put down"
         else:
             yield f"'{part}' moved at {pauses[0]}, although no operation of the scenario moves it"
+
+
+def tell_hidden(stays: Stays) -> Iterator[str]:
+    """One sentence for each part that was not seen for a while after it had rested."""
+    for part, known in stays.items():
+        for rest in (rest for stay in known for rest in stay.rests if rest.gone > rest.ends):
+            yield f"'{part}' was hidden from {rest.ends:.2f} to {rest.gone:.2f} s"

@@ -1,13 +1,9 @@
-"""From the log of a tracker to an observation: frames, rests, the order of operations, and what stays unclear.
-
-A recording without a scenario: which part was put where, in order; nothing is known of contacts.
-"""
+"""From the log of a tracker to an observation: frames, rests, the order of operations, and what stays unclear."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
-from typing import NamedTuple, final
+from typing import final
 
 import numpy as np
 
@@ -15,18 +11,17 @@ from apo_bench.assembly import Assembly, Observation, Poses, SharedError
 from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Array, turned_alike
 from apo_bench.observation.models import UNSEEN_DEVIATION, floored, last_seen, with_shared
-from apo_bench.recording.arranging import CameraPose, arrangement_of, solved_camera, staying
+from apo_bench.recording.arranging import CameraPose, arrangement_of, staying
 from apo_bench.recording.averaging import per_axis
-from apo_bench.recording.doubts import check_arrangement, check_direction, check_moved, hidden, unclear
+from apo_bench.recording.camera_file import CameraFile
+from apo_bench.recording.doubts import tell_doubts
 from apo_bench.recording.operations import SeenOperation, seen_operation
 from apo_bench.recording.ordering import ContactFit, NoOrder, Stated
-from apo_bench.recording.rests import RestSpan, consecutive, least_rest_s, rests_of
-from apo_bench.recording.setup_files import CameraFile, PoseTrack
-from apo_bench.recording.stays import Stay, Stays, all_stays
+from apo_bench.recording.refusals import check_arrangement, check_moved
+from apo_bench.recording.rests import RestSpan, least_rest_s, rests_of
+from apo_bench.recording.stays import Stay, all_stays
+from apo_bench.recording.tracks import PoseTrack
 from apo_bench.scenario import Scenario, layout_at
-
-_SLOW_S = 0.5
-"""Rests that have to be longer are said: hands pause for less."""
 
 
 @final
@@ -78,24 +73,13 @@ def import_recording(
     stays = all_stays(tracks)
     for part, track in tracks.items():
         if not stays[part]:
-            still = [turned_alike(assembly.solids[part], T, track.T[0]) for T in track.T]
-            spins = ""
-            if rests_of(PoseTrack(track.t, np.array(still))):
-                spins = " but for a turn about its axis of revolution, which the tracker is to hold"
-            raise InputError(
-                f"{file}: '{part}' never rests{spins}, so nothing is known of it (frames: {len(track.t)}, in "
-                f"{track.t[-1] - track.t[0]:.2f} s); give a log in which it lies still for "
-                f"{least_rest_s(track):.1f} s and more."
-            )
+            raise InputError(f"{file}: {_never_rests(part, track, assembly)}")
     arrange = partial(arrangement_of, camera=camera, assembly=assembly, planned=planned_starts(scenario), stated=stated)
     try:
         arrangement = arrange(stays)
     except NoOrder as error:
-        check_direction(arrange, stays, file)
-        least = max(map(least_rest_s, tracks.values()))
-        slow = f" At this rate of frames a rest is seen from {least:.1f} s on." if least > _SLOW_S else ""
-        raise InputError(f"{file}: {error}{slow}") from error
-    check_arrangement(arrangement, arrange, stays, models or {}, camera, assembly, file)
+        raise InputError(f"{file}: {error}") from error
+    check_arrangement(arrangement, arrange, stays, models or {}, assembly, file)
     solved, order, start, whence, _, stays = arrangement
     X = solved.T_world_camera
     operations = tuple(seen_operation(tracks, stays, order.stays, assembly, X, k) for k in range(len(assembly)))
@@ -131,7 +115,18 @@ def import_recording(
         stood=whence,
         fit=arrangement.fit,
         stays_stated=camera.stays is not None,
-        unclear=(*unclear(stays, arrangement, operations, covariance, assembly), *hidden(stays)),
+        unclear=tell_doubts(stays, arrangement, operations, covariance, assembly),
+    )
+
+
+def _never_rests(part: str, track: PoseTrack, assembly: Assembly) -> str:
+    still = [turned_alike(assembly.solids[part], T, track.T[0]) for T in track.T]
+    spins = ""
+    if rests_of(PoseTrack(track.t, np.array(still))):
+        spins = " but for a turn about its axis of revolution, which the tracker is to hold"
+    return (
+        f"'{part}' never rests{spins}, so nothing is known of it (frames: {len(track.t)}, in {np.ptp(track.t):.2f} s); "
+        f"give a log in which it lies still for {least_rest_s(track):.1f} s and more."
     )
 
 
@@ -151,76 +146,6 @@ def _adjustments(operations: Sequence[SeenOperation], assembly: Assembly) -> Arr
     return C
 
 
-class Put(NamedTuple):
-    """A part was put somewhere, perhaps with others."""
-
-    part: str
-    carries: tuple[str, ...]
-    stay: Stay
-
-    @property
-    def rest(self) -> RestSpan:
-        return self.stay.rests[-1]
-
-
-class UnplannedRecording(NamedTuple):
-    """What a log says by itself."""
-
-    camera: CameraPose
-    stays: Stays
-    puts: tuple[Put, ...]
-
-
-class _Move(NamedTuple):
-    taken: float
-    stay: Stay
-
-
-def unplanned_recording(tracks: Mapping[str, PoseTrack], camera: CameraFile, file: str) -> UnplannedRecording:
-    """The order of operations, as far as poses alone tell it: parts that move together are one operation.
-
-    Raises:
-        InputError: A known place is not stated by a pose, or nothing moves.
-    """
-    stays = all_stays(tracks)
-    X = _camera_pose(stays, camera)
-    pairs = [pair for known in stays.values() for pair in pairwise(known)]
-    moves = sorted((_Move(before.ends, after) for before, after in pairs), key=lambda move: move.stay.begins)
-    require(moves, f"{file}: no part comes to rest at another place than before, so there is no operation.")
-    groups = consecutive(moves, lambda group, move: any(_together(move, other) for other in group))
-    return UnplannedRecording(X, stays, tuple(map(_put, groups)))
-
-
-def _camera_pose(stays: Stays, camera: CameraFile) -> CameraPose:
-    if camera.T_world_camera is not None:
-        return CameraPose(camera.T_world_camera)
-    places = {part: T for part, T in camera.known.items() if T is not None and stays.get(part)}
-    require(
-        places,
-        "without --scenario the camera file has to state the pose of the camera, or poses of known parts that "
-        'rest; "start" is a place of a scenario.',
-    )
-    return solved_camera(stays, camera, places)
-
-
-def _together(move: _Move, other: _Move) -> bool:
-    """Whether two parts were on their way at the same time, for more than half of the shorter way."""
-    shared = min(move.stay.begins, other.stay.begins) - max(move.taken, other.taken)
-    shorter = min(move.stay.begins - move.taken, other.stay.begins - other.taken)
-    return move.stay.part != other.stay.part and shared > 0.5 * shorter
-
-
-def _put(moves: Sequence[_Move]) -> Put:
-    """What was taken first is taken for what the hand held."""
-    first, *others = sorted(moves, key=lambda move: move.taken)
-    return Put(first.stay.part, tuple(move.stay.part for move in others), first.stay)
-
-
 def deviations(rest: RestSpan, camera: CameraFile) -> tuple[float, float]:
     """Standard deviations per axis of one rest, [m, rad]: of its mean, and of what stays; else that of one frame."""
     return per_axis(rest.mean.covariance + staying(camera, rest.mean))
-
-
-def goals_of(recording: UnplannedRecording) -> Array:
-    """Where parts were put, (n, 4, 4), world, [m]."""
-    return np.array([recording.camera.T_world_camera @ put.rest.T for put in recording.puts])

@@ -107,17 +107,10 @@ def order_of(assembly: Assembly, stays: Stays, start: Poses, T_world_camera: Arr
 
     best, why = _choices(assembly, stays, worth, unseen)
     if not best:
-        seen = sorted((part for part in stays if len(stays[part]) > 1), key=lambda part: stays[part][-1].begins)
-        other = set(seen) == set(last) and seen != sorted(last, key=last.__getitem__)
         raise NoOrder(
             f"the moves of the log ({moves_text(stays)}) do not follow each other as the operations of the scenario do "
             f"({', '.join(operation.main for operation in assembly.operations)}): {why}; "
-            + (
-                f"in this log they end in the order {', '.join(seen)}, as `scenario new --order` has it; "
-                if other
-                else ""
-            )
-            + "check the ids in the objects file and that the log begins before the first part is taken, or state "
+            "check the ids in the objects file and that the log begins before the first part is taken, or state "
             "--ends, or --unseen for operations that the log does not show."
         )
     close = len(best) > 1 and best[0][0] - best[1][0] < _CLOSE
@@ -184,7 +177,7 @@ def _choices(
                     longer = (value + worth(k, stay) - _LEFT_OVER * amiss, stay.begins, (*choice, stay))
                     by_end.setdefault(stay, []).append(longer)
         if not by_end:
-            return [], _why_none(assembly, stays, followed[0][2], k)
+            return [], _why_none(assembly, stays, k)
         followed = [each for ending in by_end.values() for each in sorted(ending, key=lambda x: -x[0])[:2]]
     return sorted(((value, choice) for value, _, choice in followed), key=lambda x: -x[0])[:2], ""
 
@@ -198,23 +191,14 @@ def _strangers(stays: Stays, moved: Collection[str], t: float, stay: Stay) -> in
     )
 
 
-def _why_none(assembly: Assembly, stays: Stays, before: Chosen, k: int) -> str:
-    """Why no stay can end operation k, after the best choice of those before it."""
+def _why_none(assembly: Assembly, stays: Stays, k: int) -> str:
+    """Why no stay can end operation k."""
     main = assembly.operations[k].main
     flipped = flip_time(assembly.solids[main], stays[main])
     if flipped is not None:
         return f"'{main}' is turned at {flipped:.2f} s to where it looks the same, probably flipped by the tracker"
-    *_, final = stays[main]
-    last = next((stay for stay in reversed(before) if stay is not None), None)
-    if len(stays[main]) == 1 or last is None:
-        return f"'{main}', which operation {k + 1} moves, rests at one place only"
-    if final.begins <= last.begins:
-        order = f"at {final.begins:.2f} s, before '{last.part}' rests at {last.begins:.2f} s"
-        return f"'{main}' comes to its last place {order}"
-    return (
-        f"'{main}' was not seen at rest where operation {k + 1} takes it after "
-        f"{taken(assembly, stays, before, final):.2f} s, though '{last.part}' rests only at {last.begins:.2f} s"
-    )
+    rests = ", ".join(f"{stay.begins:.2f} s" for stay in stays[main])
+    return f"'{main}', which operation {k + 1} moves, rests from {rests} on, and none of these follows the others"
 
 
 def taken(assembly: Assembly, stays: Stays, before: Sequence[Stay | None], stay: Stay) -> float:

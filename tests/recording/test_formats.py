@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import os
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -12,8 +10,9 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.geometry import pose
+from apo_bench.recording.camera_file import Conventions, read_camera
 from apo_bench.recording.formats import FORMATS, read_log
-from apo_bench.recording.setup_files import Conventions, part_tracks, read_camera, read_objects
+from apo_bench.recording.objects_file import name_tracks, read_objects
 from benchmarks.recording_forms import FORMS, Tracked
 from tests.recorded import CAMERA, RATE_HZ, motion
 
@@ -47,41 +46,45 @@ def test_a_part_is_where_its_frame_lies_in_the_model(tmp_path: Path) -> None:
     frame = "at_mm = [10, -20, 30], turn_deg = [20, -40, 60]"
     parts = "\n".join(f'{part} = {{ id = "{track.id}", frame = {{ {frame} }} }}' for part, track in written.items())
     (tmp_path / "o.toml").write_text(f'schema = "apo-bench/objects/1"\n[objects]\n{parts}\n', encoding="utf-8")
-    tracks = part_tracks(read_log(tmp_path / "log", "tum", Conventions()), read_objects(tmp_path / "o.toml"))
+    tracks = name_tracks(read_log(tmp_path / "log", "tum", Conventions()), read_objects(tmp_path / "o.toml"))
     for part, T in motion("block_on_block")[1].items():
         assert np.abs(CAMERA @ tracks[part].T - T).max() < 1e-6
 
 
 HEAD = "t_s,id,x_mm,y_mm,z_mm,qw,qx,qy,qz\n"
 ROW = "0.1,a,0,0,900,1,0,0,0\n"
-WRONG: dict[str, tuple[str, str]] = {
-    "empty": ("", "the file is empty"),
-    "no rows": (HEAD, "no pose stands in the file"),
-    "not finite": (HEAD + ROW + "0.2,a,nan,0,900,1,0,0,0\n", "line 3, column x_mm: a finite number is needed, 'nan'"),
-    "time twice": (HEAD + ROW + ROW, "line 3: a time of 'a' stands twice"),
-    "backwards": (HEAD + "0.2,a,0,0,900,1,0,0,0\n0.1,a,0,0,900,1,0,0,0\n", "the times of 'a' run backwards"),
-    "metres": (HEAD + "0.1,a,0,0,0.9,1,0,0,0\n", "these seem to be metres that were read as mm; state the unit"),
-    "length": (HEAD + "0.1,a,0,0,900,1,1,0,0\n", "line 2: a quaternion of length 1 is needed, one of length 1.414"),
-    "order": ("t_s,id,x_mm,y_mm,z_mm,q0,q1,q2,q3\n" + ROW, 'do not say their order; state `quaternion = "wxyz"`'),
-    "unit": ("t_s,id,x,y,z,qw,qx,qy,qz\n" + ROW, "the unit of the column 'x' is not known"),
-    "cells": (HEAD + "0.1,a,0,0\n", "line 2: 9 cells are needed, as many as line 1 has, which is read as the names"),
-    "title": ("# mytracker 1.2\n" + HEAD + ROW, "line 2: 1 cells are needed, as many as line 1 has"),
-    "no names": (ROW, "line 1: the names of columns are needed, such as t_s,id,x_mm, and the number 0.1 was given"),
-    "euler": ("t_s,id,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\n0.1,a,0,0,900,1,0,0\n", "do not say their order"),
-    "no time": ("id,x_mm,y_mm,z_mm,qw,qx,qy,qz\na,0,0,900,1,0,0,0\n", "the column of the time is missing"),
-    "milliseconds": (HEAD + ROW + "33.4,a,0,0,900,1,0,0,0\n", "33.3 s, so its times seem to be in another unit"),
-    "degrees": ("t_s,id,x_mm,y_mm,z_mm,rx_rad,ry_rad,rz_rad\n0.1,a,0,0,900,90,0,0\n", "up to 90 rad were given"),
-    "lacking": (HEAD.replace("qz", "q") + ROW, "qz is missing beside qw, qx, qy"),
-    "semicolons": (HEAD.replace(",", ";"), "columns are separated by commas; this file uses ';'"),
-}
+MESSAGE = (
+    '{"header": {"stamp": {"sec": 1}}, "pose": {"position": %s, "orientation": {"x": 0, "y": 0, "z": 0, "w": %s}}}'
+)
+WRONG = [
+    ("csv", "", "the file is empty"),
+    ("csv", HEAD, "no pose stands in the file"),
+    ("csv", HEAD + ROW + "0.2,a,nan,0,900,1,0,0,0\n", "line 3, column x_mm: a finite number is needed, 'nan'"),
+    ("csv", HEAD + ROW + ROW, "line 3: a time of 'a' stands twice"),
+    ("csv", HEAD + "0.1,a,0,0,0.9,1,0,0,0\n", "0.9 mm, so its lengths are in another unit"),
+    ("csv", HEAD + ROW + "33.4,a,0,0,900,1,0,0,0\n", "33.3 s, so its times are in another unit"),
+    ("csv", HEAD + "0.1,a,0,0,900,1,1,0,0\n", "line 2: a quaternion of length 1 is needed"),
+    ("csv", HEAD.replace("w,qx,qy,qz", "0,q1,q2,q3") + ROW, 'do not say their order; state `quaternion = "wxyz"`'),
+    ("csv", HEAD.replace("_mm", "") + ROW, "the unit of the column 'x' is not known"),
+    ("csv", "# mytracker 1.2\n" + HEAD + ROW, "line 2: 1 cells are needed, as many as line 1 has"),
+    ("csv", ROW, "line 1: the names of columns are needed, such as t_s,id,x_mm, and numbers were given"),
+    ("csv", "t_s,x_mm,y_mm,z_mm,roll_deg,pitch_deg,yaw_deg\n0.1,0,0,900,1,0,0\n", "do not say their order"),
+    ("csv", HEAD.replace("qz", "q") + ROW, "qz is missing beside qw, qx, qy"),
+    ("csv", HEAD.replace(",", ";"), "columns are separated by commas; this file uses ';'"),
+    ("tum", "# t\n1 0 0 0.9 0 0 0 1 7", "timestamp tx ty tz qx qy qz qw; '1 0 0 0.9 0 0 0 1 7' was given"),
+    ("tum", "# t\n1 0 0 x 0 0 0 1", "line 2: a finite number is needed, 'x' was given"),
+    ("ros-json", '{"header": {"stamp": {"sec": 1}}}', "a field `pose` with position and orientation is needed"),
+    ("ros-json", MESSAGE % ('{"x": "a", "y": 0, "z": 1}', 1), "line 1, x: a finite number"),
+    ("ros-json", MESSAGE % ('{"x": 0, "y": 0, "z": 1}', 2), "of length 1 is needed"),
+    ("ros-json", "3", "a message with named fields is needed"),
+]
 
 
-@pytest.mark.parametrize("what", WRONG)
-def test_what_is_wrong_with_a_log_is_one_sentence(what: str, tmp_path: Path) -> None:
-    text, sentence = WRONG[what]
+@pytest.mark.parametrize(("form", "text", "sentence"), WRONG)
+def test_what_is_wrong_with_a_log_is_one_sentence(form: str, text: str, sentence: str, tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(text, encoding="utf-8")
     with pytest.raises(InputError) as error:
-        read_log(tmp_path / "log.csv", "csv", Conventions())
+        read_log(tmp_path / "log.csv", form, Conventions())
     assert sentence in str(error.value)
     assert str(error.value).startswith(str(tmp_path))
     assert str(error.value).endswith(".")
@@ -106,85 +109,42 @@ def test_columns_are_known_by_their_names_however_they_are_written(tmp_path: Pat
 
 
 @pytest.mark.parametrize(
-    ("line", "sentence"),
+    ("stated", "sentence"),
     [
-        ("1 0 0 0.9 0 0 0 1 7", "timestamp tx ty tz qx qy qz qw; '1 0 0 0.9 0 0 0 1 7' was given"),
-        ("1 0 0 0.9 0 0 0", "line 2: eight numbers with spaces between them are needed"),
-        ("1 0 0 0.9 0 0 1 1", "line 2: a quaternion of length 1 is needed, one of length 1.414"),
-        ("1,0,0,0.9,0,0,0,1", "with spaces between them are needed, timestamp tx ty tz qx qy qz qw; '1,0,0,0.9"),
-        ("1 0 0 x 0 0 0 1", "line 2: a finite number is needed, 'x' was given"),
-        ("", "no pose stands in the file"),
+        ({"id": "body"}, "log.columns, id: unknown column 'body'"),
+        ({"corpus": "id"}, "log.columns: 'corpus' means nothing here"),
     ],
 )
-def test_what_is_wrong_with_a_line_of_tum_is_one_sentence(line: str, sentence: str, tmp_path: Path) -> None:
-    (tmp_path / "log.txt").write_text(f"# timestamp tx ty tz qx qy qz qw\n{line}\n", encoding="utf-8")
-    with pytest.raises(InputError) as error:
-        read_log(tmp_path / "log.txt", "tum", Conventions())
-    assert sentence in str(error.value)
-
-
-@pytest.mark.parametrize(
-    ("renamed", "sentence"),
-    [
-        ({"body": "id"}, "log.columns, id: unknown column 'body'"),
-        ({"id": "corpus"}, "log.columns: 'corpus' means nothing here"),
-    ],
-)
-def test_a_column_that_does_not_exist_is_named(renamed: dict[str, str], sentence: str, tmp_path: Path) -> None:
+def test_a_column_that_does_not_exist_is_named(stated: dict[str, str], sentence: str, tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(HEAD + ROW, encoding="utf-8")
     with pytest.raises(InputError) as error:
-        read_log(tmp_path / "log.csv", "csv", Conventions(columns=renamed))
+        read_log(tmp_path / "log.csv", "csv", Conventions(columns=stated))
     assert sentence in str(error.value)
 
 
-@pytest.mark.parametrize("form", FORMATS)
-def test_a_pipe_is_not_waited_for(form: str, tmp_path: Path) -> None:
+def test_a_pipe_is_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "log.csv")
     with pytest.raises(InputError, match="a pipe was given; give a"):
-        read_log(tmp_path / "log.csv", form, Conventions(rate_hz=1.0))
+        read_log(tmp_path / "log.csv", "csv", Conventions())
 
 
 def test_a_huge_file_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("apo_bench.recording.formats.LARGEST_LOG_BYTES", 1000)
+    monkeypatch.setattr("apo_bench.recording.row_logs.LARGEST_LOG_BYTES", 1000)
     (tmp_path / "log.csv").write_text(HEAD + "".join(f"{i},a,0,0,900,1,0,0,0\n" for i in range(100)), encoding="utf-8")
-    with pytest.raises(InputError, match=r"larger than 0\.001 MB; cut the log"):
+    with pytest.raises(InputError, match=r"larger than 0\.001 MB; give a log"):
         read_log(tmp_path / "log.csv", "csv", Conventions())
 
 
 def test_an_id_that_is_no_part_and_a_part_without_its_id_are_named(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(HEAD + ROW, encoding="utf-8")
     log = read_log(tmp_path / "log.csv", "csv", Conventions())
-    for id_, sentence in (("b", "the id 'a' is no part; name its part in"), ("a", "")):
-        text = f'schema = "apo-bench/objects/1"\n[objects]\npeg = {{ id = "{id_}" }}\n'
-        (tmp_path / "o.toml").write_text(text, encoding="utf-8")
-        if sentence:
-            with pytest.raises(InputError, match=sentence):
-                part_tracks(log, read_objects(tmp_path / "o.toml"))
-    (tmp_path / "o.toml").write_text(text + 'hole = { id = "c" }\n', encoding="utf-8")
-    with pytest.raises(InputError, match=r"hole: unknown id 'c'\. In the log: a\."):
-        part_tracks(log, read_objects(tmp_path / "o.toml"))
-
-
-JSON: dict[str, tuple[Callable[[dict], object], str]] = {
-    "no pose": (lambda m: {"header": m["header"]}, "a field `pose` or `transform` is needed"),
-    "text": (lambda m: m | {"pose": m["pose"] | {"position": {"x": "1", "y": 0, "z": 1}}}, "x: a finite number"),
-    "no stamp": (lambda m: {"pose": m["pose"]}, "header.stamp: a finite number is needed"),
-    "length": (lambda m: m | {"pose": m["pose"] | {"orientation": dict.fromkeys("xyzw", 1)}}, "length 2 was given"),
-    "number": (lambda m: 3, "a message with named fields is needed"),
-}
-
-
-@pytest.mark.parametrize("what", JSON)
-def test_what_is_wrong_with_a_message_is_one_sentence(what: str, tmp_path: Path) -> None:
-    change, sentence = JSON[what]
-    turn = {"x": 0, "y": 0, "z": 0, "w": 1}
-    stamp = {"stamp": {"sec": 1, "nanosec": 5}}
-    message = {"header": stamp, "pose": {"position": {"x": 0, "y": 0, "z": 1}, "orientation": turn}}
-    (tmp_path / "log.json").write_text(json.dumps([message]), encoding="utf-8")
-    assert list(read_log(tmp_path / "log.json", "ros-json", Conventions()).tracks) == ["log"]
-    (tmp_path / "log.json").write_text(json.dumps([change(message)]), encoding="utf-8")
-    with pytest.raises(InputError, match=sentence):
-        read_log(tmp_path / "log.json", "ros-json", Conventions())
+    for parts, sentence in (
+        ('peg = { id = "b" }', "the id 'a' is no part"),
+        ('peg = { id = "a" }\nhole = { id = 3 }', "'3'"),
+    ):
+        (tmp_path / "o.toml").write_text(f'schema = "apo-bench/objects/1"\n[objects]\n{parts}\n', encoding="utf-8")
+        with pytest.raises(InputError, match=sentence):
+            name_tracks(log, read_objects(tmp_path / "o.toml"))
 
 
 def test_images_of_bop_are_counted_by_the_rate_and_the_best_estimate_counts(tmp_path: Path) -> None:

@@ -7,8 +7,9 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.geometry import pose
-from apo_bench.recording.setup_files import Log, ObjectsFile, PoseTrack, TrackedPart, part_tracks
-from apo_bench.recording.stays import hands_of
+from apo_bench.recording.hands import find_hands
+from apo_bench.recording.objects_file import ObjectsFile, TrackedPart, name_tracks
+from apo_bench.recording.tracks import Log, PoseTrack
 from tests.recorded import CAMERA, motion, seen
 
 HELD = pose.at((0.0, 0.0, 0.09), (180.0, 0.0, 20.0))
@@ -33,9 +34,9 @@ def hand_over(name: str) -> PoseTrack:
 def test_a_hand_is_told_and_is_no_part(name: str) -> None:
     tracks = seen(name, 0.5)
     log = Log("log.csv", {**tracks, "glove": hand_over(name)}, ())
-    told = hands_of(log, objects(*tracks))
+    told = find_hands(log, objects(*tracks))
     assert set(told) == {"glove"}
-    assert set(part_tracks(log, objects(*tracks), told)) == set(tracks)
+    assert set(name_tracks(log, objects(*tracks), told)) == set(tracks)
 
 
 def test_a_part_that_has_no_name_is_no_hand() -> None:
@@ -44,6 +45,6 @@ def test_a_part_that_has_no_name_is_no_hand() -> None:
     for left_out in tracks:
         named = objects(*(part for part in tracks if part != left_out))
         log = Log("log.csv", tracks, ())
-        assert hands_of(log, named) == {}
+        assert find_hands(log, named) == {}
         with pytest.raises(InputError, match="is no part"):
-            part_tracks(log, named, hands_of(log, named))
+            name_tracks(log, named, find_hands(log, named))

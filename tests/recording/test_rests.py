@@ -7,8 +7,8 @@ import pytest
 
 from apo_bench.geometry import Array, pose
 from apo_bench.recording.rests import LEAST_REST_S, rests_of
-from apo_bench.recording.setup_files import PoseTrack
 from apo_bench.recording.stays import poses_at, stays_of
+from apo_bench.recording.tracks import PoseTrack
 from tests.recorded import RATE_HZ, seen
 
 BEFORE = pose.at((0.1, -0.2, 0.9), (10.0, 20.0, 30.0))

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from apo_bench.observation.fitting.fit import fit_noise
-from apo_bench.recording.rests import still_residuals
-from apo_bench.recording.setup_files import Log, PoseTrack
+from apo_bench.recording.still import still_residuals
+from apo_bench.recording.tracks import Log, PoseTrack
 from tests.recorded import seen
 
 

@@ -7,10 +7,11 @@ import numpy as np
 from apo_bench import load_scenario
 from apo_bench.geometry import pose
 from apo_bench.recording.arranging import CameraPose
+from apo_bench.recording.camera_file import CameraFile, Conventions
 from apo_bench.recording.importing import planned_starts
-from apo_bench.recording.setup_files import CameraFile, Conventions, Log
 from apo_bench.recording.show.drawing import unfit_drawing
 from apo_bench.recording.show.text import camera_lines
+from apo_bench.recording.tracks import Log
 from tests.recorded import seen
 
 NAME = "stick_in_tower"

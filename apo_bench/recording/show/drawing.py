@@ -1,36 +1,28 @@
 """A recording drawn, whether it fits, is refused or has no scenario: frames of camera and parts, paths, and rests."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from itertools import combinations, cycle, product
 from pathlib import Path
-from typing import Any, NamedTuple, final
+from typing import Any, final
 
 import numpy as np
 
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, Solid, pose
 from apo_bench.io import default_looks, save_figure
+from apo_bench.recording.approaches import approaches
 from apo_bench.recording.arranging import camera_pose
-from apo_bench.recording.importing import ImportedRecording, UnplannedRecording, planned_starts
-from apo_bench.recording.operations import approaches
-from apo_bench.recording.setup_files import CameraFile, Log, PoseTrack
+from apo_bench.recording.camera_file import CameraFile
+from apo_bench.recording.importing import ImportedRecording, planned_starts
 from apo_bench.recording.stays import Stays, all_stays
+from apo_bench.recording.tracks import Log, PoseTrack
+from apo_bench.recording.unplanned import UnplannedRecording
 from apo_bench.scenario.scenario import Scenario
 
 _AXES = ("#c0392b", "#2e8b57", "#2456a6")
 _PARTS = ("#cc5c45", "#4588c7", "#b8a02a", "#6b8e23", "#8e5ea2", "#3cba9f", "#777777")
-_AXIS_M = 0.03
-
-
-class DrawnEnd(NamedTuple):
-    """The last straight piece of a path."""
-
-    part: str
-    label: str
-    ends: Array
-    """(2, 3), world, [m]."""
 
 
 @final
@@ -50,7 +42,8 @@ class RecordingDrawing:
     """For the box around each part."""
     places: Mapping[str, Array] = field(default_factory=dict)
     """Part -> the known place on which it should start, (4, 4), world, [m]."""
-    path_ends: Sequence[DrawnEnd] = ()
+    path_ends: Sequence[tuple[str, str, Array]] = ()
+    """Part, label, and both ends of the last straight piece of its path, (2, 3), world, [m]."""
 
 
 def drawing_of(
@@ -69,7 +62,7 @@ def drawing_of(
         ],
         solids=recording.scenario.assembly.solids,
         places=camera.places(planned_starts(recording.scenario)),
-        path_ends=_path_ends(recording),
+        path_ends=tuple(_path_ends(recording)),
     )
 
 
@@ -107,15 +100,13 @@ def _title(log: Log, scenario: Scenario | None) -> str:
     return f"{log.file}{f', {scenario.name}' if scenario else ''}\n{'; '.join(log.notes)}"
 
 
-def _path_ends(recording: ImportedRecording) -> Sequence[DrawnEnd]:
-    drawn = []
+def _path_ends(recording: ImportedRecording) -> Iterator[tuple[str, str, Array]]:
     for k, end, macro, off_deg in approaches(recording.scenario, recording.operations, recording.camera.T_world_camera):
         if end is not None:
             goal = recording.observation.goals[k]
             ends = np.array([goal[:3, 3] - end.length_m * goal[:3, :3] @ end.direction, goal[:3, 3]])
             part = recording.scenario.assembly.operations[k].main
-            drawn.append(DrawnEnd(part, f"{k + 1}: {macro}, {off_deg:.0f} deg off", ends))
-    return drawn
+            yield part, f"{k + 1}: {macro}, {off_deg:.0f} deg off", ends
 
 
 @default_looks()
@@ -131,14 +122,13 @@ def draw_recording(drawing: RecordingDrawing, out: Path) -> None:
         _draw_frame(room, np.eye(4), 0.12, "world")
     _draw_frame(room, X, 0.12, "camera")
     _draw_parts(room, drawing, X, 0.05, False)
-    _draw_parts(near, drawing, X, _AXIS_M, True)
-    ends = [(X @ track.T)[i] for track in drawing.tracks.values() for i in (0, -1)]
-    rests = [X @ known[i].rests[-1].T for known in drawing.stays.values() if known for i in (0, -1)]
-    places = np.array([T[:3, 3] for T in (*(rests or ends), *drawing.places.values())])
-    _level(room, np.concatenate([places, X[None, :3, 3], np.zeros((1, 3))]), 0.1)
-    _level(near, places, 0.06)
-    room.set_title("frames: x red, y green, z blue; mm", fontsize=10)
-    near.set_title("first and last place; dashed: known place; thick: last straight piece", fontsize=10)
+    _draw_parts(near, drawing, X, 0.03, True)
+    for axes in (room, near):
+        axes.set_aspect("equal")
+        axes.view_init(elev=28.0, azim=-60.0)
+        axes.locator_params(nbins=5)
+    room.set_title("frames: x red, y green, z blue; m", fontsize=10)
+    near.set_title("first and last place; dotted: known place; thick: last straight piece", fontsize=10)
     near.legend(loc="upper left", fontsize=8, frameon=False)
     _draw_times(figure.add_subplot(grid[2]), drawing)
     figure.suptitle(drawing.title, fontsize=11)
@@ -156,9 +146,9 @@ def _draw_parts(axes: Any, drawing: RecordingDrawing, X: Array, reach: float, cl
                 _draw_box(axes, drawing.solids[part], T, color, "-")
         if close and part in drawing.places and part in drawing.solids:
             _draw_box(axes, drawing.solids[part], drawing.places[part], "black", ":")
-        for piece in drawing.path_ends if close else ():
-            if piece.part == part:
-                axes.plot(*piece.ends.T, color=color, linewidth=4.0, alpha=0.6, label=piece.label)
+        for of, label, ends in drawing.path_ends if close else ():
+            if of == part:
+                axes.plot(*ends.T, color=color, linewidth=4.0, alpha=0.6, label=label)
 
 
 def _draw_times(axis: Any, drawing: RecordingDrawing) -> None:
@@ -192,17 +182,3 @@ def _draw_box(axis: Any, solid: Solid, T: Array, color: str, style: str) -> None
         if np.abs(a - b).sum() == 1:
             ends = np.where(np.array([a, b]) == 1, solid.bounds[1], solid.bounds[0])
             axis.plot(*pose.apply(T, ends).T, color=color, linestyle=style, linewidth=0.9, alpha=0.8)
-
-
-def _level(axis: Any, points: Array, least: float) -> None:
-    """The same scale in all directions, in mm; at least so much, [m], to each side."""
-    from matplotlib.ticker import MaxNLocator
-
-    middle = (points.max(axis=0) + points.min(axis=0)) / 2
-    reach = max(0.55 * float(np.ptp(points, axis=0).max()), least)
-    axis.set(**{f"{name}lim": (at - reach, at + reach) for name, at in zip("xyz", middle, strict=True)})
-    axis.set_box_aspect((1, 1, 1))
-    for each in (axis.xaxis, axis.yaxis, axis.zaxis):
-        each.set_major_locator(MaxNLocator(5))
-        each.set_major_formatter(lambda x, _: f"{1e3 * x:.0f}")
-    axis.view_init(elev=28.0, azim=-60.0)

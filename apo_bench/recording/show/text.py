@@ -1,19 +1,19 @@
 """What was made of a recording, in words and as tables of files."""
 
-import csv
-import io
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
 from apo_bench.geometry import Array, frozen, pose
 from apo_bench.io import columns, direction
+from apo_bench.recording.approaches import approaches
 from apo_bench.recording.arranging import CameraPose
 from apo_bench.recording.averaging import per_axis
-from apo_bench.recording.importing import ImportedRecording, UnplannedRecording
-from apo_bench.recording.operations import approaches
+from apo_bench.recording.importing import ImportedRecording
+from apo_bench.recording.objects_file import ObjectsFile
 from apo_bench.recording.rests import RestSpan
-from apo_bench.recording.setup_files import Log, ObjectsFile
+from apo_bench.recording.tracks import Log
+from apo_bench.recording.unplanned import UnplannedRecording
 
 _HEADS: tuple[str, ...] = (
     "",
@@ -123,19 +123,29 @@ def put_lines(recording: UnplannedRecording) -> list[str]:
     ]
 
 
-def observation_table(
+OBSERVATION_HEAD = (
+    "operation",
+    "part",
+    "x_mm",
+    "y_mm",
+    "z_mm",
+    "qw",
+    "qx",
+    "qy",
+    "qz",
+    "deviation_mm",
+    "deviation_deg",
+    "seen",
+)
+
+
+def observation_rows(
     parts: Sequence[str], goals: Array, deviations: Sequence[tuple[float, float]], seen: Sequence[bool]
-) -> str:
-    """An observation file as CSV, mm and degrees."""
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(
-        ["operation", "part", "x_mm", "y_mm", "z_mm", "qw", "qx", "qy", "qz", "deviation_mm", "deviation_deg", "seen"]
-    )
+) -> Iterator[tuple[object, ...]]:
+    """The rows of an observation file as CSV, mm and degrees."""
     for k, (part, T, (m, rad), was_seen) in enumerate(zip(parts, goals, deviations, seen, strict=True), 1):
         packed = (pose.pack(T) * _POSE_UNITS).round(9).tolist()
-        writer.writerow([k, part, *packed, f"{1e3 * m:.4g}", f"{np.degrees(rad):.4g}", "true" if was_seen else "false"])
-    return text.getvalue()
+        yield (k, part, *packed, f"{1e3 * m:.4g}", f"{np.degrees(rad):.4g}", "true" if was_seen else "false")
 
 
 def path_rows(recording: ImportedRecording) -> Iterator[tuple[object, ...]]:
