@@ -15,14 +15,14 @@ import typer
 from apo_bench import __version__
 from apo_bench.cli import noise, part, recording, scenario, score, sweep
 from apo_bench.cli.arguments import NO_RESULT
-from apo_bench.cli.correct import correct_command
-from apo_bench.cli.explain import explain_command
+from apo_bench.cli.correct_command import correct_command
+from apo_bench.cli.explain_command import explain_command
 from apo_bench.cli.eye import eye_command
 from apo_bench.cli.graph import graph_command
 from apo_bench.cli.help import Grouped, GroupedOptions
 from apo_bench.cli.plan import plan_command
-from apo_bench.cli.recognise import recognise_command
-from apo_bench.cli.replay import run_replay
+from apo_bench.cli.recognise_command import recognise_command
+from apo_bench.cli.replay_command import run_replay
 from apo_bench.cli.scene import scene_command
 from apo_bench.cli.show import show_command
 from apo_bench.cli.view import view_command

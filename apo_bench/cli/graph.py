@@ -22,7 +22,7 @@ def graph_command(
     as_json: AsJson = False,
 ) -> None:
     """Print the relation graph: parts at their placements with their ODLs, contacts made and lost."""
-    from apo_bench.show.graph.picture import draw_graph
+    from apo_bench.show.graph.drawing import draw_graph
     from apo_bench.show.graph.text import graph_form, graph_lines, graph_title, mermaid_text
 
     check_outputs([(out, "--out", (".svg", ".png", ".mmd"))])

@@ -119,8 +119,9 @@ def _sentence(said: str, value: Any, wanted: Any, place: str) -> str:
     """What msgspec says, with the place in words: `mine.toml, operation 2, goal: a list is needed, 3 was given.`"""
     match = _PATH.fullmatch(said)
     assert match is not None
-    fault, path = match[1], match[2] or ""
-    for key, entry in _STEP.findall(path.partition("[...]")[0]):
+    fault, named = match[1], match[2] or ""
+    path = named.partition("[...]")[0]
+    for key, entry in _STEP.findall(path):
         value = value[key] if key else value[int(entry)]
     at = place + _ENTRY.sub(lambda found: f" {int(found[2]) + 1}", re.sub(r"^\[", ".entry[", path)).replace(".", ", ")
     if missing := re.fullmatch(r"Object missing required field `(.*)`", fault):

@@ -106,6 +106,8 @@ class StatedPart:
     """[kg/m^3]."""
     friction: tuple[float, ...]
     """Sliding, and then turning and rolling, as in MJCF; empty if unsaid."""
+    title: str
+    """What a person calls the part, in any letters; empty if unsaid."""
 
 
 def read_stated_part(path: Path) -> StatedPart:
@@ -124,6 +126,7 @@ def read_stated_part(path: Path) -> StatedPart:
         inertia=1e-15 * _inertia(top.inertia_mm5, f"{path}, inertia_mm5"),
         density=top.density,
         friction=_friction(top.friction, f"{path}, friction"),
+        title=top.title,
     )
 
 

@@ -8,6 +8,6 @@ searching for it in `execution/search.py`), `robot/robot.py` (a line of the tip 
 Hands that demonstrate: `human/demonstration.py`, `human/hands.py`.
 """
 
-from apo_bench.simulation.graphics import import_mujoco
+from apo_bench.mjcf.lazy_graphics import import_mujoco
 
 import_mujoco()

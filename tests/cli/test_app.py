@@ -129,7 +129,7 @@ def test_the_method_that_is_not_named_is_the_same_everywhere() -> None:
     from inspect import signature
 
     from apo_bench import Corrected, SweepSettings, TrialSettings, correct
-    from apo_bench.cli.correct import correct_command
+    from apo_bench.cli.correct_command import correct_command
     from apo_bench.cli.setting_options import trial_options
     from apo_bench.cli.show import show_command
     from apo_bench.records import CORRECTOR

@@ -67,7 +67,7 @@ MISBEHAVED = {
     "nonsense": "returned a str",
     "imaginary": "returned complex numbers as goals; return real ones",
     "wide": r"a position of 1e\+09 m",
-    "odd": "'users:odd' returned",
+    "odd": "the corrector 'users:odd' failed: freed of Correction must be a list",
     "red": r"returned '\\x1b\[31m red' as its sentence",
 }
 

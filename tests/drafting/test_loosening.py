@@ -155,7 +155,12 @@ def test_nothing_is_left_of_what_is_too_thin(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("fit", "said"),
-    [("nope = 0", "unknown key 'nope'"), ("head = -1.1", "-1 to 1"), ("head = 'x'", "number"), ("head = 2", "-1 to 1")],
+    [
+        ("nope = 0", "unknown face 'nope'"),
+        ("head = -1.1", "fit: a number >= -1.0 is needed"),
+        ("head = 'x'", "number"),
+        ("head = 2", "fit: a number <= 1.0 is needed"),
+    ],
 )
 def test_a_scenario_that_states_fit_faces_wrongly_is_refused(tmp_path: Path, fit: str, said: str) -> None:
     parts = slotted(tmp_path, 20.0)

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from apo_bench.assembly import Graph, relation_graph
+from apo_bench.show.graph.drawing import draw_graph
 from apo_bench.show.graph.layout import Bend, layout_graph
-from apo_bench.show.graph.picture import draw_graph
 from apo_bench.show.graph.text import mermaid_text
 from tests import rounds, scenes
 

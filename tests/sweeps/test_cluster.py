@@ -187,12 +187,11 @@ def test_files_below_the_current_folder_travel_and_no_others(
     (own / "deep").mkdir()
     (own / "deep" / "mine.toml").write_text(text.replace('file = "block"', 'file = "../part.xml"'))
     shutil.copy(folder("assets") / "parts" / "block.xml", own / "part.xml")
-    (own / "part.toml").write_text("")
     shutil.copy(folder("assets") / "noise" / "megapose-lmo.toml", own / "noise.toml")
     loaded = load_all([replace(SPEC, scenarios=("deep/mine.toml", str(far), "stick_in_tower"))])
     travel = travelling_files(loaded, (), ("code_of_mine:raises+feel", "noise.toml", "camera", "given", "six_axis"))
     code = {"code_of_mine.py", "helper_of_mine.py"}
-    assert set(travel) == {"deep/mine.toml", "part.xml", "part.toml", "noise.toml"} | code
+    assert set(travel) == {"deep/mine.toml", "part.xml", "noise.toml"} | code
     assert all((own / name).samefile(path) for name, path in travel.items())
 
 

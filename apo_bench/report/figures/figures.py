@@ -182,6 +182,5 @@ def _mark(setting: Place, place: Place, value: float, low: float, high: float) -
 
 
 def _unit(settings: Iterable[Any]) -> str:
-    """What a level is in most of them."""
-    units = [level_unit(setting.noise) for setting in settings]
-    return max(units, key=units.count, default="")
+    """What a level is; where settings differ in that, each of them."""
+    return "; ".join(dict.fromkeys(level_unit(setting.noise) for setting in settings))
