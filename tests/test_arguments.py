@@ -235,3 +235,23 @@ def test_a_relation_that_is_left_out_may_be_one_text() -> None:
     one, several, all_of_them = (apo_bench.explain(observation, observation.goals, x) for x in ("R1", ("R1",), ()))
     assert one.redundant == several.redundant < all_of_them.redundant
     assert (observation.assembly.without("R1") == observation.assembly.without(("R1",))).all()
+
+
+def test_settings_of_a_trial_are_texts_and_plain_numbers() -> None:
+    for wrong in ({"scenario": 3}, {"scenario": "dovetail", "noise": [1]}, {"scenario": "dovetail", "arm": [1]}):
+        with pytest.raises(apo_bench.InputError, match=r"a name is needed, a str"):
+            apo_bench.TrialSettings(**wrong)
+    assert type(apo_bench.TrialSettings("dovetail", level_mm=np.float32(0.5)).level_mm) is float
+    assert apo_bench.SweepSettings("dovetail", trials=np.int64(2)).trials == 2
+
+
+def test_a_scene_of_another_scenario_is_refused(tower: apo_bench.Scene) -> None:
+    with pytest.raises(apo_bench.InputError, match="the scene is of 'stick_in_tower'; build the scene of the same"):
+        apo_bench.run_trial(apo_bench.TrialSettings("dovetail"), tower)
+
+
+def test_a_part_is_written_into_its_folder_only(tmp_path: Path) -> None:
+    making = apo_bench.parts.making
+    body = making.extrude(making.rectangle(20.0, 20.0), 0.0, 10.0)
+    with pytest.raises(apo_bench.InputError, match=r"the name '\.\./x' of a part must be"):
+        making.write_part("../x", body, tmp_path, source="a test", licence="CC0-1.0")

@@ -5,6 +5,7 @@ import re
 import tomllib
 from collections.abc import Iterator
 from difflib import get_close_matches
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal, TypeVar, get_args, get_origin, get_type_hints
 
@@ -85,7 +86,7 @@ def parse_plain(text: str, file: str, syntax: Syntax) -> Any:
     try:
         if syntax == "toml":
             return tomllib.loads(text)
-        return json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=unique_members(file))
+        return json.loads(text, parse_constant=partial(_refuse_constant, file), object_pairs_hook=unique_members(file))
     except InputError:
         raise
     except json.JSONDecodeError as error:
@@ -96,8 +97,8 @@ def parse_plain(text: str, file: str, syntax: Syntax) -> Any:
         raise InputError(f"{file}: this is not {syntax.upper()}: nested too deep, or a huge number.") from error
 
 
-def _refuse_constant(constant: str) -> None:
-    raise InputError(f"every number in a JSON file must be finite, {constant} was given.")
+def _refuse_constant(file: str, constant: str) -> None:
+    raise InputError(f"{file}: every number must be finite, {constant} was given.")
 
 
 def convert_typed(value: Any, wanted: type[T], place: str) -> T:

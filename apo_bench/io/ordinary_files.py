@@ -28,7 +28,7 @@ def opened(path: str | Path, kind: str) -> Iterator[BinaryIO]:
         raise InputError(f"{str(path)!r}: this is not a path ({error}); give the path of a {kind}.") from error
     except OSError as error:
         raise _unreadable(path, kind, error) from error
-    require(stat.S_ISREG(mode), f"{path}: {kind_of(mode)} was given; give a {kind}.")
+    require(stat.S_ISREG(mode), f"{path}: {kind_of(mode)} was given; give {_one(kind)}.")
     try:
         with open(path, "rb") as file:
             yield file
@@ -55,7 +55,7 @@ def read_bytes(path: str | Path, kind: str, limit: int = LARGEST_BYTES, *, own: 
             f"{path}: the {kind} belongs to another user.",
         )
         content = file.read(limit + 1)
-    require(len(content) <= limit, f"{path}: the file is larger than {limit / 1e6:g} MB; give a {kind}.")
+    require(len(content) <= limit, f"{path}: the file is larger than {limit / 1e6:g} MB; give {_one(kind)}.")
     return content
 
 
@@ -105,3 +105,8 @@ _KINDS = (
 def kind_of(mode: int) -> str:
     """What a mode of `os.stat` is of, in words: `a folder`."""
     return next((name for is_kind, name in _KINDS if is_kind(mode)), "something else")
+
+
+def _one(kind: str) -> str:
+    """`a scenario file`, `an entry`."""
+    return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"

@@ -13,7 +13,7 @@ from typing import Annotated, Literal, Never, final, get_args, get_type_hints
 import numpy as np
 from msgspec import Meta
 
-from apo_bench.errors import InputError, require
+from apo_bench.errors import InputError, require, require_text
 from apo_bench.records.robot_error import (
     DRAWN,
     NO_ROBOT_ERROR,
@@ -268,6 +268,12 @@ class TrialSettings:
     """`full`, or `contact`: only the part of each motion in which things may touch is simulated."""
 
     def __post_init__(self) -> None:
+        for info in SETTINGS.values():
+            value = getattr(self, info.name)
+            if info.is_text:
+                require_text(info.name.replace("_", " "), value)
+            elif isinstance(value, np.generic):
+                object.__setattr__(self, info.name, value.item())
         for info in _CHECKED:
             check(info.name, getattr(self, info.name), self.eye)
             if info.spelled is not None:

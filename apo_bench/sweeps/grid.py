@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from itertools import product
-from numbers import Real
+from numbers import Integral, Real
 from typing import Any, final
 
 from apo_bench.arguments import check_arguments
@@ -90,9 +90,10 @@ class SweepSettings:
             )
             object.__setattr__(self, info.axis, values)
         require(
-            type(self.trials) is int and 1 <= self.trials <= MOST_TRIALS,
+            isinstance(self.trials, Integral) and 1 <= self.trials <= MOST_TRIALS,
             f"{self.trials} trials were given; a whole number from 1 to {MOST_TRIALS} is allowed.",
         )
+        object.__setattr__(self, "trials", int(self.trials))
         check("seed", self.seed)
         check("seed", self.seed + self.trials - 1)
         for eye in self.eyes:

@@ -30,6 +30,7 @@ from apo_bench.records import (
     told_error,
 )
 from apo_bench.records.run.validation import unwritable
+from apo_bench.scenario import scenario_names
 from apo_bench.simulation.execution import ReplayCache
 from apo_bench.simulation.execution.feel.feeling import ACTS, Feels
 from apo_bench.simulation.hooks import Hooks
@@ -119,6 +120,11 @@ def run_trial(
         InputError: The noise model, the relations or the corrector are unknown or returned what they must not.
     """
     scene = scene or scene_of(settings)
+    require(
+        settings.scenario == scene.scenario.name or settings.scenario not in scenario_names(),
+        f"the settings name the scenario '{settings.scenario}', the scene is of '{scene.scenario.name}'; build the "
+        "scene of the same scenario, or leave it out.",
+    )
     simulated = simulated or demonstration_of(settings, scene)
     content = content or content_hash(scene.scenario, settings.scenario, scene.arm.files)
     first = head(settings, scene.scenario, spec_hash(settings, content))

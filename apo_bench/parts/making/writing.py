@@ -8,9 +8,10 @@ from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import numpy as np
 
+from apo_bench.errors import require
 from apo_bench.geometry import WHOLE_TURN, Array, Box, Face, Hull, Piece, RoundFace, Solid, all_boxes, flat_area
 from apo_bench.io import write_file
-from apo_bench.parts.allowed import THINNEST_M
+from apo_bench.parts.allowed import THINNEST_M, is_name
 from apo_bench.parts.making.body import Body
 from apo_bench.parts.stated import PART_SCHEMA
 
@@ -100,6 +101,8 @@ def write_part(
         source: Where the shape comes from.
         title: What a person calls the part, in any letters.
     """
+    require(is_name(name), f"the name '{name}' of a part must be a letter, then letters, digits and underscores.")
+    require(density > 0.0, f"a density of {density:g} kg/m^3 was given; a number above 0 is allowed.")
     solid = solid_of(name, body)
     path = folder / f"{name}.xml"
     boxes = all_boxes(solid.pieces)
