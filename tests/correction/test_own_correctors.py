@@ -76,7 +76,7 @@ MISBEHAVED = {
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     made = tmp_path_factory.mktemp("own")
     (made / "users.py").write_text(CODE)
-    (made / "leaving.py").write_text("raise SystemExit(0)")
+    (made / "leaves_when_imported.py").write_text("raise SystemExit(0)")
     (made / "broken.py").write_text("def")
     with pytest.MonkeyPatch.context() as patch:
         patch.syspath_prepend(str(made))
@@ -118,7 +118,7 @@ def test_a_corrector_of_ones_own_may_look_again(scene: Scene) -> None:
         ("users:number", "is an int; give a function"),
         ("users:", "is not of the form"),
         (":leaves", "is not of the form"),
-        ("leaving:any", "SystemExit"),
+        ("leaves_when_imported:any", "SystemExit"),
         ("broken:any", "SyntaxError"),
     ],
 )
