@@ -150,7 +150,9 @@ def test_a_driver_that_is_stopped_goes_on_later(cluster: Any, here: list[bytes],
     process.send_signal(signal.SIGTERM)
     printed = process.communicate(timeout=60)
     assert process.returncode == 143
-    assert printed == ("", "apo-bench: ended by SIGTERM; what had ended is kept, and the same command continues.\n")
+    # on a slow machine Ray says on standard output that a node answers late
+    ours = [line for stream in printed for line in stream.splitlines() if "(raylet)" not in line]
+    assert ours == ["apo-bench: ended by SIGTERM; what had ended is kept, and the same command continues."]
     assert 2 <= len(lines(out)) < len(here)
     run_sweep(SPEC, out, backend="ray", address=cluster.address)
     assert lines(out) == here
