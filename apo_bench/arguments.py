@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal, NamedTuple, TypeVar, Union, get_args
 
 import numpy as np
 
-from apo_bench.errors import ArgumentError, shown
+from apo_bench.errors import ArgumentError, add_article, shown
 
 Public = TypeVar("Public", bound=Callable[..., Any])
 
@@ -97,11 +97,7 @@ def _read(hint: Any) -> _Type:
         return _mapping(*map(_read, within))
     if issubclass(origin, Collection) and within:
         return _several(origin, within)
-    return _Type(_with_article(origin), lambda value: _require(isinstance(value, origin), value))
-
-
-def _with_article(origin: type) -> str:
-    return f"{'an' if origin.__name__[0] in 'AEIOU' else 'a'} {origin.__name__}"
+    return _Type(add_article(origin.__name__), lambda value: _require(isinstance(value, origin), value))
 
 
 def _is_unchecked_protocol(origin: type) -> bool:
@@ -222,7 +218,7 @@ def _named_tuple(origin: Any) -> _Type:
         unchanged = isinstance(value, origin) and all(a is b for a, b in zip(taken, value, strict=True))
         return value if unchanged else taken
 
-    return _Type(_with_article(origin), take)
+    return _Type(add_article(origin.__name__), take)
 
 
 def _take_entry(of: _Type, value: Any) -> Any:

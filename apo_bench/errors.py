@@ -60,7 +60,7 @@ def kind(value: Any) -> str:
     if value is None or isinstance(value, type):
         return "None" if value is None else "a class"
     name = type(value).__name__.removeprefix("nd")  # an array of NumPy
-    return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
+    return add_article(name)
 
 
 def shown(value: Any) -> str:
@@ -68,6 +68,11 @@ def shown(value: Any) -> str:
     if isinstance(value, str | PurePath):
         return repr(value)[:_LONGEST]
     return str(value) if isinstance(value, Real) else kind(value)
+
+
+def add_article(name: str) -> str:
+    """`a scenario file`, `an entry`, `an int`."""
+    return f"{'an' if name[0].lower() in 'aeiou' else 'a'} {name}"
 
 
 def require_text(called: str, value: Any) -> None:

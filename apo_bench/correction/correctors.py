@@ -3,7 +3,7 @@
 Correct many observations of one assembly at once: what they share is worked out once, the rest is one array.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
 from math import ceil
@@ -21,9 +21,6 @@ from apo_bench.errors import RAISED, ArgumentError, InputError, failed, kind, re
 from apo_bench.geometry import Array, NotReal, is_rigid, real
 from apo_bench.names import resolve
 from apo_bench.records import CORRECTOR, CORRECTORS
-
-_Corrector = Callable[[Observation], Correction]
-"""Any function of this shape; one that returns nothing but goals (n, 4, 4) is accepted too."""
 
 _STATUSES = ("converged", "not_seen", "inconsistent", "doubtful", "not_converged", "not_finite")
 

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import BinaryIO
 
-from apo_bench.errors import InputError, require
+from apo_bench.errors import InputError, add_article, require
 
 LARGEST_BYTES = 1_000_000
 
@@ -28,7 +28,7 @@ def opened(path: str | Path, kind: str) -> Iterator[BinaryIO]:
         raise InputError(f"{str(path)!r}: this is not a path ({error}); give the path of a {kind}.") from error
     except OSError as error:
         raise _unreadable(path, kind, error) from error
-    require(stat.S_ISREG(mode), f"{path}: {kind_of(mode)} was given; give {_one(kind)}.")
+    require(stat.S_ISREG(mode), f"{path}: {kind_of(mode)} was given; give {add_article(kind)}.")
     try:
         with open(path, "rb") as file:
             yield file
@@ -40,35 +40,25 @@ def _unreadable(path: str | Path, kind: str, error: OSError) -> InputError:
     return InputError(f"{path}: the {kind} cannot be read ({error.strerror or error}); check the path.")
 
 
-def read_bytes(path: str | Path, kind: str, limit: int = LARGEST_BYTES, *, own: bool = False) -> bytes:
+def read_bytes(path: str | Path, kind: str, limit: int = LARGEST_BYTES) -> bytes:
     """What stands in a file.
 
-    Args:
-        own: Whether it must belong to this user, where the system tells users apart.
-
     Raises:
-        InputError: It is no ordinary file, cannot be opened, is larger than the limit, or belongs to another user.
+        InputError: It is no ordinary file, cannot be opened, or is larger than the limit.
     """
     with opened(path, kind) as file:
-        require(
-            not (own and hasattr(os, "geteuid") and os.fstat(file.fileno()).st_uid != os.geteuid()),
-            f"{path}: the {kind} belongs to another user.",
-        )
         content = file.read(limit + 1)
-    require(len(content) <= limit, f"{path}: the file is larger than {limit / 1e6:g} MB; give {_one(kind)}.")
+    require(len(content) <= limit, f"{path}: the file is larger than {limit / 1e6:g} MB; give {add_article(kind)}.")
     return content
 
 
-def read_text(path: str | Path, kind: str, limit: int = LARGEST_BYTES, *, own: bool = False) -> str:
+def read_text(path: str | Path, kind: str, limit: int = LARGEST_BYTES) -> str:
     """The text of a file, without a byte order mark.
 
-    Args:
-        own: As in `read_bytes`.
-
     Raises:
-        InputError: It cannot be read, is larger than the limit, belongs to another user, or is not UTF-8.
+        InputError: It cannot be read, is larger than the limit, or is not UTF-8.
     """
-    return decoded(read_bytes(path, kind, limit, own=own), str(path), kind)
+    return decoded(read_bytes(path, kind, limit), str(path), kind)
 
 
 def each_line(path: str | Path, kind: str) -> Iterator[tuple[int, bytes]]:
@@ -105,8 +95,3 @@ _KINDS = (
 def kind_of(mode: int) -> str:
     """What a mode of `os.stat` is of, in words: `a folder`."""
     return next((name for is_kind, name in _KINDS if is_kind(mode)), "something else")
-
-
-def _one(kind: str) -> str:
-    """`a scenario file`, `an entry`."""
-    return f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}"

@@ -87,8 +87,3 @@ def check_span(span: tuple[float, float], place: str) -> tuple[float, float]:
 def read_pose(node: JsonNode) -> Array:
     """A pose out of a document, (4, 4), [m]."""
     return convert_typed(node.value, Pose, node.place).matrix
-
-
-def read_any_pose(node: JsonNode) -> Array:
-    """A pose whose turn is stated in one of three ways, out of a document, (4, 4), [m]."""
-    return convert_typed(node.value, AnyPose, node.place).matrix(node.place)

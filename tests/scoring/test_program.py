@@ -22,6 +22,7 @@ from apo_bench.scoring.answers import read_answers, write_request
 from apo_bench.scoring.entry import read_entry
 from apo_bench.scoring.program import LARGEST_ANSWER_BYTES, ask_program
 from tests import round_contacts, scenes
+from tests.scoring.test_score import SMALL
 
 TOWER = scenes.stick_in_tower()
 SEEN = scenes.seen(TOWER, TOWER.goals)
@@ -35,17 +36,6 @@ from pathlib import Path
 child = subprocess.Popen([sys.executable, "-c", "import sys\\nCHILD"])
 Path("pid").write_text(str(child.pid))
 child.wait()
-"""
-TRACK = """
-scenarios = ["block_on_block"]
-levels = [1]
-careless = [0]
-trials = 2
-grasps = ["weld"]
-
-[track]
-schema = "apo-bench/track/1"
-title = "A small one"
 """
 
 
@@ -115,7 +105,7 @@ def test_a_program_is_told_of_round_faces_by_their_axes(tmp_path: Path) -> None:
 @pytest.fixture(scope="module")
 def requests(tmp_path_factory: pytest.TempPathFactory) -> list[dict[str, Any]]:
     folder = tmp_path_factory.mktemp("export")
-    (folder / "small.toml").write_text(TRACK)
+    (folder / "small.toml").write_text(SMALL)
     out = folder / "requests.jsonl"
     assert main(["score", "--export", str(out), "--track", str(folder / "small.toml"), "--workers", "1"]) == 0
     return [json.loads(line) for line in out.read_text().splitlines()]
@@ -131,7 +121,7 @@ def lines(answers: list[Any]) -> str:
 
 
 def score(folder: Path, text: str) -> int:
-    (folder / "small.toml").write_text(TRACK)
+    (folder / "small.toml").write_text(SMALL)
     (folder / "goals.jsonl").write_text(text)
     files = [str(folder / name) for name in ("goals.jsonl", "small.toml", "entry.json")]
     return main(["score", "--answers", files[0], "--track", files[1], "--out", files[2], "--workers", "1"])
