@@ -7,17 +7,19 @@ from apo_bench.assembly.goals import Observation as Observation
 from apo_bench.assembly.goals import Plan as Plan
 from apo_bench.assembly.reached import ReplayResult as ReplayResult
 from apo_bench.assembly.topology import Assembly as Assembly
+from apo_bench.benchmark.sweeps.grid import SweepSettings as SweepSettings
+from apo_bench.benchmark.sweeps.sweep import run_sweep as run_sweep
 from apo_bench.correction.contact.contact import ContactCorrector as ContactCorrector
 from apo_bench.correction.correctors import correct as correct
 from apo_bench.correction.correctors import correct_many as correct_many
 from apo_bench.correction.explanation import explain as explain
 from apo_bench.envs.corrected import Corrected as Corrected
 from apo_bench.errors import InputError as InputError
-from apo_bench.files.observation import read_observation as read_observation
+from apo_bench.formats.observation import read_observation as read_observation
 from apo_bench.judging.verdict import Verdict as Verdict
 from apo_bench.judging.verdict import judge as judge
-from apo_bench.observation.observing import observe as observe
-from apo_bench.recognition.contacts import recognise as recognise
+from apo_bench.perception.detection.contacts import recognise as recognise
+from apo_bench.perception.observation.observing import observe as observe
 from apo_bench.records.settings import TrialSettings as TrialSettings
 from apo_bench.records.thresholds import Criteria as Criteria
 from apo_bench.scenario.file import load_scenario as load_scenario
@@ -32,8 +34,6 @@ from apo_bench.simulation.scene.render import camera_view as camera_view
 from apo_bench.simulation.scene.render import picture as picture
 from apo_bench.simulation.scene.scene import Scene as Scene
 from apo_bench.simulation.scene.scene import build_scene as build_scene
-from apo_bench.sweeps.grid import SweepSettings as SweepSettings
-from apo_bench.sweeps.sweep import run_sweep as run_sweep
 from apo_bench.trial.fitting import fitting_plan as fitting_plan
 from apo_bench.trial.trial import run_trial as run_trial
 

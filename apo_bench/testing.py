@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import Any, final
 
 from apo_bench.assembly import Correction, Observation
+from apo_bench.benchmark.scoring.track import read_track
+from apo_bench.benchmark.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.errors import require, unknown
 from apo_bench.records import CORRECTOR, TrialSettings
-from apo_bench.scoring.track import read_track
 from apo_bench.simulation.scene import Scene
-from apo_bench.sweeps.grid import SweepSettings, load_all, units
 from apo_bench.trial.fingerprint import content_hash
 from apo_bench.trial.stages import demonstration_of, scene_key, scene_of
 from apo_bench.trial.trial import trial_row

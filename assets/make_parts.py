@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.parts.making import (
+from apo_bench.scenario.parts.making import (
     Body,
     Bore,
     Frustum,

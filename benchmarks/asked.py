@@ -15,8 +15,8 @@ from typing import Any, NamedTuple
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from apo_bench.sweeps.grid import load_all, units
-from apo_bench.sweeps.sweep_file import read_sweep
+from apo_bench.benchmark.sweeps.grid import load_all, units
+from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 
 ROOT = Path(__file__).resolve().parents[1]
 FIRST = "<!-- seeds -->"

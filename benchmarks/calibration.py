@@ -30,10 +30,10 @@ from apo_bench.assembly import Demonstration, Observation
 from apo_bench.correction.correctors import correct
 from apo_bench.correction.region import contains_truth
 from apo_bench.geometry import Array, pose, symmetries
-from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.fitted import MeasuredNoise, restated
-from apo_bench.observation.noise import FAILURES, NOISES, Level, make_noise
-from apo_bench.observation.noise_file import presets, read_noise
+from apo_bench.perception.observation.models.camera import Camera
+from apo_bench.perception.observation.models.fitted import MeasuredNoise, restated
+from apo_bench.perception.observation.noise import FAILURES, NOISES, Level, make_noise
+from apo_bench.perception.observation.noise_file import presets, read_noise
 from apo_bench.scenario.file import load_scenario
 from apo_bench.scenario.layout import draw_layout
 

@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.assembly import placements
-from apo_bench.depth_camera.follow import Event
 from apo_bench.geometry import pose
+from apo_bench.perception.depth_camera.follow import Event
 from apo_bench.scenario.file import load_scenario, scenario_names
 from apo_bench.simulation.scene.scene import Scene, build_scene
 from apo_bench.simulation.sensor.rays import ModelRays

@@ -29,12 +29,12 @@ from apo_bench.assembly import Plan, measured_rates, placements
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.contacts import face_overlap
-from apo_bench.observation.looking import Looks
-from apo_bench.observation.models import Camera
-from apo_bench.observation.models.failures import PRESETS, RATE, CameraFailures, Failure, draw_failing
-from apo_bench.observation.noise import Level
-from apo_bench.observation.observing import observe
-from apo_bench.prediction.failure import predict
+from apo_bench.perception.observation.looking import Looks
+from apo_bench.perception.observation.models import Camera
+from apo_bench.perception.observation.models.failures import PRESETS, RATE, CameraFailures, Failure, draw_failing
+from apo_bench.perception.observation.noise import Level
+from apo_bench.perception.observation.observing import observe
+from apo_bench.planning.prediction.failure import predict
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.outcome_columns import goal_errors
 from benchmarks.failures_page import write

@@ -28,12 +28,12 @@ import tomllib
 
 import mujoco
 
+from apo_bench.benchmark.analysis import wilson
 from apo_bench.errors import InputError
 from apo_bench.records import TrialSettings, parsed
 from apo_bench.scenario.file import load_scenario
-from apo_bench.simulation.execution.feel.feeling import ACTS
+from apo_bench.simulation.execution.probing.feeling import ACTS
 from apo_bench.simulation.scene.scene import Scene
-from apo_bench.statistics import wilson
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.stages import (
     WRENCH,

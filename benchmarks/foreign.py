@@ -29,19 +29,19 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 
 from apo_bench.assembly import contact_kind
-from apo_bench.cad.assembled import coming_near, mates_of
-from apo_bench.cad.places import named_places, write_places
-from apo_bench.cad.solids.raw_solid import RawSolid, SolidPlace
-from apo_bench.drafting.checking import check_file
-from apo_bench.drafting.from_cad import import_solid, solids_at
-from apo_bench.drafting.posed import read_posed
-from apo_bench.drafting.upright import drafted
-from apo_bench.drafting.writing import write_scenario
 from apo_bench.errors import InputError
 from apo_bench.geometry import pose
-from apo_bench.parts import load_part
+from apo_bench.importers.assembly.checking import check_file
+from apo_bench.importers.assembly.from_cad import import_solid, solids_at
+from apo_bench.importers.assembly.posed import read_posed
+from apo_bench.importers.assembly.upright import drafted
+from apo_bench.importers.assembly.writing import write_scenario
+from apo_bench.importers.cad.assembled import coming_near, mates_of
+from apo_bench.importers.cad.places import named_places, write_places
+from apo_bench.importers.cad.solids.raw_solid import RawSolid, SolidPlace
 from apo_bench.records import TrialSettings
 from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.parts import load_part
 from apo_bench.trial.stages import scene_of
 from apo_bench.trial.trial import run_trial
 from benchmarks.foreign_table import METHODS, came_to, page, table

@@ -11,11 +11,22 @@ from typing import NamedTuple
 
 import numpy as np
 
-from apo_bench.drafting.draft import draft
-from apo_bench.drafting.posed import on_the_table, read_posed
-from apo_bench.drafting.writing import write_scenario
-from apo_bench.parts.making import Body, Frustum, bore, extrude, join, polygon, rectangle, shaft, turned, write_part
+from apo_bench.importers.assembly.draft import draft
+from apo_bench.importers.assembly.posed import on_the_table, read_posed
+from apo_bench.importers.assembly.writing import write_scenario
 from apo_bench.records import TrialSettings
+from apo_bench.scenario.parts.making import (
+    Body,
+    Frustum,
+    bore,
+    extrude,
+    join,
+    polygon,
+    rectangle,
+    shaft,
+    turned,
+    write_part,
+)
 from apo_bench.trial.stages import scene_of
 from apo_bench.trial.trial import run_trial
 

@@ -21,14 +21,14 @@ import imageio.v3 as imageio
 import numpy as np
 
 from apo_bench.assembly import placements
-from apo_bench.drafting.checking import check_file
-from apo_bench.drafting.posed import TABLE
+from apo_bench.benchmark.analysis import wilson
+from apo_bench.importers.assembly.checking import check_file
+from apo_bench.importers.assembly.posed import TABLE
 from apo_bench.records import TrialSettings
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.execution.replay_cache import ReplayCache
 from apo_bench.simulation.scene.render import camera_view, picture
 from apo_bench.simulation.scene.scene import Scene, build_scene
-from apo_bench.statistics import wilson
 from apo_bench.trial.stages import scene_of, simulate_demonstration
 from apo_bench.trial.trial import run_trial
 from benchmarks.generated import FAMILIES, generated, scenario_of

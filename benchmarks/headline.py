@@ -22,10 +22,10 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from apo_bench.benchmark.analysis import read_timing, tally
+from apo_bench.benchmark.analysis.paired import paired
+from apo_bench.benchmark.report.report import report
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.report.report import report
-from apo_bench.statistics import read_timing, tally
-from apo_bench.statistics.paired import paired
 from benchmarks.headline_figure import draw_look
 from benchmarks.headline_look import block, look_at
 from benchmarks.headline_page import page

@@ -12,8 +12,8 @@ matplotlib.use("Agg")
 
 import matplotlib.pyplot as plt
 
-from apo_bench.report.figures.style import INK, RULE, SOFT
-from apo_bench.statistics import Rate
+from apo_bench.benchmark.analysis import Rate
+from apo_bench.benchmark.report.figures.style import INK, RULE, SOFT
 from benchmarks.headline_look import NOISES, TOLD_LEVEL, WORDS, Look, pooled, robot_rate, robot_scenarios
 
 LOOKS = {"none": "#d55e00", "search": "#c2186f", "contact-robust": "#332288", "contact": "#332288", "oracle": SOFT}

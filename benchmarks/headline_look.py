@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from typing import NamedTuple
 
+from apo_bench.benchmark.analysis import Cell, Rate
 from apo_bench.records import TrialSettings
-from apo_bench.statistics import Cell, Rate
 
 TOLD_LEVEL = 1.0
 """Of the sentence, and of where it breaks: mm and degrees."""

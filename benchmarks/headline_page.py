@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from apo_bench.benchmark.analysis import Cell, Paired
+from apo_bench.benchmark.sweeps.grid import described, load_all
+from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 from apo_bench.records import SETTINGS, TrialSettings
-from apo_bench.statistics import Cell, Paired
-from apo_bench.sweeps.grid import described, load_all
-from apo_bench.sweeps.sweep_file import read_sweep
 from benchmarks.headline_look import TOLD_LEVEL, Look, block, robot_scenarios
 from benchmarks.headline_tables import differing, rates, together, widths
 

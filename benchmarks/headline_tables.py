@@ -6,9 +6,9 @@ from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from apo_bench.benchmark.analysis import Cell, Paired, Rate, read_timing, wilson
+from apo_bench.benchmark.report.comparison.compare import compare
 from apo_bench.records import as_seen
-from apo_bench.report.comparison.compare import compare
-from apo_bench.statistics import Cell, Paired, Rate, read_timing, wilson
 
 Of = Callable[[Cell], Hashable]
 

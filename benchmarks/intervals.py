@@ -26,8 +26,8 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import expit, ndtr, ndtri
 
-from apo_bench.statistics import mean_surprise, tango, threshold, wilson
-from apo_bench.statistics.half_level import sure
+from apo_bench.benchmark.analysis import mean_surprise, tango, threshold, wilson
+from apo_bench.benchmark.analysis.half_level import sure
 
 LONG = ("mean over seeds", "sure bounds")
 SEEDS = (50, 100, 200)

@@ -14,8 +14,8 @@ import argparse
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-from apo_bench.scoring.entry import Entry
-from apo_bench.scoring.leaderboard import leaderboard_table, ranked, read_entries, write_leaderboard
+from apo_bench.benchmark.scoring.entry import Entry
+from apo_bench.benchmark.scoring.leaderboard import leaderboard_table, ranked, read_entries, write_leaderboard
 from benchmarks.made_with import with_mujoco
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -20,7 +20,7 @@ from typing import Any
 
 import mujoco
 
-from apo_bench.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import Level, make_noise
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.execution.controller import replay

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from apo_bench.drafting.draft import draft
-from apo_bench.drafting.posed import on_the_table, read_posed
-from apo_bench.drafting.writing import write_scenario
-from apo_bench.parts.making import Body, extrude, join, polygon, rectangle
+from apo_bench.importers.assembly.draft import draft
+from apo_bench.importers.assembly.posed import on_the_table, read_posed
+from apo_bench.importers.assembly.writing import write_scenario
+from apo_bench.scenario.parts.making import Body, extrude, join, polygon, rectangle
 from benchmarks.generated import Assembled, Between, Place, write
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from apo_bench.assembly import Layout
 from apo_bench.geometry import Array, pose
-from apo_bench.observation.models.camera import WORKSPACE_MIDDLE_M
+from apo_bench.perception.observation.models.camera import WORKSPACE_MIDDLE_M
 from apo_bench.records import TrialSettings
 from apo_bench.scenario.layout import draw_layout
 from apo_bench.simulation.human.demonstration import demonstrate

@@ -21,12 +21,12 @@ import mujoco
 import numpy as np
 
 from apo_bench.geometry import pose
+from apo_bench.importers.recording.camera_file import read_camera
+from apo_bench.importers.recording.formats import read_log
+from apo_bench.importers.recording.importing import ImportedRecording, import_recording
+from apo_bench.importers.recording.objects_file import name_tracks, read_objects
+from apo_bench.importers.recording.ordering import Stated
 from apo_bench.judging.verdict import judge
-from apo_bench.recording.camera_file import read_camera
-from apo_bench.recording.formats import read_log
-from apo_bench.recording.importing import ImportedRecording, import_recording
-from apo_bench.recording.objects_file import name_tracks, read_objects
-from apo_bench.recording.ordering import Stated
 from apo_bench.simulation.execution.controller import replay
 from apo_bench.trial.planning import apply_method
 from benchmarks.made_with import said_by, with_mujoco

@@ -16,9 +16,9 @@ from statistics import median
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from apo_bench.benchmark.analysis import Cell, tally, wilson
 from apo_bench.records import Row, TrialSettings
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.statistics import Cell, tally, wilson
 from benchmarks.feel_acts import Line, lines_of, table
 from benchmarks.made_with import mujoco_of, states_of_code, with_mujoco
 

@@ -17,9 +17,9 @@ from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from apo_bench.benchmark.analysis import tango, wilson
 from apo_bench.records import Row
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.statistics import tango, wilson
 from benchmarks.asked import ROBUST, block
 from benchmarks.made_with import mujoco_of, with_mujoco
 

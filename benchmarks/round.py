@@ -18,9 +18,9 @@ from typing import NamedTuple
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
+from apo_bench.benchmark.analysis import wilson
 from apo_bench.records import Row
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.statistics import wilson
 from benchmarks.asked import ROUND, block
 from benchmarks.made_with import mujoco_of, with_mujoco
 

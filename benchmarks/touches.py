@@ -30,7 +30,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 from scipy.stats import chi2
 
-from apo_bench.correction.touches import UNSTATED, RobotBelief, Touch, believe, slip_sigmas
+from apo_bench.correction.calibration import UNSTATED, RobotBelief, Touch, believe, slip_sigmas
 from apo_bench.geometry import Array, pose
 from apo_bench.records import robot_sigmas
 from apo_bench.records.robot_error import Sigmas

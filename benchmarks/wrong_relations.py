@@ -22,9 +22,9 @@ import numpy as np
 
 from apo_bench import Assembly, Demonstration, Observation, draw_layout, load_scenario
 from apo_bench.correction.correctors import correct
-from apo_bench.observation.noise import make_noise
-from apo_bench.observation.observing import observe
-from apo_bench.observation.relations import make_relations, with_relations
+from apo_bench.perception.observation.noise import make_noise
+from apo_bench.perception.observation.observing import observe
+from apo_bench.perception.observation.relations import make_relations, with_relations
 from benchmarks.failures import LEVEL, right
 from benchmarks.failures_page import ROOT, put
 

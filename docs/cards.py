@@ -11,9 +11,9 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from apo_bench.assembly import relation_graph
 from apo_bench.scenario.file import load_scenario, scenario_names
-from apo_bench.show.card import cards
-from apo_bench.show.graph.drawing import draw_graph
-from apo_bench.show.graph.text import graph_title
+from apo_bench.viz.card import cards
+from apo_bench.viz.graph.drawing import draw_graph
+from apo_bench.viz.graph.text import graph_title
 from benchmarks.asks import HEAD, asks, by_heart
 from benchmarks.baselines import kept
 

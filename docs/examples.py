@@ -19,7 +19,7 @@ import numpy as np
 
 from apo_bench.assembly import Plan, ReplayResult
 from apo_bench.geometry import Array
-from apo_bench.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import Level, make_noise
 from apo_bench.scenario.file import load_scenario
 from apo_bench.simulation.scene.render import SceneCamera, camera_view, picture_with_arm
 from apo_bench.simulation.scene.scene import Scene, build_scene

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from apo_bench.show.sensor import run_sensor
-from apo_bench.show.sensor_picture import draw_sensor
+from apo_bench.viz.sensor import run_sensor
+from apo_bench.viz.sensor_picture import draw_sensor
 
 HERE = Path(__file__).parent
 SHOWN = {"stick_in_tower": 7, "carried_bridge": 2}

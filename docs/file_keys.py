@@ -21,18 +21,18 @@ import msgspec
 import numpy as np
 from fields import sentences
 
+from apo_bench.benchmark.sweeps.grid import AXES, SHARED
+from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 from apo_bench.cli.setting_options import shown_default
-from apo_bench.drafting.writing import THRESHOLDS
+from apo_bench.importers.assembly.writing import THRESHOLDS
 from apo_bench.io import JsonNode
-from apo_bench.observation.models.fitted import ConstantError, ViewNoise
-from apo_bench.observation.noise_file import noise_text, presets, read_noise
-from apo_bench.parts import stated
+from apo_bench.perception.observation.models.fitted import ConstantError, ViewNoise
+from apo_bench.perception.observation.noise_file import noise_text, presets, read_noise
 from apo_bench.records import SETTINGS, SettingInfo
 from apo_bench.scenario import tables as scenario_tables
+from apo_bench.scenario.parts import stated
 from apo_bench.scenario.values import Pose
 from apo_bench.simulation.arms.arm import Arm
-from apo_bench.sweeps.grid import AXES, SHARED
-from apo_bench.sweeps.sweep_file import read_sweep
 
 ROOT = Path(__file__).parents[1]
 EXAMPLE = ROOT / "docs" / "guide" / "sweeps.md"

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from apo_bench.correction.correctors import correct
-from apo_bench.observation.noise import Level, make_noise
-from apo_bench.observation.observing import observe
-from apo_bench.show.noise_card import SCENARIO, draw_errors, list_models, nominal_demonstration, write_card
+from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.observing import observe
+from apo_bench.viz.noise_card import SCENARIO, draw_errors, list_models, nominal_demonstration, write_card
 
 HERE = Path(__file__).parent
 PAGE = HERE / "reference" / "noise-models.md"
@@ -25,7 +25,7 @@ one seed gives comparable errors at all of them. At level 0 the models below see
 covariance also holds the mean square of the person's error, where the scenario has one, and at least 0.05 mm and 0.05
 degrees.
 
-`tests/observation/test_laws.py` and, for what is measured, `tests/observation/test_measured_noise.py` hold all of them
+`tests/perception/observation/test_laws.py` and, for what is measured, `test_measured_noise.py` there hold all of them
 to the same laws: over seeds, errors have zero mean and the covariance that is declared; nothing depends on the choice
 of the world frame; what was not seen says so; what was seen reaches the robot bit for bit.
 

@@ -11,14 +11,14 @@ from top_picture import ARM, FITS, JAMS, draw_top, shot
 
 from apo_bench.assembly import Plan
 from apo_bench.correction.correctors import correct
-from apo_bench.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import Level, make_noise
 from apo_bench.scenario.file import load_scenario
-from apo_bench.show.believed_picture import belief_panel, draw_beliefs
 from apo_bench.simulation.film.film import frames
 from apo_bench.simulation.scene.scene import build_scene
 from apo_bench.trial.request import Request, run_request
 from apo_bench.trial.stages import observe_demonstration, simulate_demonstration
 from apo_bench.trial.story import Story
+from apo_bench.viz.believed_picture import belief_panel, draw_beliefs
 
 HERE = Path(__file__).parent / "pictures"
 SEED = 7

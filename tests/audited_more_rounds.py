@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from apo_bench.assembly import Operation
-from apo_bench.parts import load_part
+from apo_bench.scenario.parts import load_part
 from tests.audited_rounds import DOWN
 from tests.audited_states import Seen
 from tests.end_states import END, moved, put, shift

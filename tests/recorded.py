@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench import load_scenario
 from apo_bench.geometry import Array, pose
-from apo_bench.recording.tracks import PoseTrack
+from apo_bench.importers.recording.tracks import PoseTrack
 from apo_bench.scenario.layout import layout_at
 
 RATE_HZ = 30.0

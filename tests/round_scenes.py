@@ -10,11 +10,11 @@ import numpy as np
 from apo_bench import Assembly, Scenario
 from apo_bench.assembly import Contact, Operation, PartFace
 from apo_bench.geometry import Array, pose
-from apo_bench.insertion.arrival import Preference
-from apo_bench.parts import load_part, part_path
-from apo_bench.parts.making import Body, bore, extrude, rectangle, shaft, write_part
+from apo_bench.planning.insertion.arrival import Preference
 from apo_bench.records import Thresholds
 from apo_bench.scenario.attach_lines import with_attach_lines
+from apo_bench.scenario.parts import load_part, part_path
+from apo_bench.scenario.parts.making import Body, bore, extrude, rectangle, shaft, write_part
 from apo_bench.scenario.scenario import Grasp, Site
 
 PEG = shaft(5, -25, 25, "wall", bottom="bottom", top="top")

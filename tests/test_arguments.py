@@ -15,14 +15,14 @@ import pytest
 
 import apo_bench
 from apo_bench.assembly import Operation, Outcome, Reached, Snapshot
-from apo_bench.datasets import endless_pairs
+from apo_bench.benchmark.datasets import endless_pairs
+from apo_bench.benchmark.scoring.track import read_track, read_tracks
+from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 from apo_bench.envs.apo_replay import APOReplay
-from apo_bench.files.observation import as_planned
-from apo_bench.parts.making import rectangle
+from apo_bench.formats.observation import as_planned
 from apo_bench.resources import folder
-from apo_bench.scoring.track import read_track, read_tracks
+from apo_bench.scenario.parts.making import rectangle
 from apo_bench.simulation.arms.arm import read_description
-from apo_bench.sweeps.sweep_file import read_sweep
 from apo_bench.trial.stages import simulate_demonstration
 
 SCENARIO = "stick_on_castles"
@@ -251,7 +251,7 @@ def test_a_scene_of_another_scenario_is_refused(tower: apo_bench.Scene) -> None:
 
 
 def test_a_part_is_written_into_its_folder_only(tmp_path: Path) -> None:
-    making = apo_bench.parts.making
+    making = apo_bench.scenario.parts.making
     body = making.extrude(making.rectangle(20.0, 20.0), 0.0, 10.0)
     with pytest.raises(apo_bench.InputError, match=r"the name '\.\./x' of a part must be"):
         making.write_part("../x", body, tmp_path, source="a test", licence="CC0-1.0")

@@ -1,4 +1,4 @@
-"""The walls of the house: every contract is kept, and each one breaks when its wall is broken."""
+"""Import contracts: each is kept, and each breaks when a forbidden import is added."""
 
 from __future__ import annotations
 
@@ -24,7 +24,27 @@ BREACHES = {
         ("apo_bench.simulation.scene.scene", "apo_bench.correction.contact.contact"),
         ("apo_bench.scenario.file", "apo_bench.trial.trial"),
         ("apo_bench.geometry.pose", "apo_bench.assembly.goals"),
-        ("apo_bench.sweeps.sweep", "apo_bench.report.report"),
+        ("apo_bench.perception.observation.noise", "apo_bench.trial.trial"),
+    ],
+    "scenario": [
+        ("apo_bench.scenario.parts.load", "apo_bench.scenario.file"),
+        ("apo_bench.scenario.generated.families", "apo_bench.scenario.layout"),
+    ],
+    "planning": [
+        ("apo_bench.planning.insertion.arrival", "apo_bench.planning.prediction.failure"),
+    ],
+    "perception": [
+        ("apo_bench.perception.observation.noise", "apo_bench.perception.detection.contacts"),
+        ("apo_bench.perception.detection.contacts", "apo_bench.perception.depth_camera.locate"),
+    ],
+    "benchmark": [
+        ("apo_bench.benchmark.sweeps.sweep", "apo_bench.benchmark.report.report"),
+        ("apo_bench.benchmark.analysis.rates", "apo_bench.benchmark.sweeps.sweep"),
+        ("apo_bench.benchmark.report.report", "apo_bench.benchmark.scoring.score"),
+    ],
+    "importers": [
+        ("apo_bench.importers.cad.importing", "apo_bench.importers.assembly.draft"),
+        ("apo_bench.importers.assembly.draft", "apo_bench.importers.recording.importing"),
     ],
     "simulation": [
         ("apo_bench.simulation.arms.kinematics", "apo_bench.simulation.scene.world"),
@@ -40,13 +60,13 @@ BREACHES = {
         ("apo_bench.simulation.hooks", "apo_bench.simulation.robot.robot"),
     ],
     "cad": [
-        ("apo_bench.cad.faces.fitting", "apo_bench.cad.step.surfaces"),
-        ("apo_bench.cad.pieces.cutting", "apo_bench.cad.meshes.shells"),
-        ("apo_bench.cad.solids.raw_solid", "apo_bench.cad.pieces.corners"),
+        ("apo_bench.importers.cad.faces.fitting", "apo_bench.importers.cad.step.surfaces"),
+        ("apo_bench.importers.cad.pieces.cutting", "apo_bench.importers.cad.meshes.shells"),
+        ("apo_bench.importers.cad.solids.raw_solid", "apo_bench.importers.cad.pieces.corners"),
     ],
     "cad-loose": [
-        ("apo_bench.cad.pieces.cutting", "apo_bench.cad.contact_faces"),
-        ("apo_bench.cad.solids.naming", "apo_bench.cad.part_report"),
+        ("apo_bench.importers.cad.pieces.cutting", "apo_bench.importers.cad.contact_faces"),
+        ("apo_bench.importers.cad.solids.naming", "apo_bench.importers.cad.part_report"),
     ],
     "correction": [
         ("apo_bench.correction.solvers.gauss_newton", "apo_bench.correction.contact.contact"),
@@ -61,35 +81,35 @@ BREACHES = {
         ("apo_bench.correction.contact.inferred", "apo_bench.correction.contact.problem"),
         ("apo_bench.correction.contact.starts", "apo_bench.correction.contact.contact"),
     ],
-    "touches": [
-        ("apo_bench.correction.touches.robust_estimate", "apo_bench.correction.touches.belief"),
-        ("apo_bench.correction.touches.robust_estimate", "apo_bench.correction.touches.belief"),
+    "calibration": [
+        ("apo_bench.correction.calibration.robust_estimate", "apo_bench.correction.calibration.belief"),
+        ("apo_bench.correction.calibration.robust_estimate", "apo_bench.correction.calibration.belief"),
     ],
-    "workshop": [
-        ("apo_bench.trial.trial", "apo_bench.recording.importing"),
-        ("apo_bench.show.card", "apo_bench.drafting.draft"),
-        ("apo_bench.scenario.file", "apo_bench.cad.importing"),
+    "importers-used": [
+        ("apo_bench.trial.trial", "apo_bench.importers.recording.importing"),
+        ("apo_bench.viz.card", "apo_bench.importers.assembly.draft"),
+        ("apo_bench.scenario.file", "apo_bench.importers.cad.importing"),
     ],
     "report": [
-        ("apo_bench.report.page.report_page", "apo_bench.report.comparison.text"),
-        ("apo_bench.report.page.report_page", "apo_bench.report.answer"),
-        ("apo_bench.report.tables.cells", "apo_bench.report.facts"),
-        ("apo_bench.report.figures.figures", "apo_bench.report.page.report_page"),
+        ("apo_bench.benchmark.report.page.report_page", "apo_bench.benchmark.report.comparison.text"),
+        ("apo_bench.benchmark.report.page.report_page", "apo_bench.benchmark.report.answer"),
+        ("apo_bench.benchmark.report.tables.cells", "apo_bench.benchmark.report.facts"),
+        ("apo_bench.benchmark.report.figures.figures", "apo_bench.benchmark.report.page.report_page"),
     ],
     "statistics": [
-        ("apo_bench.statistics.rates", "apo_bench.statistics.half_level"),
-        ("apo_bench.statistics.settings", "apo_bench.statistics.summary"),
-        ("apo_bench.statistics.paired", "apo_bench.statistics.over_seeds"),
+        ("apo_bench.benchmark.analysis.rates", "apo_bench.benchmark.analysis.half_level"),
+        ("apo_bench.benchmark.analysis.settings", "apo_bench.benchmark.analysis.summary"),
+        ("apo_bench.benchmark.analysis.paired", "apo_bench.benchmark.analysis.over_seeds"),
     ],
     "sweeps": [
-        ("apo_bench.sweeps.grid", "apo_bench.sweeps.worker"),
-        ("apo_bench.sweeps.worker", "apo_bench.sweeps.pool"),
-        ("apo_bench.sweeps.pool", "apo_bench.sweeps.cluster"),
-        ("apo_bench.sweeps.cluster", "apo_bench.sweeps.sweep"),
+        ("apo_bench.benchmark.sweeps.grid", "apo_bench.benchmark.sweeps.worker"),
+        ("apo_bench.benchmark.sweeps.worker", "apo_bench.benchmark.sweeps.pool"),
+        ("apo_bench.benchmark.sweeps.pool", "apo_bench.benchmark.sweeps.cluster"),
+        ("apo_bench.benchmark.sweeps.cluster", "apo_bench.benchmark.sweeps.sweep"),
     ],
     "judge": [
-        ("apo_bench.judging.verdict", "apo_bench.observation.noise"),
-        ("apo_bench.judging.contacts", "apo_bench.recognition.contacts"),
+        ("apo_bench.judging.verdict", "apo_bench.perception.observation.noise"),
+        ("apo_bench.judging.contacts", "apo_bench.perception.detection.contacts"),
         ("apo_bench.judging.verdict", "apo_bench.correction.contact.contact"),
     ],
     "corrector": [
@@ -97,15 +117,15 @@ BREACHES = {
         ("apo_bench.correction.contact.contact", "apo_bench.mjcf.part_file"),
         ("apo_bench.correction.solvers.compact", "apo_bench.simulation.scene.settling"),
     ],
-    "rows": [
-        ("apo_bench.report.report", "apo_bench.trial.trial"),
-        ("apo_bench.statistics.rates", "apo_bench.simulation.scene.scene"),
+    "records": [
+        ("apo_bench.benchmark.report.report", "apo_bench.trial.trial"),
+        ("apo_bench.benchmark.analysis.rates", "apo_bench.simulation.scene.scene"),
         ("apo_bench.records.settings", "apo_bench.assembly.goals"),
     ],
     "simulators": [
         ("apo_bench.envs.apo_replay", "mujoco"),
         ("apo_bench.cli.app", "mink"),
-        ("apo_bench.parts.part_file", "mujoco"),
+        ("apo_bench.scenario.parts.part_file", "mujoco"),
     ],
     "dm-control": [
         ("apo_bench.simulation.scene.composing", "dm_control"),
@@ -147,7 +167,7 @@ def test_the_contract_is_kept(graph: grimp.ImportGraph, contract: str) -> None:
     ("contract", "importer", "imported"),
     [(name, *breach) for name, breaches in BREACHES.items() for breach in breaches],
 )
-def test_a_broken_wall_is_seen(graph: grimp.ImportGraph, contract: str, importer: str, imported: str) -> None:
+def test_a_broken_contract_is_noticed(graph: grimp.ImportGraph, contract: str, importer: str, imported: str) -> None:
     assert {importer} <= graph.modules
     graph.add_import(importer=importer, imported=imported)
     try:
@@ -156,23 +176,23 @@ def test_a_broken_wall_is_seen(graph: grimp.ImportGraph, contract: str, importer
         graph.remove_import(importer=importer, imported=imported)
 
 
-def test_the_lists_of_rooms_are_complete() -> None:
-    """A new room is in the layers, and may not know a simulator or Gymnasium unless somebody says so."""
+def test_the_lists_of_packages_are_complete() -> None:
+    """A new package is in the layers, and knows neither a simulator nor Gymnasium unless it is listed."""
     package = ROOT / "apo_bench"
-    rooms = {
+    packages = {
         f"apo_bench.{path.stem}"
         for path in package.iterdir()
         if (path / "__init__.py").is_file() or (path.suffix == ".py" and path.stem != "__init__")
     }
-    layers = {f"apo_bench.{room.strip()}" for line in CONTRACTS["layers"]["layers"] for room in line.split("|")}
-    assert layers == rooms
-    workshop = {"apo_bench.__main__", "apo_bench.cli", *CONTRACTS["workshop"]["forbidden_modules"]}
-    assert {*CONTRACTS["workshop"]["source_modules"], *workshop} == rooms
-    assert {*CONTRACTS["simulators"]["source_modules"], "apo_bench.simulation", "apo_bench.mjcf"} == rooms
-    assert {*CONTRACTS["gymnasium"]["source_modules"], "apo_bench.envs"} == rooms
+    layers = {f"apo_bench.{package.strip()}" for line in CONTRACTS["layers"]["layers"] for package in line.split("|")}
+    assert layers == packages
+    users = {"apo_bench.__main__", "apo_bench.cli", *CONTRACTS["importers-used"]["forbidden_modules"]}
+    assert {*CONTRACTS["importers-used"]["source_modules"], *users} == packages
+    assert {*CONTRACTS["simulators"]["source_modules"], "apo_bench.simulation", "apo_bench.mjcf"} == packages
+    assert {*CONTRACTS["gymnasium"]["source_modules"], "apo_bench.envs"} == packages
 
 
-@pytest.mark.parametrize("room", ["cad", "simulation"])
-def test_a_wall_between_subfolders_names_every_subfolder(room: str) -> None:
-    subfolders = {path.parent.name for path in (ROOT / "apo_bench" / room).glob("*/__init__.py")}
-    assert {each.strip() for line in CONTRACTS[room]["layers"] for each in line.split("|")} == subfolders
+@pytest.mark.parametrize("package", ["importers/cad", "simulation"])
+def test_a_contract_between_subfolders_names_every_subfolder(package: str) -> None:
+    subfolders = {path.parent.name for path in (ROOT / "apo_bench" / package).glob("*/__init__.py")}
+    assert {each.strip() for line in CONTRACTS[Path(package).name]["layers"] for each in line.split("|")} == subfolders

@@ -14,8 +14,8 @@ EXCEPTIONS = {
     "io/streams.py": {"fdopen": 1, "os.open": 1},  # standard error, /dev/null
     "io/result_files.py": {"open": 2, "os.open": 3, "os.replace": 1, "os.link": 1, "copyfileobj": 1},  # the function
     "records/run/run_folder.py": {"open": 1, "os.write": 1},  # records are appended; half of a last line is cut off
-    "scoring/program.py": {"TemporaryFile": 1},  # the request that a program reads; no result
-    "sweeps/cluster.py": {"copyfile": 1, "touch": 1},  # a temporary folder
+    "benchmark/scoring/program.py": {"TemporaryFile": 1},  # the request that a program reads; no result
+    "benchmark/sweeps/cluster.py": {"copyfile": 1, "touch": 1},  # a temporary folder
 }
 """File -> calls that write something else than a result file, and how many."""
 WRITERS = {

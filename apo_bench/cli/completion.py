@@ -17,7 +17,7 @@ def offered_names(what: str) -> list[str]:
     if what == "scenario":
         return _stems("scenarios", "*.toml")
     if what == "noise":
-        from apo_bench.observation.noise import NOISES
+        from apo_bench.perception.observation.noise import NOISES
 
         return [*NOISES, *_stems("assets", "noise/*.toml")]
     if what == "arm":

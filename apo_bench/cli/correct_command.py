@@ -11,8 +11,8 @@ from apo_bench.cli.outputs import check_outputs
 from apo_bench.cli.planned import plan_correction
 from apo_bench.cli.printing import print_json, print_lines, print_tables, say
 from apo_bench.errors import require
-from apo_bench.files.deviations import assumed_deviations
-from apo_bench.files.observation import read_observation_file
+from apo_bench.formats.deviations import assumed_deviations
+from apo_bench.formats.observation import read_observation_file
 from apo_bench.io import redirect_output, write_file
 from apo_bench.records import CORRECTOR, with_simulated
 
@@ -45,8 +45,8 @@ def correct_command(
 ) -> None:
     """Correct observed poses by their face contacts; no simulator is needed."""
     from apo_bench.correction.correctors import correct
-    from apo_bench.show.correct_text import correction_form, correction_lines, correction_tables
     from apo_bench.trial.promise import promise_sentence
+    from apo_bench.viz.correct_text import correction_form, correction_lines, correction_tables
 
     check_outputs([(out, "--out", (".json", ".csv"))], [observation])
     method = method or (CORRECTOR if if_doubtful is None else "contact")
@@ -55,8 +55,8 @@ def correct_command(
         observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg
     )
     if camera_noise is not None:
-        from apo_bench.observation.models.fitted import restated
-        from apo_bench.observation.noise_file import read_noise
+        from apo_bench.perception.observation.models.fitted import restated
+        from apo_bench.perception.observation.noise_file import read_noise
 
         seen = restated(seen, *read_noise(camera_noise))
         assumed = False
@@ -117,8 +117,8 @@ def _corrector(method: str, doubt: str | None) -> Any:
 
 
 def _write_plan(out: Path, scenario: str, name: str, plan: Plan) -> None:
-    from apo_bench.files.csv_form import table
-    from apo_bench.files.json_forms import plan_form, write_form
+    from apo_bench.formats.csv_form import table
+    from apo_bench.formats.json_forms import plan_form, write_form
 
     if out.suffix.lower() == ".json":
         write_form(plan_form(plan, name if scenario == name else str(Path(scenario).resolve())), out)

@@ -9,7 +9,7 @@ from apo_bench.cli.arguments import AsJson, DeviationDeg, DeviationMm, ScenarioA
 from apo_bench.cli.outputs import check_outputs
 from apo_bench.cli.planned import plan_correction
 from apo_bench.cli.printing import print_json, print_tables, say
-from apo_bench.files.observation import as_planned, read_observation_file
+from apo_bench.formats.observation import as_planned, read_observation_file
 from apo_bench.scenario.file import load_scenario
 
 
@@ -26,7 +26,8 @@ def explain_command(
     """Say what the contacts determine: what is fixed by which relations, what is free, how well poses are known."""
     from apo_bench.correction.correctors import correct
     from apo_bench.correction.explanation import explain
-    from apo_bench.show.explain_text import (
+    from apo_bench.trial.promise import promise_sentence
+    from apo_bench.viz.explain_text import (
         explanation_form,
         hypothesis_forms,
         hypothesis_lines,
@@ -34,7 +35,6 @@ def explain_command(
         sentences,
         total,
     )
-    from apo_bench.trial.promise import promise_sentence
 
     check_outputs([(out, "--out", (".png",))])
     stated = f"seen with a standard deviation of {deviation_mm:g} mm and {deviation_deg:g} deg per axis"
@@ -55,7 +55,7 @@ def explain_command(
         where = f"at the corrected goals of {observation}" + f", {stated} where it states none" * assumed
     explanation = explain(seen, at)
     if out is not None:
-        from apo_bench.show.explain_picture import draw_explanation
+        from apo_bench.viz.explain_picture import draw_explanation
 
         draw_explanation(loaded, seen, explanation, out)
     form = explanation_form(loaded.name, explanation)

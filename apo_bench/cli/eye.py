@@ -20,14 +20,14 @@ def eye_command(
     as_json: AsJson = False,
 ) -> None:
     """Watch a demonstration with a range finder: what moved, which part it was, where it went."""
-    from apo_bench.show.sensor import checked_view, run_sensor, sensor_form, sensor_table
+    from apo_bench.viz.sensor import checked_view, run_sensor, sensor_form, sensor_table
 
     check_outputs([(out, "--out", (".png",))])
     drawn_view = checked_view(view)
     sensor_run = run_sensor(scenario, level, seed, careless)
     form = sensor_form(sensor_run, level, seed, careless)
     if out is not None:
-        from apo_bench.show.sensor_picture import draw_sensor
+        from apo_bench.viz.sensor_picture import draw_sensor
 
         draw_sensor(sensor_run, out, drawn_view)
     if as_json:

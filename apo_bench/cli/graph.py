@@ -9,7 +9,7 @@ from apo_bench.assembly import observed_residuals, relation_graph
 from apo_bench.cli.arguments import AsJson, ScenarioArgument
 from apo_bench.cli.outputs import check_outputs
 from apo_bench.cli.printing import print_answer, say
-from apo_bench.files.observation import read_observation
+from apo_bench.formats.observation import read_observation
 from apo_bench.io import write_file
 from apo_bench.scenario.file import load_scenario
 
@@ -22,8 +22,8 @@ def graph_command(
     as_json: AsJson = False,
 ) -> None:
     """Print the relation graph: parts at their placements with their ODLs, contacts made and lost."""
-    from apo_bench.show.graph.drawing import draw_graph
-    from apo_bench.show.graph.text import graph_form, graph_lines, graph_title, mermaid_text
+    from apo_bench.viz.graph.drawing import draw_graph
+    from apo_bench.viz.graph.text import graph_form, graph_lines, graph_title, mermaid_text
 
     check_outputs([(out, "--out", (".svg", ".png", ".mmd"))])
     loaded = load_scenario(scenario)

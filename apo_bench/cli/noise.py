@@ -18,7 +18,7 @@ _NAME = "A name out of `apo-bench noise list`, FILE.toml, empirical:FILE.csv, or
 
 def noise_list() -> None:
     """List the noise models that have a name."""
-    from apo_bench.show.noise_card import list_models
+    from apo_bench.viz.noise_card import list_models
 
     models = list_models()
     width = max(map(len, models))
@@ -42,8 +42,8 @@ def print_noise_card(
     ] = 1.0,
 ) -> None:
     """Print the card of a noise model: formula, frame, parameters, and a table of its errors."""
-    from apo_bench.observation.noise import Level
-    from apo_bench.show.noise_card import draw_errors, write_card
+    from apo_bench.perception.observation.noise import Level
+    from apo_bench.viz.noise_card import draw_errors, write_card
 
     check("level_mm", level, called="level")
     both = Level(level, level)
@@ -66,12 +66,12 @@ def noise_fit(
     as_json: AsJson = False,
 ) -> None:
     """Measure a pose estimator: fit tails along and across the ray, outliers and misses, to its published results."""
-    from apo_bench.files.bop import read_results
-    from apo_bench.files.bop_truth import read_truth
-    from apo_bench.observation.fitting import fit
-    from apo_bench.observation.models.empirical import residuals_text
-    from apo_bench.observation.models.residuals import match_residuals
-    from apo_bench.show.fit_text import fit_form, fit_lines, fit_notes
+    from apo_bench.formats.bop import read_results
+    from apo_bench.formats.bop_truth import read_truth
+    from apo_bench.perception.observation.fitting import fit
+    from apo_bench.perception.observation.models.empirical import residuals_text
+    from apo_bench.perception.observation.models.residuals import match_residuals
+    from apo_bench.viz.fit_text import fit_form, fit_lines, fit_notes
 
     outputs = [(out, "--out", (".toml",)), (residuals, "--residuals", (".csv",)), (picture, "--picture", (".png",))]
     check_outputs(outputs, (estimates, truth))
@@ -98,11 +98,11 @@ def noise_still(
     picture: _Picture = None,
 ) -> None:
     """Measure a camera on parts that rest: how its frames scatter, how many are missing, how many are wrong."""
-    from apo_bench.observation.fitting import fit
-    from apo_bench.recording.camera_file import read_camera
-    from apo_bench.recording.formats import read_log
-    from apo_bench.recording.still import still_residuals
-    from apo_bench.show.fit_text import fit_form, fit_lines
+    from apo_bench.importers.recording.camera_file import read_camera
+    from apo_bench.importers.recording.formats import read_log
+    from apo_bench.importers.recording.still import still_residuals
+    from apo_bench.perception.observation.fitting import fit
+    from apo_bench.viz.fit_text import fit_form, fit_lines
 
     check_outputs([(out, "--out", (".toml",)), (picture, "--picture", (".png",))], (camera,))
     stated = read_camera(camera)
@@ -122,8 +122,8 @@ def _write_fit(
     residuals: Any, measured: Any, files: tuple[Path | None, Path | None], notes: tuple[str, ...], *camera: Any
 ) -> None:
     """Write the noise file and the picture of a fit, where they are asked for."""
-    from apo_bench.observation.noise_file import noise_text
-    from apo_bench.show.fit_picture import draw_fit
+    from apo_bench.perception.observation.noise_file import noise_text
+    from apo_bench.viz.fit_picture import draw_fit
 
     out, picture = files
     if out is not None:

@@ -19,12 +19,12 @@ from apo_bench.cli.printing import print_json, say
 from apo_bench.cli.values import path_given
 from apo_bench.errors import InputError, require
 from apo_bench.io import check_target, read_text, write_file
-from apo_bench.parts.allowed import LARGEST_PART_BYTES
 from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.parts.allowed import LARGEST_PART_BYTES
 
 if TYPE_CHECKING:
-    from apo_bench.cad.importing import Imported
-    from apo_bench.cad.solids.raw_solid import RawSolid
+    from apo_bench.importers.cad.importing import Imported
+    from apo_bench.importers.cad.solids.raw_solid import RawSolid
 
 part = group("part", "Parts from CAD files.")
 
@@ -47,10 +47,10 @@ def part_import(
     as_json: AsJson = False,
 ) -> None:
     """Make part files from a CAD file: find its faces, cut it into convex pieces, and say what was done."""
-    from apo_bench.cad.importing import raw_solids
-    from apo_bench.cad.part_report import file_lines, report_file
-    from apo_bench.cad.places import named_places, write_places
-    from apo_bench.cad.solids.naming import renamed
+    from apo_bench.importers.cad.importing import raw_solids
+    from apo_bench.importers.cad.part_report import file_lines, report_file
+    from apo_bench.importers.cad.places import named_places, write_places
+    from apo_bench.importers.cad.solids.naming import renamed
 
     names = _pairs(name or [])
     require(1.0 <= density <= 25_000.0, f"--density {density:g} was given; 1 to 25000 kg/m^3 are allowed.")
@@ -81,10 +81,10 @@ def _written(
     file: Path, raws: Sequence[RawSolid], out: Path, density: float, as_json: bool
 ) -> tuple[list[Imported], list[str]]:
     """Parts with their pictures; and why others of the file became none."""
-    from apo_bench.cad.importing import import_part
-    from apo_bench.cad.part_picture import draw_part
-    from apo_bench.cad.part_report import part_lines, report_part
-    from apo_bench.cad.solids.naming import part_name, title_of
+    from apo_bench.importers.cad.importing import import_part
+    from apo_bench.importers.cad.part_picture import draw_part
+    from apo_bench.importers.cad.part_report import part_lines, report_part
+    from apo_bench.importers.cad.solids.naming import part_name, title_of
 
     imported: list[Imported] = []
     left_out: list[str] = []
@@ -143,8 +143,8 @@ _WHOLE_TABLE = (np.array([-0.15, 0.0, 0.3]), 1.9, 140.0, -18.0)
 @arm.command("list")
 def arm_list() -> None:
     """List the arms that come with the benchmark, and how others are named."""
-    from apo_bench.show.arm_text import list_line
     from apo_bench.simulation.arms.finding import arm_names, find_arm
+    from apo_bench.viz.arm_text import list_line
 
     for name in arm_names():
         typer.echo(list_line(name, find_arm(name)))
@@ -164,9 +164,9 @@ def arm_check(
     out: Annotated[Path | None, typer.Option(help="Draw it at the table into this file: .png.")] = None,
 ) -> None:
     """Say what an arm can do at the table: reach, errors of its tip, stiffness, gripper, room along a plan."""
-    from apo_bench.show.arm_text import check_lines
     from apo_bench.simulation.arm_checks.arm_check import check_arm
     from apo_bench.simulation.arms.finding import find_arm
+    from apo_bench.viz.arm_text import check_lines
 
     check_outputs([(out, "--out", (".png",))])
     loaded = load_scenario(scenario)

@@ -11,9 +11,9 @@ from apo_bench.cli.arguments import AsJson, ScenarioArgument, StatedDeg, StatedM
 from apo_bench.cli.outputs import check_outputs
 from apo_bench.cli.printing import print_json
 from apo_bench.errors import require
-from apo_bench.files.deviations import assumed_deviations
-from apo_bench.files.observation import read_observation_file
-from apo_bench.files.robot_frames import RobotFrames, read_robot_frames
+from apo_bench.formats.deviations import assumed_deviations
+from apo_bench.formats.observation import read_observation_file
+from apo_bench.formats.robot_frames import RobotFrames, read_robot_frames
 from apo_bench.geometry import Array, pose
 from apo_bench.io import redirect_output
 from apo_bench.records import CORRECTOR, SETTINGS
@@ -51,9 +51,9 @@ def plan_command(
     as_json: AsJson = False,
 ) -> None:
     """Say how every operation is done: contact states, macros, from where until where, what is guarded, the grasp."""
-    from apo_bench.files.json_forms import write_form
-    from apo_bench.show.plan_text import plan_lines, plan_lines_form, plan_text
-    from apo_bench.show.robot_form import robot_form
+    from apo_bench.formats.json_forms import write_form
+    from apo_bench.viz.plan_text import plan_lines, plan_lines_form, plan_text
+    from apo_bench.viz.robot_form import robot_form
 
     check_outputs([(robot, "--robot", (".json",))])
     require(
@@ -116,8 +116,8 @@ def _base_of(arm: str) -> Array:
 
 
 def _acts_form(scenario: Scenario, plan: Plan, frames: RobotFrames, sensor: str, arm: str | None) -> dict[str, Any]:
-    from apo_bench.show.acts_form import acts_form
     from apo_bench.simulation.scene.scene import build_scene
+    from apo_bench.viz.acts_form import acts_form
 
     return acts_form(plan, build_scene(scenario, arm=arm or SETTINGS["arm"].default), frames, sensor)
 

@@ -18,7 +18,7 @@ class PlannedCorrection(NamedTuple):
 
 def plan_correction(scenario: Scenario, observation: Observation, correction: Correction) -> PlannedCorrection:
     """Move a plan that would not fit; a simulator is asked only then."""
-    from apo_bench.prediction.failure import predict
+    from apo_bench.planning.prediction.failure import predict
     from apo_bench.trial.promise import promised_success
 
     plan = correction.plan(observation)

@@ -9,7 +9,7 @@ from apo_bench.cli.arguments import AsJson, ScenarioArgument, StatedDeg, StatedM
 from apo_bench.cli.printing import console, print_json
 from apo_bench.cli.setting_options import takes, trial_options
 from apo_bench.errors import require_known
-from apo_bench.files.deviations import assumed_deviations
+from apo_bench.formats.deviations import assumed_deviations
 from apo_bench.io import redirect_output
 from apo_bench.records import RECOGNISED
 from apo_bench.scenario.file import load_scenario
@@ -30,9 +30,9 @@ def recognise_command(
     **options: Any,
 ) -> None:
     """Find the contacts of what was seen, and say how they differ from those of the scenario."""
-    from apo_bench.show.recognised_text import confidence_lines, difference_lines, evidence_table, recognition_form
     from apo_bench.trial.recognised_contacts import recognise_by
     from apo_bench.trial.request import looked_at
+    from apo_bench.viz.recognised_text import confidence_lines, difference_lines, evidence_table, recognition_form
 
     require_known("way of recognising", relations, RECOGNISED)
     name = load_scenario(scenario).name

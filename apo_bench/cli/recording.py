@@ -32,11 +32,11 @@ def recording_import(
     paths: Annotated[Path | None, typer.Option(help="Write the paths between rests: .csv.")] = None,
 ) -> None:
     """Turn the log of a pose tracker into an observation: frames, rests, the order of operations."""
-    from apo_bench.recording.camera_file import read_camera
-    from apo_bench.recording.formats import read_log
-    from apo_bench.recording.hands import find_hands
-    from apo_bench.recording.objects_file import name_tracks, read_objects
-    from apo_bench.recording.show.text import reading_lines
+    from apo_bench.importers.recording.camera_file import read_camera
+    from apo_bench.importers.recording.formats import read_log
+    from apo_bench.importers.recording.hands import find_hands
+    from apo_bench.importers.recording.objects_file import name_tracks, read_objects
+    from apo_bench.importers.recording.show.text import reading_lines
 
     outputs = [(out, "--out", (".json", ".csv")), (picture, "--picture", (".png",)), (paths, "--paths", (".csv",))]
     check_outputs(outputs, (log, camera, objects))
@@ -59,9 +59,9 @@ def recording_import(
 def _import(
     log: Any, objects: Any, camera: Any, tracks: Any, scenario: str, order: tuple[str | None, str | None], files: Any
 ) -> None:
-    from apo_bench.recording.importing import import_recording
-    from apo_bench.recording.show.drawing import draw_recording, drawing_of, unfit_drawing
-    from apo_bench.recording.show.text import PATH_HEAD, imported_lines, path_rows
+    from apo_bench.importers.recording.importing import import_recording
+    from apo_bench.importers.recording.show.drawing import draw_recording, drawing_of, unfit_drawing
+    from apo_bench.importers.recording.show.text import PATH_HEAD, imported_lines, path_rows
 
     out, picture, paths = files
     loaded = load_scenario(scenario)
@@ -76,7 +76,7 @@ def _import(
     mains = [operation.main for operation in loaded.assembly.operations]
     rests = [operation.rest for operation in imported.operations]
     if out.suffix.lower() == ".json":
-        from apo_bench.files.json_forms import observation_form, write_form
+        from apo_bench.formats.json_forms import observation_form, write_form
 
         name = scenario if scenario == loaded.name else str(Path(scenario).resolve())
         write_form(observation_form(imported.observation, name), out)
@@ -92,9 +92,9 @@ def _import(
 
 
 def _import_unplanned(log: Any, objects: Any, camera: Any, tracks: Any, out: Path, picture: Path | None) -> None:
-    from apo_bench.recording.show.drawing import draw_recording, unplanned_drawing
-    from apo_bench.recording.show.text import put_lines
-    from apo_bench.recording.unplanned import goals_of, unplanned_recording
+    from apo_bench.importers.recording.show.drawing import draw_recording, unplanned_drawing
+    from apo_bench.importers.recording.show.text import put_lines
+    from apo_bench.importers.recording.unplanned import goals_of, unplanned_recording
 
     recording = unplanned_recording(tracks, camera, log.file)
     parts = [put.part for put in recording.puts]
@@ -107,7 +107,7 @@ def _import_unplanned(log: Any, objects: Any, camera: Any, tracks: Any, out: Pat
 
 
 def _stated(ends: str | None, unseen: str | None, operations: int) -> Any:
-    from apo_bench.recording.ordering import Stated
+    from apo_bench.importers.recording.ordering import Stated
 
     hidden = whole_numbers(unseen, "--unseen") if unseen else ()
     require(
@@ -120,7 +120,7 @@ def _stated(ends: str | None, unseen: str | None, operations: int) -> Any:
 
 def _print_rests(camera: Any, parts: list[str], rests: list[Any], tracks: Any, further: list[str]) -> None:
     """The camera, where each part rested after its operation, and further lines."""
-    from apo_bench.recording.show.text import camera_lines, rest_lines
+    from apo_bench.importers.recording.show.text import camera_lines, rest_lines
 
     print_lines(camera_lines(camera))
     times = {part: track.t for part, track in tracks.items()}
@@ -134,8 +134,8 @@ def _print_written(*paths: Path | None) -> None:
 
 def _write_table(path: Path, parts: list[str], rests: list[Any], goals: Any, camera: Any) -> None:
     """Write goals as CSV; an operation that the log does not show has no rest."""
-    from apo_bench.recording.importing import deviations
-    from apo_bench.recording.show.text import OBSERVATION_HEAD, observation_rows
+    from apo_bench.importers.recording.importing import deviations
+    from apo_bench.importers.recording.show.text import OBSERVATION_HEAD, observation_rows
 
     sizes = [(1.0, 1.0) if rest is None else deviations(rest, camera) for rest in rests]
     write_csv(path, OBSERVATION_HEAD, observation_rows(parts, goals, sizes, [rest is not None for rest in rests]))

@@ -33,10 +33,10 @@ def run_replay(
 ) -> None:
     """Run one trial: demonstrate, observe, plan by a method, replay, judge."""
     from apo_bench.cli.trial_text import print_row
-    from apo_bench.show.viewing import choose_display
-    from apo_bench.show.viewing import view as show_story
     from apo_bench.trial.request import Request, run_request
     from apo_bench.trial.story import Story
+    from apo_bench.viz.viewing import choose_display
+    from apo_bench.viz.viewing import view as show_story
 
     check_outputs([(video, "--video", (".mp4", ".gif")), (save_observation, "--save-observation", (".json",))])
     place = choose_display(port) if view else None
@@ -55,7 +55,7 @@ def run_replay(
             if trial_limit is None:
                 row = run_request(request, stories.append if view else None)
             else:
-                from apo_bench.sweeps.pool import run_request_alone
+                from apo_bench.benchmark.sweeps.pool import run_request_alone
 
                 row = run_request_alone(request, trial_limit)
     except KeyboardInterrupt as error:

@@ -29,7 +29,7 @@ scenario.command("list")(scenario_list)
 @scenario.command("card")
 def print_card(scenario: ScenarioArgument) -> None:
     """Print the task card of a scenario; the file is checked."""
-    from apo_bench.show.card import scenario_card
+    from apo_bench.viz.card import scenario_card
 
     typer.echo(scenario_card(load_scenario(scenario)), nl=False)
 
@@ -84,10 +84,10 @@ def scenario_new(
     overwrite: Annotated[bool, typer.Option(help="Make --out and its parts anew where they are.")] = False,
 ) -> None:
     """Make a scenario of parts at their final poses: contacts, an order, starts, grasps, a comment for each choice."""
-    from apo_bench.drafting.from_cad import import_assembly
-    from apo_bench.drafting.posed import UPS, read_posed
-    from apo_bench.drafting.upright import drafted
-    from apo_bench.drafting.writing import draft_lines, write_scenario
+    from apo_bench.importers.assembly.from_cad import import_assembly
+    from apo_bench.importers.assembly.posed import UPS, read_posed
+    from apo_bench.importers.assembly.upright import drafted
+    from apo_bench.importers.assembly.writing import draft_lines, write_scenario
 
     check_writable(out, "--out", (".toml",))
     require(
@@ -124,7 +124,7 @@ def scenario_check(
     ),
 ) -> None:
     """Say whether human and robot can do a scenario, and which line of its file to change if not."""
-    from apo_bench.drafting.checking import check_file
+    from apo_bench.importers.assembly.checking import check_file
 
     require(0 <= seeds <= 1000, f"--seeds {seeds} was given; 0 to 1000 are allowed.")
     check("fidelity", fidelity)

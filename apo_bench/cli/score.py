@@ -75,11 +75,11 @@ def score_command(
     as_json: AsJson = False,
 ) -> None:
     """Run a method over tracks of fixed trials, resumed where they were left: one number for each, and one over all."""
-    from apo_bench.scoring.entrants import entrant, exported
-    from apo_bench.scoring.entry import check_name, form_of, read_entry, write_entry
-    from apo_bench.scoring.score import score
-    from apo_bench.scoring.track import Track, read_tracks, seen_by
-    from apo_bench.show.score_text import entry_lines
+    from apo_bench.benchmark.scoring.entrants import entrant, exported
+    from apo_bench.benchmark.scoring.entry import check_name, form_of, read_entry, write_entry
+    from apo_bench.benchmark.scoring.score import score
+    from apo_bench.benchmark.scoring.track import Track, read_tracks, seen_by
+    from apo_bench.viz.score_text import entry_lines
 
     given = [x for x in (method, command, answers, export) if x is not None]
     require(
@@ -145,7 +145,7 @@ def leaderboard_command(
     ] = None,
 ) -> None:
     """Write a table of entries, and one figure of all tracks; a file that is not an entry is named and left out."""
-    from apo_bench.scoring.leaderboard import read_entries, write_leaderboard
+    from apo_bench.benchmark.scoring.leaderboard import read_entries, write_leaderboard
 
     check_writable(out, "--out", (".md",))
     entries, left_out = read_entries(folder)
@@ -172,9 +172,9 @@ def report_command(
     ] = False,
 ) -> None:
     """Write report.html, which opens anywhere, with tables (CSV, Parquet) and figures (SVG, PNG) beside it."""
+    from apo_bench.benchmark.report.report import report
     from apo_bench.cli.terminal import print_cells, print_report
-    from apo_bench.report.report import report
-    from apo_bench.show.failure_pictures import failure_pictures
+    from apo_bench.viz.failure_pictures import failure_pictures
 
     require(
         0 <= pictures <= _MOST_PICTURES,
@@ -199,9 +199,9 @@ def compare_command(
     as_json: AsJson = False,
 ) -> None:
     """Compare two sweeps trial by trial: two versions, machines or fidelities; write compare.html."""
+    from apo_bench.benchmark.report.comparison.compare import compare
+    from apo_bench.benchmark.report.comparison.text import comparison_form, write_comparison
     from apo_bench.cli.terminal import print_comparison
-    from apo_bench.report.comparison.compare import compare
-    from apo_bench.report.comparison.text import comparison_form, write_comparison
 
     comparison = compare(first, second)
     if out is None and not as_json:

@@ -10,7 +10,7 @@ from apo_bench.cli.arguments import ScenarioArgument, StatedDeg, StatedMm
 from apo_bench.cli.outputs import check_writable
 from apo_bench.cli.setting_options import takes, trial_options
 from apo_bench.errors import require
-from apo_bench.files.deviations import assumed_deviations
+from apo_bench.formats.deviations import assumed_deviations
 from apo_bench.geometry import Array
 from apo_bench.records import CORRECTOR, with_simulated
 from apo_bench.scenario.file import load_scenario
@@ -32,8 +32,8 @@ def show_command(
     **options: Any,
 ) -> None:
     """Draw the believed state: parts where they were seen, and where the corrected motion parameters put them."""
-    from apo_bench.show.believed_picture import belief_lines, belief_panel, draw_beliefs
     from apo_bench.trial.request import looked_at
+    from apo_bench.viz.believed_picture import belief_lines, belief_panel, draw_beliefs
 
     check_writable(out, "--out", (".png",))
     loaded = load_scenario(scenario)

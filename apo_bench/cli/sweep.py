@@ -28,7 +28,7 @@ from apo_bench.records import FIRST_TRAINING_TRIAL, in_python
 from apo_bench.scenario.file import load_scenario
 
 if TYPE_CHECKING:
-    from apo_bench.sweeps.grid import SweepSettings
+    from apo_bench.benchmark.sweeps.grid import SweepSettings
 
 _KILLED = 128
 """Added to the number of a signal: the exit code of a process that it has ended."""
@@ -86,9 +86,9 @@ def sweep_command(
     **options: Any,
 ) -> None:
     """Run every combination, or the grids of a file, and print success rates with Wilson 95 % intervals."""
+    from apo_bench.benchmark.analysis import tally
+    from apo_bench.benchmark.sweeps.sweep import run_sweep
     from apo_bench.cli.terminal import print_cells, print_prediction
-    from apo_bench.statistics import tally
-    from apo_bench.sweeps.sweep import run_sweep
 
     options |= {"trials": trials, "seed": seed}
     grids = _grids(scenarios, {name: value for name, value in options.items() if value is not None})
@@ -116,8 +116,8 @@ def sweep_command(
 
 def _grids(scenarios: list[str], options: Mapping[str, Any]) -> tuple[SweepSettings, ...]:
     """The grid of the options, or those of a sweep file with some settings replaced."""
-    from apo_bench.sweeps.grid import AXES, SweepSettings
-    from apo_bench.sweeps.sweep_file import is_sweep_file, read_sweep
+    from apo_bench.benchmark.sweeps.grid import AXES, SweepSettings
+    from apo_bench.benchmark.sweeps.sweep_file import is_sweep_file, read_sweep
 
     axes = {axis_option(info): info for info in AXES}
     texts = {axes[option]: text for option, text in options.items() if option in axes}
@@ -162,7 +162,7 @@ def dataset_make(
     **options: Any,
 ) -> None:
     """Run trials and write what was seen, planned and true, and all frames, with a card for people and programs."""
-    from apo_bench.datasets.making import make_dataset
+    from apo_bench.benchmark.datasets.making import make_dataset
     from apo_bench.trial.request import Request, requested_settings
 
     require(record in ("replays", "insertions"), f"--record {record} was given; replays or insertions is allowed.")

@@ -7,19 +7,19 @@ from typing import TYPE_CHECKING
 
 from rich.table import Table
 
+from apo_bench.benchmark.analysis import Cell, confusions
+from apo_bench.benchmark.report.tables.cells import cell_table
+from apo_bench.benchmark.report.tables.methods import prediction_summary
+from apo_bench.benchmark.report.tables.table import Column
+from apo_bench.benchmark.report.tables.table import Table as Data
 from apo_bench.cli.printing import console
 from apo_bench.io import clean, has_parquet
 from apo_bench.records import Row
-from apo_bench.report.tables.cells import cell_table
-from apo_bench.report.tables.methods import prediction_summary
-from apo_bench.report.tables.table import Column
-from apo_bench.report.tables.table import Table as Data
 from apo_bench.scenario.scenario import Scenario
-from apo_bench.statistics import Cell, confusions
 
 if TYPE_CHECKING:
-    from apo_bench.report.comparison.compare import Comparison
-    from apo_bench.report.report import Report
+    from apo_bench.benchmark.report.comparison.compare import Comparison
+    from apo_bench.benchmark.report.report import Report
 
 _MOST_NAMES = 8
 """Settings that differ, named on the terminal."""
@@ -73,7 +73,7 @@ def print_report(report: Report) -> None:
 
 def print_comparison(comparison: Comparison) -> None:
     """How far two sweeps agree, and what is not the same in them."""
-    from apo_bench.report.comparison.text import comparison_tables, in_words
+    from apo_bench.benchmark.report.comparison.text import comparison_tables, in_words
 
     console().print(clean(in_words(comparison)))
     print_table(comparison_tables(comparison)["agreement"])

@@ -4,10 +4,10 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from rich.table import Table
 
+from apo_bench.benchmark.analysis import level_label
 from apo_bench.cli.printing import console
 from apo_bench.io import clean
 from apo_bench.records import SETTINGS, FreedSet, MovedInHand, Predicted, Row, feels, look_up
-from apo_bench.statistics import level_label
 from apo_bench.trial.promise import promise_sentence
 
 _SAID = ("eye", "noise", "relations", "looks", "robot_error", "abstain", "wrench", "stated_error")

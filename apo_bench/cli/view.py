@@ -27,10 +27,10 @@ def view_command(
 ) -> None:
     """Look at a scenario, or at a finished trial, which is run again, and step through it; `show` draws files."""
     from apo_bench.cli.trial_text import print_row
-    from apo_bench.show.finished_trial import trial_again
-    from apo_bench.show.viewing import choose_display, view
     from apo_bench.simulation.scene.scene import build_scene
     from apo_bench.trial.story import scenario_story
+    from apo_bench.viz.finished_trial import trial_again
+    from apo_bench.viz.viewing import choose_display, view
 
     folder = Path(target)
     if folder.is_dir():

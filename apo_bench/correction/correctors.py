@@ -108,7 +108,7 @@ def _admitted(returned: Any, observation: Observation, chosen: Any, name: str) -
 def _ours(corrector: Any) -> bool:
     """Whether a corrector comes with the package; what others say of the gaps that they leave is measured instead.
 
-    Programs and files of answers, which `apo_bench.scoring` stands for, are others.
+    Programs and files of answers, which `apo_bench.benchmark.scoring` stands for, are others.
     """
     while isinstance(corrector, partial):
         corrector = corrector.func

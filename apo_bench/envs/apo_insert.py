@@ -18,7 +18,7 @@ from apo_bench.envs.starts import Begun, RobotSettings, Trials, judged
 from apo_bench.errors import InputError, require, shown, unknown
 from apo_bench.geometry import Array
 from apo_bench.names import resolve
-from apo_bench.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import Level, make_noise
 from apo_bench.records import (
     CORRECTOR,
     CORRECTORS,

@@ -15,8 +15,8 @@ from apo_bench.envs.spaces import Action, Seen, action_space, as_seen_entries, m
 from apo_bench.envs.starts import RobotSettings, carried_out
 from apo_bench.errors import require
 from apo_bench.geometry import Array
-from apo_bench.observation.looking import Looks
-from apo_bench.observation.noise import Level, make_noise
+from apo_bench.perception.observation.looking import Looks
+from apo_bench.perception.observation.noise import Level, make_noise
 from apo_bench.records import (
     RANGE,
     USUAL,

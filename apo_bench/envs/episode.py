@@ -15,8 +15,8 @@ import numpy as np
 from apo_bench.assembly import Observation, Outcome
 from apo_bench.errors import InputError, shown, unknown
 from apo_bench.judging.verdict import Verdict
-from apo_bench.observation.looking import Looks
-from apo_bench.observation.noise import Level
+from apo_bench.perception.observation.looking import Looks
+from apo_bench.perception.observation.noise import Level
 from apo_bench.records import Predicted, check, level_pair
 from apo_bench.simulation.scene import Scene, build_scene
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration

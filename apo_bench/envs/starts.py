@@ -12,7 +12,7 @@ import numpy as np
 from apo_bench.assembly import Correction, Observation, Outcome, Plan, Reached, Snapshot, placements
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import Verdict, judge
-from apo_bench.observation.noise import Noise
+from apo_bench.perception.observation.noise import Noise
 from apo_bench.records import (
     NO_ROBOT_ERROR,
     checked_robot_error,

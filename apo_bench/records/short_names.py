@@ -46,9 +46,9 @@ METHODS = (*UNCORRECTED, *CORRECTORS, *SIMULATED)
 """What a robot can be told to do: a plan without a corrector, or by one."""
 WRONG_RELATIONS = MappingProxyType(
     {
-        "missed": "apo_bench.observation.relations:missed",
-        "false": "apo_bench.observation.relations:false",
-        "shifted": "apo_bench.observation.relations:Shifted",
+        "missed": "apo_bench.perception.observation.relations:missed",
+        "false": "apo_bench.perception.observation.relations:false",
+        "shifted": "apo_bench.perception.observation.relations:Shifted",
     }
 )
 """Wrong relations that a corrector is told."""

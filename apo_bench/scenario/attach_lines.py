@@ -7,7 +7,7 @@ from functools import lru_cache
 import numpy as np
 
 from apo_bench.errors import InputError, require
-from apo_bench.insertion.arrival import Arrival, OperationMacros, Preference, understand
+from apo_bench.planning.insertion.arrival import Arrival, OperationMacros, Preference, understand
 from apo_bench.scenario.layout import nominal_start
 from apo_bench.scenario.scenario import Scenario
 

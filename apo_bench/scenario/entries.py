@@ -10,13 +10,13 @@ import numpy as np
 from apo_bench.assembly import Operation
 from apo_bench.errors import InputError, require, require_known
 from apo_bench.geometry import Array, Solid, pose
-from apo_bench.insertion.arrival import Preference
 from apo_bench.io import convert_typed
-from apo_bench.parts import load_part, part_path
-from apo_bench.parts.allowed import FACE_OR_PART_NAME
-from apo_bench.parts.fit import with_fit
+from apo_bench.planning.insertion.arrival import Preference
 from apo_bench.scenario.contacts import ContactGaps, check_kinds, read_contacts
 from apo_bench.scenario.grasps import read_grasp
+from apo_bench.scenario.parts import load_part, part_path
+from apo_bench.scenario.parts.allowed import FACE_OR_PART_NAME
+from apo_bench.scenario.parts.fit import with_fit
 from apo_bench.scenario.scenario import Grasp, Shift, Turn
 from apo_bench.scenario.tables import AttachTable, OperationTable, PartTable, VaryTable
 from apo_bench.scenario.values import check_span, normalize_axis

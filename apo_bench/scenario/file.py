@@ -14,14 +14,14 @@ import numpy as np
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Gap
 from apo_bench.errors import require, require_known
-from apo_bench.generated import generated_file, is_generated, whole_name
-from apo_bench.insertion.arrival import Preference
 from apo_bench.io import UNSHOWN, convert_typed, read_typed
+from apo_bench.planning.insertion.arrival import Preference
 from apo_bench.records import Thresholds
 from apo_bench.resources import folder
 from apo_bench.scenario.attach_lines import with_attach_lines
 from apo_bench.scenario.checks import check_scenario
 from apo_bench.scenario.entries import OperationEntry, read_operations, read_parts
+from apo_bench.scenario.generated import generated_file, is_generated, whole_name
 from apo_bench.scenario.scenario import Carelessness, Scenario, Shift, Site, Turn
 from apo_bench.scenario.tables import CarelessTable, JudgeTable, ScenarioTable, SiteTable
 from apo_bench.scenario.values import check_span, normalize_axis

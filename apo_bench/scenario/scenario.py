@@ -10,7 +10,7 @@ import numpy as np
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import Array, copyable, freeze, pose
-from apo_bench.insertion.arrival import Attach
+from apo_bench.planning.insertion.arrival import Attach
 from apo_bench.records import Meaning, Thresholds
 
 
@@ -133,7 +133,7 @@ class Scenario:
     goals: Array
     """(n, 4, 4): the nominal goals, consistent with every contact; frame of the assembly."""
     attach: tuple[Attach, ...]
-    """The line of every operation, stated or found (`apo_bench.insertion`)."""
+    """The line of every operation, stated or found (`apo_bench.planning.insertion`)."""
     grasps: tuple[Grasp, ...]
     site: Site
     shifts: tuple[Shift, ...]

@@ -1,7 +1,7 @@
 """Hashes that say whether two rows were made of the same things: files, settings, and the code that shapes a row.
 
 The files are those of `apo_bench.trial.inputs`; the code is every source file of the package but those of
-`ROOMS_WITHOUT_TRIALS`.
+`PACKAGES_WITHOUT_TRIALS`.
 """
 
 import json
@@ -16,25 +16,13 @@ from pathlib import Path
 from types import MappingProxyType
 
 from apo_bench import __version__
-from apo_bench.files.json_forms import OBSERVATION_SCHEMA, PLAN_SCHEMA
+from apo_bench.formats.json_forms import OBSERVATION_SCHEMA, PLAN_SCHEMA
 from apo_bench.records import ROW, TrialSettings
 from apo_bench.scenario import Scenario
 from apo_bench.trial.inputs import content_pieces, digest, noise_content, own_content
 
 _SCHEMAS = (ROW, OBSERVATION_SCHEMA, PLAN_SCHEMA)
-ROOMS_WITHOUT_TRIALS = (
-    "cad",
-    "cli",
-    "datasets",
-    "drafting",
-    "envs",
-    "recording",
-    "report",
-    "scoring",
-    "show",
-    "statistics",
-    "sweeps",
-)
+PACKAGES_WITHOUT_TRIALS = ("benchmark", "cli", "envs", "importers", "viz")
 """Commands, imports that end in files, how work is spread, and all that is made of rows afterwards."""
 
 _PACKAGES = (
@@ -73,7 +61,7 @@ def code_files() -> Mapping[str, str]:
 
 def counts(path: str) -> bool:
     """Whether a source file of the package shapes rows."""
-    return not path.startswith(tuple(f"{room}/" for room in ROOMS_WITHOUT_TRIALS))
+    return not path.startswith(tuple(f"{package}/" for package in PACKAGES_WITHOUT_TRIALS))
 
 
 def sources(package: Traversable, prefix: str = "") -> Iterator[tuple[str, bytes]]:

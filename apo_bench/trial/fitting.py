@@ -15,8 +15,8 @@ from apo_bench.assembly import Correction, Observation, Plan, goals_in_force
 from apo_bench.assembly.equations import equations
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
-from apo_bench.prediction.failure import predict
-from apo_bench.prediction.measures import Measure, measures
+from apo_bench.planning.prediction.failure import predict
+from apo_bench.planning.prediction.measures import Measure, measures
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.simulation.execution import in_reach
 from apo_bench.simulation.scene import Scene, build_scene

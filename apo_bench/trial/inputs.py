@@ -20,11 +20,11 @@ import numpy as np
 
 from apo_bench.io import opened
 from apo_bench.names import admit
-from apo_bench.observation.noise_file import noise_path
-from apo_bench.parts import part_files_of
+from apo_bench.perception.observation.noise_file import noise_path
 from apo_bench.records.run.replay_command import DATA_PREFIXES, is_own_code
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario, scenario_path
+from apo_bench.scenario.parts import part_files_of
 
 _CHUNK = 1 << 20
 

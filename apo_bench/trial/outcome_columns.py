@@ -22,7 +22,7 @@ from apo_bench.correction.region import contains_truth
 from apo_bench.correction.solvers import LENGTH_M
 from apo_bench.geometry import Array, pose, turned_alike
 from apo_bench.io import clean
-from apo_bench.observation.relations import culprit
+from apo_bench.perception.observation.relations import culprit
 from apo_bench.records import (
     ENV_ID,
     LONGEST_SENTENCE,

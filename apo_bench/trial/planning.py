@@ -16,7 +16,7 @@ from scipy.optimize import least_squares
 from apo_bench.assembly import Correction, Look, Observation, Outcome, Plan, largest_gap
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import Array, pose
-from apo_bench.prediction.failure import predict
+from apo_bench.planning.prediction.failure import predict
 from apo_bench.records import with_simulated
 from apo_bench.scenario import Scenario, layout_at
 from apo_bench.simulation.arm_checks.plan_check import arm_moves

@@ -24,7 +24,7 @@ from apo_bench.assembly import Assembly, Correction, Observation, Outcome, Plan,
 from apo_bench.errors import InputError
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import least_overlaps
-from apo_bench.prediction.measures import ArmMove, Measure, measures
+from apo_bench.planning.prediction.measures import ArmMove, Measure, measures
 from apo_bench.records import NO_ROBOT_ERROR, robot_sigmas, sentence
 from apo_bench.scenario.scenario import Scenario
 from apo_bench.trial.free_directions import FreeSpace, free_space

@@ -9,9 +9,9 @@ The truth, the robot and the judge keep the contacts of the scenario.
 from dataclasses import replace
 
 from apo_bench.assembly import Assembly, Contact, Observation
-from apo_bench.recognition.contacts import recognise
-from apo_bench.recognition.evidence import Recognised
-from apo_bench.recognition.jointly import recognise_jointly
+from apo_bench.perception.detection.contacts import recognise
+from apo_bench.perception.detection.evidence import Recognised
+from apo_bench.perception.detection.jointly import recognise_jointly
 
 
 def recognise_by(observation: Observation, kind: str = "recognised") -> Recognised:

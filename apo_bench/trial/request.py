@@ -114,7 +114,7 @@ def looked_at(
             )
     if observation is None:
         return _watched(Request(scenario, options)), False
-    from apo_bench.files.observation import read_observation_file
+    from apo_bench.formats.observation import read_observation_file
 
     seen, _, assumed = read_observation_file(
         observation, scenario, deviation_mm=deviation_mm, deviation_deg=deviation_deg
@@ -179,7 +179,7 @@ def run_settings(request: Request, spec: TrialSettings, show: Show | None = None
         renderer(scene.work.model, 16, 12).close()  # is there anything to draw with? asked before the trial is run
     seen: Observation | None = None
     if request.observation:
-        from apo_bench.files.observation import read_stated
+        from apo_bench.formats.observation import read_stated
 
         path = request.observation
         seen = read_stated(path, scene.scenario)
@@ -231,7 +231,7 @@ def lost_request(request: Request, spec: TrialSettings, scenario: Scenario, code
 
 def _drawn(request: Request, spec: TrialSettings, scene: Scene, simulated: SimulatedDemonstration, watch: Any) -> Row:
     if request.save_observation:
-        from apo_bench.files.json_forms import observation_form, write_form
+        from apo_bench.formats.json_forms import observation_form, write_form
 
         name = request.scenario if request.scenario == scene.scenario.name else str(Path(request.scenario).resolve())
         write_form(observation_form(look(spec, scene, simulated), name), request.save_observation)

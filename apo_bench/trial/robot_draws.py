@@ -12,9 +12,9 @@ import numpy as np
 
 from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, pose
-from apo_bench.prediction.resting import resting_poses
+from apo_bench.planning.prediction.resting import resting_poses
 from apo_bench.simulation.execution import Grip, after_transfer, key_angles, moves
-from apo_bench.simulation.execution.feel.feeling import ACTS, TOUCH_SIGMA_M
+from apo_bench.simulation.execution.probing.feeling import ACTS, TOUCH_SIGMA_M
 from apo_bench.simulation.robot import RobotError
 from apo_bench.simulation.scene import Scene
 

@@ -15,21 +15,21 @@ import numpy as np
 from apo_bench.assembly import Assembly, Demonstration, Layout, Observation, Outcome, Plan, ReplayResult
 from apo_bench.geometry import Array, pose
 from apo_bench.judging.verdict import Verdict, judge
-from apo_bench.observation.looking import Looks
-from apo_bench.observation.noise import Noise
-from apo_bench.observation.observing import observe
-from apo_bench.prediction.failure import ARM_CODES, predict
+from apo_bench.perception.observation.looking import Looks
+from apo_bench.perception.observation.noise import Noise
+from apo_bench.perception.observation.observing import observe
+from apo_bench.planning.prediction.failure import ARM_CODES, predict
 from apo_bench.records import NO_ROBOT_ERROR, RANGE, SETTINGS, Predicted, Salt, TrialSettings, robot_sigmas, sentence
 from apo_bench.scenario import Scenario, draw_layout, load_scenario
 from apo_bench.simulation.arm_checks.plan_check import arm_moves
 from apo_bench.simulation.execution import ReplayCache, replay
-from apo_bench.simulation.execution.feel.feeling import Feels
+from apo_bench.simulation.execution.probing.feeling import Feels
 from apo_bench.simulation.human.demonstration import demonstrate
 from apo_bench.simulation.robot import RobotError
 from apo_bench.simulation.scene import Scene, build_scene
 
 if TYPE_CHECKING:
-    from apo_bench.depth_camera.sensor import RangeSensor
+    from apo_bench.perception.depth_camera.sensor import RangeSensor
     from apo_bench.simulation.sensor.watch import DemonstrationImages
 
 LAYOUT, DEMONSTRATION, OBSERVATION, ARM, RELATIONS, TV, LOOKS, HAND_EYE, JOINTS, TOOL, IN_HAND, WRENCH = range(12)
@@ -75,7 +75,7 @@ def simulate_demonstration(
     rng = stream(seed, DEMONSTRATION, salt)
     if eye != RANGE:
         return SimulatedDemonstration(layout, demonstrate(scene, layout, careless, rng))
-    from apo_bench.depth_camera.surface import load_small_gicp
+    from apo_bench.perception.depth_camera.surface import load_small_gicp
     from apo_bench.simulation.sensor.watch import DemonstrationCamera
 
     load_small_gicp()
@@ -101,7 +101,7 @@ def watch_again(
 
 def range_sensor(scene: Scene, simulated: SimulatedDemonstration, level_mm: float) -> RangeSensor:
     """The range finder that watched a demonstration, as a noise model; `level_mm` is the noise of a ray."""
-    from apo_bench.depth_camera.sensor import RangeSensor
+    from apo_bench.perception.depth_camera.sensor import RangeSensor
     from apo_bench.simulation.sensor.rays import ModelRays
 
     assert simulated.images is not None, "simulate the demonstration with eye='range'"

@@ -9,13 +9,13 @@ from typing import Any, cast
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Correction, Observation, Plan
+from apo_bench.correction.calibration import UNSTATED, believe, slip_sigmas
 from apo_bench.correction.correctors import CorrectorMisbehaved
-from apo_bench.correction.touches import UNSTATED, believe, slip_sigmas
 from apo_bench.errors import require
 from apo_bench.geometry import Array
-from apo_bench.observation.looking import Looks
-from apo_bench.observation.noise import Level, Noise, make_noise
-from apo_bench.observation.relations import make_relations, with_relations
+from apo_bench.perception.observation.looking import Looks
+from apo_bench.perception.observation.noise import Level, Noise, make_noise
+from apo_bench.perception.observation.relations import make_relations, with_relations
 from apo_bench.records import (
     RANGE,
     RECOGNISED,
@@ -32,7 +32,7 @@ from apo_bench.records import (
 from apo_bench.records.run.validation import unwritable
 from apo_bench.scenario import scenario_names
 from apo_bench.simulation.execution import ReplayCache
-from apo_bench.simulation.execution.feel.feeling import ACTS, Feels
+from apo_bench.simulation.execution.probing.feeling import ACTS, Feels
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.scene import Scene
 from apo_bench.trial.fingerprint import content_hash, spec_hash

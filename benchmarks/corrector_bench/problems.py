@@ -22,8 +22,8 @@ import numpy as np
 from apo_bench.assembly import Assembly, Contact, Equations, Operation, PartFace, Poses
 from apo_bench.assembly.equations import equations
 from apo_bench.geometry import Array, Box, Face, Solid, pose
-from apo_bench.parts.load import load_part
 from apo_bench.scenario.file import load_scenario
+from apo_bench.scenario.parts.load import load_part
 
 PITCH_M = 0.14
 FIGURES = ("fig2", "fig3", "fig6")

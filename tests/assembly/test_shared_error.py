@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose
 
 from apo_bench.assembly import SharedError, first_order, joint_covariance
 from apo_bench.geometry import pose
-from apo_bench.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import Level, make_noise
 from tests import scenes
 
 GOALS = np.array(

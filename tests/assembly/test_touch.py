@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError
-from apo_bench.correction.touches import Touch
+from apo_bench.correction.calibration import Touch
 
 RIGHT: dict[str, Any] = {
     "T_world_tip": np.eye(4),

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from apo_bench.sweeps.sweep_file import read_sweep
+from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 from benchmarks.asked import ROBUST, ROUND, Kept, asked_trials, block, found_trials, said
 
 ROOT = Path(__file__).parents[2]

@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-from apo_bench.simulation.execution.feel.feeling import ACTS
+from apo_bench.simulation.execution.probing.feeling import ACTS
 from benchmarks import feel_acts
 from benchmarks.feel_acts import ALL, HALF_STEP, VARIANTS, Case, acts_of, lines_of, missing, settings_of, table
 from benchmarks.robot_errors import page

@@ -13,10 +13,10 @@ from typing import Any
 import pytest
 
 from apo_bench import SweepSettings
+from apo_bench.benchmark.analysis import Cell, tally
+from apo_bench.benchmark.sweeps.grid import load_all, units
+from apo_bench.benchmark.sweeps.sweep_file import read_sweep
 from apo_bench.records import ROW
-from apo_bench.statistics import Cell, tally
-from apo_bench.sweeps.grid import load_all, units
-from apo_bench.sweeps.sweep_file import read_sweep
 from benchmarks import headline
 from benchmarks.headline import BEGIN, BLOCKS, END, KEPT, PAGE
 from benchmarks.headline_figure import NAME_HEIGHT, apart

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from apo_bench.scoring.track import read_track, track_names
+from apo_bench.benchmark.scoring.track import read_track, track_names
 from benchmarks.leaderboard import PAGE, README, entries, for_regression, in_readme, write_page
 
 

@@ -40,7 +40,7 @@ def test_scenarios_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_the_card_of_a_scenario_is_printed(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     from apo_bench.resources import folder
-    from apo_bench.show.card import scenario_card
+    from apo_bench.viz.card import scenario_card
 
     loaded = load_scenario("vanished_fixture")
     assert run(capsys, "scenarios", "vanished_fixture") == (0, scenario_card(loaded), "")
@@ -88,7 +88,7 @@ def test_a_graph_shows_the_residuals_of_an_observation(capsys: pytest.CaptureFix
 def _castle_aside(folder: Path, mm: float) -> Path:
     """An observation of example 5.1 that is right but for the upper castle, which stands aside along y."""
     from apo_bench import Observation
-    from apo_bench.files.json_forms import observation_form, write_form
+    from apo_bench.formats.json_forms import observation_form, write_form
     from apo_bench.geometry import pose
 
     scenario = load_scenario("stick_in_tower")

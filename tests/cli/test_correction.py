@@ -14,7 +14,7 @@ import pytest
 from apo_bench import Correction, Observation, load_scenario, read_observation
 from apo_bench.assembly import largest_gap
 from apo_bench.cli import app as cli
-from apo_bench.files.json_reading import read_plan
+from apo_bench.formats.json_reading import read_plan
 from apo_bench.geometry import pose
 
 ROOT = Path(__file__).parents[2]

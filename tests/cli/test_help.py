@@ -13,7 +13,7 @@ import typer
 from apo_bench.cli.app import app, main
 from apo_bench.cli.completion import completion, offered_names
 from apo_bench.cli.help import GROUPS, OPTIONS, OTHERS
-from apo_bench.observation.noise import NOISES, Level, make_noise
+from apo_bench.perception.observation.noise import NOISES, Level, make_noise
 from apo_bench.records.short_names import checked_method, checked_relations
 from apo_bench.scenario.file import scenario_names
 from apo_bench.simulation.arms.finding import arm_names

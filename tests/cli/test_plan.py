@@ -13,12 +13,12 @@ from apo_bench import InputError, Plan, Scenario, build_scene, draw_layout, load
 from apo_bench.assembly import Step, placements
 from apo_bench.cli import app as cli
 from apo_bench.geometry import pose
-from apo_bench.insertion.arrival import understand
+from apo_bench.planning.insertion.arrival import understand
 from apo_bench.scenario.attach_lines import nominal_operations
 from apo_bench.scenario.file import scenario_names
 from apo_bench.scenario.layout import nominal_start
-from apo_bench.show.plan_text import direction, plan_lines, plan_lines_form, plan_text
 from apo_bench.simulation.execution.prepare import moves
+from apo_bench.viz.plan_text import direction, plan_lines, plan_lines_form, plan_text
 from tests import scenes
 
 ROOT = Path(__file__).parents[2]

@@ -15,8 +15,8 @@ import pytest
 import trimesh
 
 from tests import bop_made
-from tests.scoring.test_entry import entry, track
-from tests.statistics.test_rates import row, write
+from tests.benchmark.analysis.test_rates import row, write
+from tests.benchmark.scoring.test_entry import entry, track
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="limits the size of files as Linux does")
 ROOT = Path(__file__).parent.parent.parent

@@ -7,11 +7,11 @@ from typing import Any
 import pytest
 
 from apo_bench.assembly import Outcome
+from apo_bench.benchmark.analysis import tally
 from apo_bench.cli.terminal import print_cells
 from apo_bench.cli.trial_text import print_row
-from apo_bench.statistics import tally
 from apo_bench.trial.outcome_columns import result
-from tests.statistics.test_rates import row
+from tests.benchmark.analysis.test_rates import row
 
 REACHED = {"worst_gap_mm": 7.0, "least_overlap": 1.0}
 

@@ -16,8 +16,8 @@ from apo_bench.assembly import Contact, PartFace
 from apo_bench.cli.app import main
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.errors import failed
-from apo_bench.observation.noise import Level, make_noise
-from apo_bench.observation.relations import with_relations
+from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.relations import with_relations
 from tests import scenes
 
 TOWER = scenes.stick_in_tower()
@@ -29,7 +29,7 @@ import math
 import numpy as np
 from pathlib import Path
 from apo_bench.errors import InputError
-from apo_bench.observation.models.isotropic import Isotropic
+from apo_bench.perception.observation.models.isotropic import Isotropic
 
 mine = Isotropic((2.0, 2.0))
 

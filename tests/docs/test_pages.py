@@ -22,7 +22,7 @@ import typer
 
 from apo_bench import read_observation
 from apo_bench.cli.app import app, main
-from apo_bench.parts.load import load_part
+from apo_bench.scenario.parts.load import load_part
 
 ROOT = Path(__file__).parents[2]
 SWEEP = ROOT / "tests" / "kept" / "sweep"
@@ -36,20 +36,20 @@ NUMBER = re.compile(r"[-+]?\d+(?:\.\d*)?(?:e[-+]?\d+)?")
 PARSED_ONLY: Mapping[str, str] = {
     r"sweep ": "minutes: many trials; tests/cli and tests/sweeps run small ones",
     r"report runs/mine$": "draws pictures of failures, which replays them; the one with --pictures 0 runs",
-    r"noise fit ": "needs the results of a pose estimator; tests/observation/test_fit.py runs it",
+    r"noise fit ": "needs the results of a pose estimator; tests/perception/observation/test_fit.py runs it",
     r"replay .*--noise (empirical:)?mine\.": "needs the files that `noise fit` writes",
-    r"replay .*--noise megapose-lmo ": "a replay of seconds; tests/observation/test_measured_noise.py runs the model",
+    r"replay .*--noise megapose-lmo ": "a replay of seconds; test_measured_noise.py runs it",
     r"replay .*--video": "half a minute of pictures; tests/cli/test_app.py makes a short film",
     r"replay .*--observation seen\.json$": "a replay of seconds; that of docs/seen.csv runs",
     r"replay .*--eye range": "many depth images; tests/depth_camera runs them",
     r"eye ": "many depth images; tests/depth_camera runs them",
-    r"(view |replay .*--view)": "opens a window or serves a page until somebody ends it; tests/show steps through",
+    r"(view |replay .*--view)": "opens a window or serves a page until somebody ends it; tests/viz steps through",
     r"part import ": "needs a CAD file; tests/cad runs it",
     r"scenario new .*\.step ": "needs the extra cad; tests/cad runs it",
     r"recording import tracker|(correct|plan|replay) clamp": "needs STEP files; tests/cad reads such files",
     r"scenario check ": "trials of seconds each; tests/drafting runs it without",
     r"(score|leaderboard) ": "minutes: many trials; tests/scoring runs small ones",
-    r"noise card ": "1000 observations; tests/observation/test_plain.py prints cards",
+    r"noise card ": "1000 observations; tests/perception/observation/test_plain.py prints cards",
     r"replay stick_in_tower --level 1 --seed 7 --method (none|contact)$": "seconds each; replays of other pages run",
 }
 """Commands that are not run, by how they begin, and why."""
@@ -184,16 +184,16 @@ def test_pages_and_notebooks_use_what_the_package_exports() -> None:
     }
     assert sum(map(len, code.values())) > 10
     assert inner == {
-        "apo_bench.correction.touches",
-        "apo_bench.datasets",
+        "apo_bench.correction.calibration",
+        "apo_bench.benchmark.datasets",
         "apo_bench.envs",
         "apo_bench.envs.apo_track",
         "apo_bench.envs.dagger_insert",
         "apo_bench.envs.policies",
         "apo_bench.envs.tracking",
-        "apo_bench.observation.fitting.quantiles",
-        "apo_bench.parts",
-        "apo_bench.parts.making",
+        "apo_bench.perception.observation.fitting.quantiles",
+        "apo_bench.scenario.parts",
+        "apo_bench.scenario.parts.making",
         "apo_bench.testing",
     }
 

@@ -27,7 +27,7 @@ from apo_bench.envs import episode, starts
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.episode import nullable, predicted_info
 from apo_bench.geometry import pose
-from apo_bench.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import Level, make_noise
 from apo_bench.records import outcomes
 from apo_bench.simulation.execution import controller as replays
 from apo_bench.trial.stages import SimulatedDemonstration, looks_at, simulate_demonstration
@@ -319,8 +319,8 @@ def test_an_action_outside_the_space_is_refused(watched: APOReplay, action: Any)
 
 
 def test_an_operation_that_was_not_seen_is_not_replayed(monkeypatch: pytest.MonkeyPatch) -> None:
-    from apo_bench.observation.models.isotropic import Isotropic
-    from apo_bench.observation.noise import Level
+    from apo_bench.perception.observation.models.isotropic import Isotropic
+    from apo_bench.perception.observation.noise import Level
 
     def blind(assembly: Any, shown: Any, rng: Any) -> Observation:
         full = Isotropic(Level(1.0, 1.0))(assembly, shown, rng)

@@ -17,7 +17,7 @@ from apo_bench import Correction, InputError, Observation
 from apo_bench.envs import episode
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.envs.spaces import as_seen_entries
-from apo_bench.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import Level, make_noise
 
 SEED = 5
 WAYS: dict[str, Callable[[Any], Any]] = {

@@ -10,8 +10,8 @@ import pytest
 
 from apo_bench import InputError
 from apo_bench.geometry import Face, Hull, Solid, physical_pieces
-from apo_bench.parts import load_part
-from apo_bench.parts.faces import SIDES, unite
+from apo_bench.scenario.parts import load_part
+from apo_bench.scenario.parts.faces import SIDES, unite
 
 
 def sizes(name: str, clearance_m: float) -> dict[str, tuple[float, ...]]:

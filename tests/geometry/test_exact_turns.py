@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from apo_bench.geometry import Box, Face, Hull, Solid, nearest_alike, pose, revolution, symmetries, turn_about
-from apo_bench.observation.models.facts import Level
-from apo_bench.observation.models.symmetric import AnyTurn, Symmetric
+from apo_bench.perception.observation.models.facts import Level
+from apo_bench.perception.observation.models.symmetric import AnyTurn, Symmetric
 from apo_bench.trial.outcome_columns import goal_errors
 from tests import scenes
 from tests.correction.robust.test_robust import shown

@@ -9,7 +9,7 @@ import pytest
 
 from apo_bench.geometry import PAD_M, Box, Solid, held_span, holds_whole, intrusion_depths, is_held
 from apo_bench.geometry.pads import holds
-from apo_bench.parts.making import Frustum, extrude, polygon, rectangle, shaft, solid_of, turned
+from apo_bench.scenario.parts.making import Frustum, extrude, polygon, rectangle, shaft, solid_of, turned
 
 OPENING_M = 0.046
 L = extrude(polygon((0, 0), (60, 0), (60, 10), (10, 10), (10, 40), (0, 40)), 0, 20)

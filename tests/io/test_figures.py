@@ -13,9 +13,9 @@ DRAW = """
 import hashlib
 from pathlib import Path
 from apo_bench.assembly.graph import relation_graph
-from apo_bench.report.figures.sheet import Panel, draw
+from apo_bench.benchmark.report.figures.sheet import Panel, draw
 from apo_bench.scenario.file import load_scenario
-from apo_bench.show.graph.drawing import draw_graph
+from apo_bench.viz.graph.drawing import draw_graph
 
 drawing = draw("rates", [Panel("one", lambda axis: axis.plot([0, 1], [0, 1]))], {})
 draw_graph(relation_graph(load_scenario("block_on_block").assembly), Path("graph.svg"), title="graph")

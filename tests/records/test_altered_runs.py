@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError
+from apo_bench.benchmark.analysis import read_timing
+from apo_bench.benchmark.report import report as reports
+from apo_bench.benchmark.report.comparison.compare import compare
+from apo_bench.benchmark.report.comparison.text import comparison_form
 from apo_bench.io import clean
 from apo_bench.records.run.run_file import read_run
 from apo_bench.records.run.trials import read_trials
-from apo_bench.report import report as reports
-from apo_bench.report.comparison.compare import compare
-from apo_bench.report.comparison.text import comparison_form
-from apo_bench.statistics import read_timing
 from tests.altered import FILES, altered
 
 KEPT = Path(__file__).parents[1] / "kept" / "sweep"

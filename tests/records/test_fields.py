@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from apo_bench import TrialSettings, build_scene, load_scenario, run_trial
+from apo_bench.benchmark.sweeps.worker import timing
 from apo_bench.records import REQUIRED, ROW_FIELDS
 from apo_bench.records.run.validation import TIMING_FIELDS, row_of, timing_of, unwritable
-from apo_bench.sweeps.worker import timing
 from apo_bench.trial.outcome_columns import lost, misbehaved
 
 SPEC = TrialSettings("block_on_block", level_mm=3.0, level_deg=2.0, method="paper", seed=2)

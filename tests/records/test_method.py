@@ -4,11 +4,11 @@ import pytest
 
 from apo_bench import InputError, SweepSettings, TrialSettings, load_scenario
 from apo_bench.assembly import LookingCorrector
+from apo_bench.benchmark.analysis import rank
+from apo_bench.benchmark.sweeps.grid import units
 from apo_bench.names import resolve
 from apo_bench.records import CORRECTORS, feels, knows_relations, knows_truth, may_look, parsed
 from apo_bench.records.short_names import checked_method
-from apo_bench.statistics import rank
-from apo_bench.sweeps.grid import units
 
 
 @pytest.mark.parametrize(

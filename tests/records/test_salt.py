@@ -16,20 +16,20 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError, Scene, SweepSettings, TrialSettings, run_sweep
+from apo_bench.benchmark.analysis import tally
+from apo_bench.benchmark.report.comparison.compare import compare
+from apo_bench.benchmark.report.report import report
 from apo_bench.cli import app as cli
-from apo_bench.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import Level, make_noise
 from apo_bench.records import Salt, read_salt, salt_of_sweep
 from apo_bench.records import salt as module
 from apo_bench.records.run.replay_command import replay_command
 from apo_bench.records.salt import make_salt
-from apo_bench.report.comparison.compare import compare
-from apo_bench.report.report import report
-from apo_bench.show.failure_pictures import failure_pictures
-from apo_bench.statistics import tally
 from apo_bench.trial.fingerprint import spec_hash
 from apo_bench.trial.stages import ARM, OBSERVATION, observe_demonstration, simulate_demonstration, stream
+from apo_bench.viz.failure_pictures import failure_pictures
 from tests import pages
-from tests.statistics.test_rates import row, write
+from tests.benchmark.analysis.test_rates import row, write
 
 HERE = Salt(bytes(range(16)))
 THERE = Salt(bytes(range(1, 33)))

@@ -13,13 +13,13 @@ from typing import get_type_hints
 import pytest
 
 from apo_bench import InputError, SweepSettings, TrialSettings, run_trial
+from apo_bench.benchmark.report.comparison.compare import compare
+from apo_bench.benchmark.sweeps.sweep_file import SWEEP_KEYS
 from apo_bench.cli import app as cli
 from apo_bench.cli.setting_options import sweep_options, trial_options
 from apo_bench.envs.apo_replay import APOReplay
 from apo_bench.records import KEY, LEVEL, REQUIRED, ROW, ROW_FIELDS, SETTINGS, look_up, setting_columns, settings_of
 from apo_bench.records.run.run_folder import read_rows
-from apo_bench.report.comparison.compare import compare
-from apo_bench.sweeps.sweep_file import SWEEP_KEYS
 
 ROOT = Path(__file__).parents[2]
 KEPT = ROOT / "tests" / "kept" / "sweep"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from apo_bench import InputError, load_scenario
-from apo_bench.parts.making import Body, bore, extrude, join, rectangle, write_part
+from apo_bench.scenario.parts.making import Body, bore, extrude, join, rectangle, write_part
 from apo_bench.scenario.scenario import Grasp
 
 FILE = """schema = 1

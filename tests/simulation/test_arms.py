@@ -12,7 +12,6 @@ from apo_bench import Arm, InputError, TrialSettings, build_scene, load_scenario
 from apo_bench.geometry import Array, pose
 from apo_bench.records.run.replay_command import own_code
 from apo_bench.resources import folder
-from apo_bench.show.arm_text import check_lines
 from apo_bench.simulation.arm_checks.arm_check import check_arm, unsaid
 from apo_bench.simulation.arms.arm import ArmDescription, GripperDescription
 from apo_bench.simulation.arms.chain import find_flange
@@ -22,6 +21,7 @@ from apo_bench.simulation.arms.loading import compiled, load_model
 from apo_bench.simulation.robot.paths import smooth
 from apo_bench.simulation.robot.reach import along, led_there, way_there, within_speed
 from apo_bench.simulation.robot.robot import Robot
+from apo_bench.viz.arm_text import check_lines
 
 ARMS = folder("assets") / "arms"
 UR5E = ((0.1625, 0, 90), (0, -0.425, 0), (0, -0.3922, 0), (0.1333, 0, 90), (0.0997, 0, -90), (0.0996, 0, 0))

@@ -10,10 +10,10 @@ from apo_bench import Plan, build_scene, load_scenario
 from apo_bench.geometry import pose
 from apo_bench.records import wrench_noise
 from apo_bench.simulation.execution.controller import replay
-from apo_bench.simulation.execution.feel.feeling import Feeling, touch_guard
-from apo_bench.simulation.execution.feel.places import floor_places, wall_places
-from apo_bench.simulation.execution.feel.touching import _stand_off, find_out
 from apo_bench.simulation.execution.prepare import moves
+from apo_bench.simulation.execution.probing.feeling import Feeling, touch_guard
+from apo_bench.simulation.execution.probing.places import floor_places, wall_places
+from apo_bench.simulation.execution.probing.touching import _stand_off, find_out
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.robot.robot_error import RobotError
 from apo_bench.simulation.robot.wrist import felt_noise, low_pass_part

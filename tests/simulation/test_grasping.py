@@ -8,8 +8,8 @@ import pytest
 from apo_bench import InputError, Plan, Scene, build_scene, load_scenario, replay
 from apo_bench.assembly import Operation, Poses, Step, placements
 from apo_bench.geometry import Array, Box, intrusion_depths, pose
-from apo_bench.parts.making import Body, extrude, polygon, rectangle
 from apo_bench.scenario.layout import layout_at
+from apo_bench.scenario.parts.making import Body, extrude, polygon, rectangle
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.execution.grasping import (
     RestingPart,

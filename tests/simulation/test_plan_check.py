@@ -5,7 +5,7 @@ import pytest
 
 from apo_bench import Plan, build_scene, draw_layout, load_scenario
 from apo_bench.geometry import pose
-from apo_bench.prediction.failure import Prediction, predict
+from apo_bench.planning.prediction.failure import Prediction, predict
 from apo_bench.simulation.arm_checks.plan_check import arm_moves
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.execution.prepare import in_reach

@@ -11,7 +11,7 @@ from scipy.spatial import ConvexHull
 from apo_bench import Plan, Scene, build_scene, demonstrate, draw_layout, load_scenario, replay
 from apo_bench.assembly import Operation
 from apo_bench.geometry import SAGITTA_M, Hull, Piece, physical_pieces, pose
-from apo_bench.parts.making import shaft, solid_of
+from apo_bench.scenario.parts.making import shaft, solid_of
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.robot.robot import Robot
 from apo_bench.simulation.scene.composing import room_with_parts

@@ -11,7 +11,7 @@ from apo_bench import TrialSettings, load_scenario
 from apo_bench.simulation.arms.finding import find_arm
 from apo_bench.trial import fingerprint, inputs
 from apo_bench.trial.fingerprint import (
-    ROOMS_WITHOUT_TRIALS,
+    PACKAGES_WITHOUT_TRIALS,
     code_files,
     content_hash,
     counts,
@@ -61,7 +61,7 @@ def reached(start: Path, *, tables: bool = True) -> set[str]:
 def test_all_that_a_trial_can_reach_counts() -> None:
     run_through = reached(PACKAGE / "trial" / "trial.py")
     assert {
-        *("simulation/execution/controller.py", "judging/verdict.py", "recognition/contacts.py"),
+        *("simulation/execution/controller.py", "judging/verdict.py", "perception/detection/contacts.py"),
         "correction/baselines/track.py",
     } <= run_through
     assert [file for file in sorted(run_through) if not counts(file)] == []
@@ -69,22 +69,22 @@ def test_all_that_a_trial_can_reach_counts() -> None:
 
 
 def test_a_new_file_counts_unless_it_is_named(tmp_path: Path) -> None:
-    for name in ("new.py", "simulation/new.py", "trial/new.py", "report/new.py", "cli/new.py", "notes.txt"):
+    for name in ("new.py", "simulation/new.py", "trial/new.py", "envs/new.py", "cli/new.py", "notes.txt"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(name)
     (tmp_path / "__pycache__").mkdir()
     (tmp_path / "__pycache__" / "old.py").write_text("")
     found = dict(sources(tmp_path))
     assert sorted(found) == [
-        *("cli/new.py", "new.py", "report/new.py", "simulation/new.py", "trial/new.py"),
+        *("cli/new.py", "envs/new.py", "new.py", "simulation/new.py", "trial/new.py"),
     ]
     assert [name for name in sorted(found) if counts(name)] == ["new.py", "simulation/new.py", "trial/new.py"]
 
 
 def test_what_is_left_out_is_after_the_fact() -> None:
-    for name in ("cli/app.py", "report/report.py", "statistics/rates.py", "sweeps/pool.py"):
+    for name in ("cli/app.py", "benchmark/report/report.py", "benchmark/analysis/rates.py", "benchmark/sweeps/pool.py"):
         assert not counts(name)
-    assert {"simulation", "correction", "judging", "trial"}.isdisjoint(ROOMS_WITHOUT_TRIALS)
+    assert {"simulation", "correction", "judging", "trial"}.isdisjoint(PACKAGES_WITHOUT_TRIALS)
 
 
 @pytest.fixture

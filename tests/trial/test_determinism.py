@@ -46,7 +46,7 @@ def test_a_trial_is_the_same_after_a_replay_and_in_a_new_scene(scene: Scene) -> 
 def test_rows_do_not_depend_on_workers_or_order(tmp_path: Path) -> None:
     """Here, one scenario after the other, and in 3 processes: the same lines, byte for byte, whole replays too.
 
-    That 1 and 2 processes give the same, also where correctors misbehave, see `tests/sweeps/test_local.py`.
+    That 1 and 2 processes give the same, also where correctors misbehave, see `tests/benchmark/sweeps/test_local.py`.
     """
     methods = ("none", "paper")
     replayed = 0.5

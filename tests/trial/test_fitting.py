@@ -26,8 +26,8 @@ from apo_bench.assembly import Step
 from apo_bench.assembly.equations import equations
 from apo_bench.correction.solvers.whitened import correction_to, noise_factor
 from apo_bench.geometry import pose
-from apo_bench.observation.noise import Level, make_noise
-from apo_bench.prediction.failure import Prediction, predict
+from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.planning.prediction.failure import Prediction, predict
 from apo_bench.simulation.execution.prepare import in_reach
 from apo_bench.trial.fitting import FittingPlan
 from apo_bench.trial.planning import apply_method

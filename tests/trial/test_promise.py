@@ -11,11 +11,11 @@ import pytest
 
 from apo_bench import Scene, TrialSettings, build_scene, load_scenario, run_trial
 from apo_bench.assembly import Hypothesis, Observation
+from apo_bench.benchmark.analysis import tally
 from apo_bench.correction.correctors import correct
 from apo_bench.geometry import pose
 from apo_bench.records import Row
 from apo_bench.simulation.execution.controller import replay
-from apo_bench.statistics import tally
 from apo_bench.trial import trial
 from apo_bench.trial.planning import apply_method
 from apo_bench.trial.promise import Explanation, abstained, drawn_truths, promised_success

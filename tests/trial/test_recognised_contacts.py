@@ -11,13 +11,13 @@ from typing import Any
 import pytest
 
 from apo_bench import Scene, TrialSettings, build_scene, load_scenario, run_trial
+from apo_bench.benchmark.analysis import ALL, recognitions
+from apo_bench.benchmark.report.tables.methods import recognition_table
 from apo_bench.cli import app as cli
 from apo_bench.records import RECOGNISED
-from apo_bench.report.tables.methods import recognition_table
-from apo_bench.statistics import ALL, recognitions
 from apo_bench.trial.stages import SimulatedDemonstration, simulate_demonstration
 from tests import pages
-from tests.statistics.test_rates import UNCOUNTED
+from tests.benchmark.analysis.test_rates import UNCOUNTED
 
 SEEN = str(Path(__file__).parents[2] / "docs" / "seen.csv")
 SPEC = TrialSettings("block_on_block", level_mm=0.5, level_deg=0.5, careless=0.0, method="contact", seed=4)

@@ -24,7 +24,7 @@ from apo_bench import (
 from apo_bench.assembly import Consistency, Step, Suspect, Try, relation_graph
 from apo_bench.cli.trial_text import print_row
 from apo_bench.geometry import pose
-from apo_bench.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import Level, make_noise
 from apo_bench.records import ENV_ID, ROW, ROW_FIELDS, level_pair, outcomes
 from apo_bench.records.settings import LARGEST_SEED
 from apo_bench.resources import folder

@@ -12,7 +12,7 @@ import numpy as np
 
 from apo_bench.assembly import Plan, Poses
 from apo_bench.geometry import Array, Solid, intrusion_depths, pose, remembered
-from apo_bench.prediction.measures import ArmMove
+from apo_bench.planning.prediction.measures import ArmMove
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.execution import (
     OPEN_TO_PICK_M,

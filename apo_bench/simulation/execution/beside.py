@@ -18,7 +18,7 @@ from shapely import MultiPoint
 
 from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import Array, Face, all_corners, extent, intrusion_depths, own_shape, plane_frame, pose
-from apo_bench.insertion.macros import UP
+from apo_bench.planning.insertion.macros import UP
 from apo_bench.simulation.execution.grasping import gripper_depth, obstacles, upwards
 from apo_bench.simulation.execution.transfer import Transfer, first_contact_pose
 from apo_bench.simulation.frames import frame

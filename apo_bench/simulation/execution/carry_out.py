@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from apo_bench.geometry import Array
-from apo_bench.insertion.macros import UP
+from apo_bench.planning.insertion.macros import UP
 from apo_bench.simulation.execution.fingers import centre, change_grip, check_hold, depart, grasp, grasp_again, release
 from apo_bench.simulation.execution.search import after_search, press_in
 from apo_bench.simulation.execution.transfer import ASIDE_M, Grip, Transfer, first_contact_pose

@@ -9,13 +9,13 @@ import numpy as np
 
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Outcome, Plan, Poses, Reached, ReplayResult, Snapshot, Step, goals_in_force
-from apo_bench.prediction.stability import first_unstable
+from apo_bench.planning.prediction.stability import first_unstable
 from apo_bench.records import sentence, touching_sentence
 from apo_bench.simulation.execution.carry_out import bring, take
-from apo_bench.simulation.execution.feel.feeling import Feeling, Feels
-from apo_bench.simulation.execution.feel.touching import find_out
-from apo_bench.simulation.execution.feel.touching import lay as lay_down
 from apo_bench.simulation.execution.prepare import Move, key_angles, moves
+from apo_bench.simulation.execution.probing.feeling import Feeling, Feels
+from apo_bench.simulation.execution.probing.touching import find_out
+from apo_bench.simulation.execution.probing.touching import lay as lay_down
 from apo_bench.simulation.execution.replay_cache import Progress, ReplayCache, cache_keys
 from apo_bench.simulation.hooks import Hooks, hooks_of
 from apo_bench.simulation.robot import Halt, HoldWatch, Robot, RobotError

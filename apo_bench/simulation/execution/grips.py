@@ -5,7 +5,7 @@ from dataclasses import replace
 
 from apo_bench.assembly import Assembly, Poses
 from apo_bench.geometry import Array, physical_pieces
-from apo_bench.insertion.surroundings import later_walls, own_walls
+from apo_bench.planning.insertion.surroundings import later_walls, own_walls
 from apo_bench.scenario.scenario import Grasp
 from apo_bench.simulation.execution.grasping import (
     Grips,

@@ -9,7 +9,7 @@ import numpy as np
 
 from apo_bench.assembly import Assembly, Plan, Poses, Step
 from apo_bench.geometry import Array, extent, pose, remembered
-from apo_bench.insertion.surroundings import (
+from apo_bench.planning.insertion.surroundings import (
     OVER_M,
     WALL_MARGIN_M,
     ends_of,

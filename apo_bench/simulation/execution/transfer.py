@@ -7,9 +7,9 @@ import numpy as np
 
 from apo_bench.assembly import Operation, Poses
 from apo_bench.geometry import Array, pose
-from apo_bench.insertion.arrival import Arrival, Attach
-from apo_bench.insertion.macros import MacroName
-from apo_bench.insertion.surroundings import WALL_MARGIN_M
+from apo_bench.planning.insertion.arrival import Arrival, Attach
+from apo_bench.planning.insertion.macros import MacroName
+from apo_bench.planning.insertion.surroundings import WALL_MARGIN_M
 from apo_bench.simulation.robot import shifted, with_height
 
 _AHEAD_M = 0.01

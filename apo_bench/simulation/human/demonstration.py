@@ -15,10 +15,10 @@ import numpy as np
 from apo_bench.arguments import check_arguments
 from apo_bench.assembly import Assembly, Demonstration, Layout, Poses, Reached, Snapshot, placements
 from apo_bench.geometry import Array, pose
-from apo_bench.insertion.arrival import Arrival
-from apo_bench.insertion.macros import UP
-from apo_bench.insertion.surroundings import OVER_M, ends_of, slide_directions
 from apo_bench.judging.verdict import judge
+from apo_bench.planning.insertion.arrival import Arrival
+from apo_bench.planning.insertion.macros import UP
+from apo_bench.planning.insertion.surroundings import OVER_M, ends_of, slide_directions
 from apo_bench.records import sentence
 from apo_bench.scenario import (
     Carelessness,

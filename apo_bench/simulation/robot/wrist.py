@@ -17,8 +17,8 @@ import mujoco
 import numpy as np
 
 from apo_bench.geometry import Array, pose
-from apo_bench.parts import read_part
 from apo_bench.records import WrenchNoise
+from apo_bench.scenario.parts import read_part
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.kinematics import Kinematics
 from apo_bench.simulation.frames import body_frame, frame

@@ -12,9 +12,9 @@ import mujoco
 from apo_bench.errors import require
 from apo_bench.geometry import Array, all_boxes
 from apo_bench.mjcf.part_file import PartModel, add_picture
-from apo_bench.parts import PartFile, read_part
 from apo_bench.resources import folder
 from apo_bench.scenario import Scenario, layout_at
+from apo_bench.scenario.parts import PartFile, read_part
 from apo_bench.simulation.arms.arm import Arm
 from apo_bench.simulation.arms.loading import load_model
 from apo_bench.simulation.physics import Physics, set_contact, set_options

@@ -7,8 +7,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from apo_bench.depth_camera.range_finder import PinholeView, RangeFinder, RangeImage
 from apo_bench.geometry import Array, Solid, physical_pieces
+from apo_bench.perception.depth_camera.range_finder import PinholeView, RangeFinder, RangeImage
 from apo_bench.simulation.scene import World
 from apo_bench.simulation.scene.geoms import add_pieces
 

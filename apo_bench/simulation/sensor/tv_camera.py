@@ -6,8 +6,8 @@ from typing import final
 
 import numpy as np
 
-from apo_bench.depth_camera.range_finder import VIEWED_POINT_M, PinholeView, look_at
 from apo_bench.geometry import Array
+from apo_bench.perception.depth_camera.range_finder import VIEWED_POINT_M, PinholeView, look_at
 from apo_bench.simulation.sensor.rays import Strikes
 
 _LIGHT = np.array([0.25, -0.35, 1.0]) / np.linalg.norm([0.25, -0.35, 1.0])

@@ -5,8 +5,8 @@ from typing import Any, final
 
 import numpy as np
 
-from apo_bench.depth_camera.range_finder import RangeFinder, RangeImage
 from apo_bench.geometry import Array
+from apo_bench.perception.depth_camera.range_finder import RangeFinder, RangeImage
 from apo_bench.simulation.scene import World
 from apo_bench.simulation.sensor.rays import Sight
 from apo_bench.simulation.sensor.tv_camera import Change, TvCamera

@@ -12,7 +12,7 @@ import numpy as np
 
 from apo_bench.assembly import Outcome, Plan, Poses, Snapshot
 from apo_bench.geometry import Array, pose
-from apo_bench.insertion.surroundings import WALL_MARGIN_M
+from apo_bench.planning.insertion.surroundings import WALL_MARGIN_M
 from apo_bench.records import sentence
 from apo_bench.simulation.execution import (
     Grip,
@@ -28,8 +28,8 @@ from apo_bench.simulation.execution import (
     take,
     take_up,
 )
-from apo_bench.simulation.execution.feel.feeling import Feeling, Feels
-from apo_bench.simulation.execution.feel.touching import lay
+from apo_bench.simulation.execution.probing.feeling import Feeling, Feels
+from apo_bench.simulation.execution.probing.touching import lay
 from apo_bench.simulation.hooks import Hooks
 from apo_bench.simulation.robot import Halt, Robot, RobotError, WristSensor, part_loads, wrist_of, zero
 from apo_bench.simulation.scene import Scene, sleeping

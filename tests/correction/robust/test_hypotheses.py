@@ -25,12 +25,12 @@ from apo_bench.correction.robust.noise_scale import likeliest_scale
 from apo_bench.correction.robust.search import Search
 from apo_bench.correction.robust.views import views_of
 from apo_bench.geometry import pose
-from apo_bench.observation.looking import Looks
-from apo_bench.observation.models.camera import Camera
-from apo_bench.observation.models.failures import make_failures
-from apo_bench.observation.noise import Level, make_noise
-from apo_bench.observation.observing import observe
-from apo_bench.observation.relations import make_relations, with_relations
+from apo_bench.perception.observation.looking import Looks
+from apo_bench.perception.observation.models.camera import Camera
+from apo_bench.perception.observation.models.failures import make_failures
+from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.observing import observe
+from apo_bench.perception.observation.relations import make_relations, with_relations
 from apo_bench.trial.outcome_columns import goal_errors
 from tests.correction.robust.test_looks import Again, at_the_same_place
 from tests.correction.robust.test_robust import astray, fixed_error_mm, look, shown

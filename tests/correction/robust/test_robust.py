@@ -27,8 +27,8 @@ from apo_bench.correction.solvers.posterior import jacobian_rank
 from apo_bench.correction.solvers.whitened import noise_factor
 from apo_bench.geometry import overlap_area, pose
 from apo_bench.geometry.covering import overlap
-from apo_bench.observation.noise import Level, make_noise
-from apo_bench.observation.relations import culprit, make_relations, with_relations
+from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.relations import culprit, make_relations, with_relations
 from apo_bench.trial.outcome_columns import goal_errors
 from tests.shipped import BOXES
 

@@ -13,7 +13,7 @@ from apo_bench.correction.contact.contact import contact_refuse
 from apo_bench.correction.contact.problem import problem_of
 from apo_bench.correction.solvers.gauss_newton import nearest_goals
 from apo_bench.correction.solvers.play import fit_covariance, plays
-from apo_bench.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise import Level, make_noise
 from benchmarks.corrector_bench.draws import draw
 from benchmarks.corrector_bench.problems import chain
 from tests.correction.robust.test_robust import look, shown

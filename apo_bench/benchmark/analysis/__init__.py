@@ -1,0 +1,76 @@
+"""Rates, paired comparisons, curves: numbers out of trial records."""
+
+from apo_bench.benchmark.analysis.calibration import calibrations
+from apo_bench.benchmark.analysis.effort import efforts
+from apo_bench.benchmark.analysis.gaps import gaps
+from apo_bench.benchmark.analysis.half_level import HalfLevel
+from apo_bench.benchmark.analysis.line import ALL, Line
+from apo_bench.benchmark.analysis.over_seeds import (
+    FEWEST_SEEDS,
+    Contrast,
+    Results,
+    contrast,
+    mean_surprise,
+    pooled_rate,
+    threshold,
+)
+from apo_bench.benchmark.analysis.paired import Paired, tango
+from apo_bench.benchmark.analysis.place import PLACE_FIELDS, Place, by_place, level_label, order, place_of, rank
+from apo_bench.benchmark.analysis.prediction import confusions
+from apo_bench.benchmark.analysis.probing import felt
+from apo_bench.benchmark.analysis.rates import NOT_EXECUTED, Cell, Interval, Rate, Records, tally, wilson
+from apo_bench.benchmark.analysis.recognition import recognitions
+from apo_bench.benchmark.analysis.settings import level_of, level_unit, level_words, levels_of, members, settings
+from apo_bench.benchmark.analysis.summary import Summary, summary
+from apo_bench.benchmark.analysis.timing import read_timing, trial_times, work
+from apo_bench.benchmark.analysis.words import percent, percents, points, signed
+
+__all__ = (
+    "ALL",
+    "FEWEST_SEEDS",
+    "NOT_EXECUTED",
+    "PLACE_FIELDS",
+    "Cell",
+    "Contrast",
+    "HalfLevel",
+    "Interval",
+    "Line",
+    "Paired",
+    "Place",
+    "Rate",
+    "Records",
+    "Results",
+    "Summary",
+    "by_place",
+    "calibrations",
+    "confusions",
+    "contrast",
+    "efforts",
+    "felt",
+    "gaps",
+    "level_label",
+    "level_of",
+    "level_unit",
+    "level_words",
+    "levels_of",
+    "mean_surprise",
+    "members",
+    "order",
+    "percent",
+    "percents",
+    "place_of",
+    "points",
+    "pooled_rate",
+    "rank",
+    "read_timing",
+    "recognitions",
+    "settings",
+    "signed",
+    "summary",
+    "tally",
+    "tango",
+    "threshold",
+    "trial_times",
+    "wilson",
+    "work",
+)

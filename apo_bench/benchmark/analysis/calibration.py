@@ -1,0 +1,52 @@
+"""How uncertain corrections say they are, and which relations their test finds wrong, against the truth."""
+
+from typing import Any
+
+import numpy as np
+
+from apo_bench.benchmark.analysis.line import Line
+from apo_bench.benchmark.analysis.place import rank, rank_relations
+from apo_bench.benchmark.analysis.rates import Rate, Records, root_mean_square
+from apo_bench.records import knows_truth
+from apo_bench.records.run.trials import Trials, trials_of
+
+_AXES = ("scenario", "noise", "relations", "method")
+
+
+def calibrations(records: Records) -> list[Line]:
+    """One line per scenario, noise, relations and method; the oracle has nothing to be calibrated.
+
+    Over every level, carelessness and clearance: how often the truth lies in the stated region, the errors of planned
+    poses along directions that contacts fix and leave free, and how often the test fails and names the culprit.
+    """
+    trials = trials_of(records)
+    counted = ~np.isnan(trials.number("success")) & ~np.isnan(trials.number("level"))
+    groups = trials.where(counted & ~trials.holds("method", knows_truth)).parts(_AXES)
+    return [_line(dict(zip(_AXES, key, strict=True)), groups[key]) for key in sorted(groups, key=_order)]
+
+
+def _order(key: tuple[Any, ...]) -> tuple[Any, ...]:
+    scenario, noise, relations, method = key
+    return scenario, noise, rank_relations(relations), rank(method), method
+
+
+def _line(axes: Line, trials: Trials) -> Line:
+    planned = trials.where(~np.isnan(trials.number("planned_error_fixed_mm")))
+    fixed = planned.number("planned_error_fixed_mm")
+    clearance = planned.number("clearance_mm")
+    loose = clearance > 0
+    inside = trials.number("inside_95")
+    passes = trials.number("test_passes")
+    known = trials.where((passes == 0) & ~trials.holds("wrong_relation", (None,).__contains__))
+    named = [
+        one in (all_ or ()) for one, all_ in zip(known.values("wrong_relation"), known.values("suspects"), strict=True)
+    ]
+    return axes | {
+        "planned": len(planned),
+        "covered": Rate(int(np.nansum(inside)), int((~np.isnan(inside)).sum())),
+        "fixed_mm": root_mean_square(fixed),
+        "fixed_over_clearance": root_mean_square(fixed[loose] / clearance[loose]),
+        "free_mm": root_mean_square(np.nan_to_num(planned.number("planned_error_free_mm"))),
+        "failed_tests": Rate(int((passes == 0).sum()), int((~np.isnan(passes)).sum())),
+        "culprits": Rate(sum(named), len(named)),
+    }

@@ -1,0 +1,25 @@
+"""What replays take: operations beyond doing each once, simulated time, how far finished parts were pushed."""
+
+import numpy as np
+
+from apo_bench.benchmark.analysis.line import Line
+from apo_bench.benchmark.analysis.place import by_method
+from apo_bench.benchmark.analysis.rates import Records
+from apo_bench.records.run.trials import trials_of
+
+
+def efforts(records: Records) -> list[Line]:
+    """One line per scenario and method that had a success, of these trials, over every level and carelessness."""
+    trials = trials_of(records)
+    right = trials.where(trials.number("success") == 1)
+    return [
+        {
+            "scenario": scenario,
+            "method": method,
+            "trials": len(own),
+            "extra_operations": float(own.number("extra_operations").mean()),
+            "sim_seconds": float(np.median(own.number("sim_seconds"))),
+            "pushed_mm": float(np.nan_to_num(own.number("pushed_mm")).max()),
+        }
+        for (scenario, method), own in by_method(right).items()
+    ]

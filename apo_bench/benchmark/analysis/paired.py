@@ -1,0 +1,204 @@
+"""Paired comparison: two methods over the same seeds, so that layout, hand and noise cancel."""
+
+from collections.abc import Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import TypeVar, final
+
+import numpy as np
+
+from apo_bench.benchmark.analysis.place import Place, by_place
+from apo_bench.benchmark.analysis.rates import CONFIDENCE, Interval, Rate, Records, mean
+from apo_bench.geometry import Array
+from apo_bench.records import TrialSettings, feels, knows_relations, knows_truth, may_look
+from apo_bench.records.run.trials import Trials, trials_of
+
+K = TypeVar("K", bound=Hashable)
+REFERENCES = ("paper", "none")
+_EDGE = 1e-9
+"""Limits are sought this far from -1, 1 and the estimate, where the statistic is not defined."""
+
+
+@final
+@dataclass(frozen=True)
+class Paired:
+    """A method against another one, in one cell."""
+
+    place: Place
+    """Of the method."""
+    reference: str
+    pairs: int
+    """Seeds of which both have a result."""
+    only_method: int
+    """Seeds at which the method alone was right."""
+    only_reference: int
+    both: int
+    """Seeds at which both were right."""
+    p: float | None
+    """McNemar's exact p-value; None without a pair."""
+    p_adjusted: float | None
+    """The p-value, adjusted for all comparisons that were made together."""
+    planned: int
+    """Seeds at which both had a plan."""
+    free_mm: float | None
+    """Mean of the differences of the errors in directions that contacts leave free, method minus reference."""
+    free_interval: Interval | None
+    """Student's t interval of that mean; None with fewer than two pairs."""
+
+    @property
+    def difference(self) -> float | None:
+        """Success rate of the method minus that of the reference; None without a pair."""
+        return (self.only_method - self.only_reference) / self.pairs if self.pairs else None
+
+    @property
+    def interval(self) -> Interval:
+        """Tango's 95 % interval of the difference."""
+        return tango(self.only_method, self.only_reference, self.pairs)
+
+    @property
+    def neither(self) -> int:
+        """Seeds at which both failed."""
+        return self.pairs - self.both - self.only_method - self.only_reference
+
+    @property
+    def recovered(self) -> Rate:
+        """Of the seeds at which the reference failed, those at which the method was right."""
+        return Rate(self.only_method, self.only_method + self.neither)
+
+    @property
+    def harmed(self) -> Rate:
+        """Of the seeds at which the reference was right, those at which the method failed."""
+        return Rate(self.only_reference, self.only_reference + self.both)
+
+
+def paired(records: Records, references: Sequence[str] = REFERENCES) -> tuple[Paired, ...]:
+    """Every method but the oracle against every reference, cell by cell, sorted as `tally` sorts.
+
+    `none` asks for no relations, so its rows with the right ones are the reference of those with wrong ones too.
+    The p-values of all comparisons are adjusted together; `a` against `b` and `b` against `a` are one comparison.
+
+    Raises:
+        InputError: A trial is there twice.
+    """
+    places = by_place(trials_of(records)).items()
+    counted = {place: own.where(~np.isnan(own.number("success"))) for place, own in places}
+    cells = {place: own for place, own in counted.items() if len(own)}
+    pairs = [
+        _paired(place, reference, cells[place], cells[other])
+        for place in cells
+        for reference in references
+        if not knows_truth(place.method) and (other := place_of_reference(place, reference)) in cells
+        if place.method != reference
+    ]
+    raised = holm({_comparison(pair): pair.p for pair in pairs if pair.p is not None})
+    return tuple(replace(pair, p_adjusted=raised.get(_comparison(pair))) for pair in pairs)
+
+
+def holm(p: Mapping[K, float]) -> dict[K, float]:
+    """The p-values of a family of tests, raised so that the chance of one false alarm or more is bounded.
+
+    After S. Holm, A simple sequentially rejective multiple test procedure, Scandinavian Journal of Statistics 6 (1979),
+    65-70.
+    """
+    tests = sorted(p, key=lambda test: p[test])
+    # of m tests the i-th smallest (from 0) is held to its share of the m - i that are left, and is never below the last
+    raised = np.maximum.accumulate([(len(p) - i) * p[test] for i, test in enumerate(tests)])
+    adjusted = dict(zip(tests, np.minimum(raised, 1.0).tolist(), strict=True))
+    return {test: adjusted[test] for test in p}
+
+
+def place_of_reference(place: Place, reference: str) -> Place:
+    """What a cell, or a curve, is compared with: `none` asks for no relations, few for looks, few robots feel."""
+    other = place._replace(method=reference, looks=place.looks if may_look(reference) else 0)
+    if not feels(reference):
+        other = other._replace(wrench=TrialSettings.wrench, stated_error=TrialSettings.stated_error)
+    return other if knows_relations(reference) else other._replace(relations="given")
+
+
+def _comparison(pair: Paired) -> frozenset[Place]:
+    return frozenset((pair.place, place_of_reference(pair.place, pair.reference)))
+
+
+def mcnemar(only_first: int, only_second: int) -> float:
+    """The two-sided exact p-value: how unlikely so uneven a split is if each discordant pair falls either way alike.
+
+    After Q. McNemar, Note on the sampling error of the difference between correlated proportions or percentages,
+    Psychometrika 12 (1947), 153-157; exact by the binomial distribution. Without a discordant pair it is 1.
+
+    Args:
+        only_first: Pairs in which the first alone succeeded.
+        only_second: Pairs in which the second alone succeeded.
+    """
+    from scipy.stats import binomtest
+
+    pairs = only_first + only_second
+    return float(binomtest(min(only_first, only_second), pairs, 0.5).pvalue) if pairs else 1.0
+
+
+@lru_cache(maxsize=65536)
+def tango(b: int, c: int, n: int) -> Interval:
+    """The score interval of a difference of paired proportions, (b - c) / n, at 95 %.
+
+    The differences at which Tango's score statistic is within the normal quantile; sensible where no pair is
+    discordant, when it is 0 -+ z^2 / (n + z^2). After T. Tango, Equivalence test and confidence interval for the
+    difference in proportions for the paired-sample design, Statistics in Medicine 17 (1998), 891-908.
+
+    Args:
+        b: Pairs in which the first alone succeeded.
+        c: Pairs in which the second alone succeeded.
+        n: All pairs; without one nothing is known: -1 to 1.
+    """
+    from scipy.optimize import brentq
+    from scipy.special import ndtri
+
+    if n == 0:
+        return Interval(-1.0, 1.0)
+    z = float(ndtri((1 + CONFIDENCE) / 2))
+    d = (b - c) / n
+    # the statistic falls from far above z at delta = -1 through 0 at the estimate d to far below -z at delta = 1
+    low = -1.0 if c == n else brentq(lambda x: _score(b, c, n, x) - z, -1 + _EDGE, d - _EDGE)
+    high = 1.0 if b == n else brentq(lambda x: _score(b, c, n, x) + z, d + _EDGE, 1 - _EDGE)
+    return Interval(float(low), float(high))
+
+
+def _score(b: int, c: int, n: int, delta: float) -> float:
+    """Tango's score statistic of a difference delta; q is the likeliest share of c if that is the difference."""
+    # q is the larger root of 2 n q^2 + B q - c delta (1 - delta) = 0, where the likelihood is flat along delta
+    B = -b - c + (2 * n - b + c) * delta
+    q = (np.sqrt(max(B * B + 8 * n * c * delta * (1 - delta), 0.0)) - B) / (4 * n)
+    return float((b - c - n * delta) / np.sqrt(n * (2 * q + delta * (1 - delta))))
+
+
+def _paired(place: Place, reference: str, ours: Trials, theirs: Trials) -> Paired:
+    _, i, j = np.intersect1d(ours.number("seed"), theirs.number("seed"), assume_unique=True, return_indices=True)
+    ours = ours.where(i)
+    theirs = theirs.where(j)
+    right = ours.number("success") == 1
+    other_right = theirs.number("success") == 1
+    only_method = int((right & ~other_right).sum())
+    only_reference = int((~right & other_right).sum())
+    apart = ours.number("planned_error_free_mm") - theirs.number("planned_error_free_mm")
+    apart = apart[~np.isnan(apart)]
+    return Paired(
+        place=place,
+        reference=reference,
+        pairs=len(right),
+        only_method=only_method,
+        only_reference=only_reference,
+        both=int((right & other_right).sum()),
+        p=mcnemar(only_method, only_reference) if len(right) else None,
+        p_adjusted=None,
+        planned=len(apart),
+        free_mm=mean(apart),
+        free_interval=_student(apart),
+    )
+
+
+def _student(x: Array) -> Interval | None:
+    """Student's t interval of a mean at 95 %: mean -+ t(n - 1) s / sqrt(n), s with n - 1 degrees of freedom."""
+    from scipy.stats import sem, t
+
+    if len(x) < 2:
+        return None
+    ends = t.interval(CONFIDENCE, len(x) - 1, loc=np.mean(x), scale=sem(x)) if np.ptp(x) else (x[0], x[0])
+    return Interval(*map(float, ends))

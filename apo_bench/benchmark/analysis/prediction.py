@@ -1,0 +1,44 @@
+"""Which plans were predicted to fail, against what physics then made of them."""
+
+import numpy as np
+
+from apo_bench.benchmark.analysis.line import ALL, Line
+from apo_bench.benchmark.analysis.place import by_method
+from apo_bench.benchmark.analysis.rates import Rate, Records, was_executed
+from apo_bench.records.run.trials import Trials, trials_of
+
+
+def confusions(records: Records) -> list[Line]:
+    """One line per scenario and method, sorted as `tally` sorts, and one of them all at the end.
+
+    Fitted means a success that was made as demonstrated: that is what a plan predicts. Of the trials that were rightly
+    predicted to fail, `stopped` are those at which the robot stopped at an operation, and `same_operation` those at
+    which it was the predicted one. Not executed is a trial without a plan, or with one that promised too little.
+    """
+    trials = trials_of(records)
+    return [*(_line(*key, own) for key, own in by_method(trials).items()), _line(ALL, ALL, trials)]
+
+
+def _line(scenario: str, method: str, trials: Trials) -> Line:
+    counted = trials.where(~np.isnan(trials.number("success")))
+    executed = counted.where(~np.isnan(counted.number("predicted_fails")) & was_executed(counted))
+    fails = executed.number("predicted_fails") == 1
+    fitted = executed.number("as_demonstrated") == 1
+    caught = executed.where(fails & ~fitted)
+    stopped = caught.where(~np.isnan(caught.number("failure_operation")))
+    right = int((fails != fitted).sum())
+    return {
+        "scenario": scenario,
+        "method": method,
+        "executed": len(executed),
+        "right": right,
+        "predicted_fit_fitted": int((~fails & fitted).sum()),
+        "predicted_fit_failed": int((~fails & ~fitted).sum()),
+        "predicted_fail_fitted": int((fails & fitted).sum()),
+        "predicted_fail_failed": len(caught),
+        "agreement": Rate(right, len(executed)).rate,
+        "same_operation": int((stopped.number("predicted_operation") == stopped.number("failure_operation")).sum()),
+        "stopped": len(stopped),
+        "not_executed": len(counted) - len(executed),
+        "excluded": len(trials) - len(counted),
+    }

@@ -1,0 +1,169 @@
+"""Success rates with Wilson's intervals: one cell for trials that differ in nothing but the seed."""
+
+import math
+from collections import Counter
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+from types import MappingProxyType
+from typing import Any, NamedTuple, final
+
+import numpy as np
+
+from apo_bench.benchmark.analysis.place import Place, by_place
+from apo_bench.geometry import Array
+from apo_bench.records.run.trials import Mask, Trials, trials_of
+
+CONFIDENCE = 0.95
+Records = Trials | Iterable[Mapping[str, Any]]
+"""Trials as columns, or as records."""
+NOT_EXECUTED = ("observe", "correct", "promise", "plan", "worker")
+"""Stages of failures at which no plan was carried out to its end: there was none, it promised too little, it was
+refused before anything moved, or its process died."""
+
+
+class Interval(NamedTuple):
+    """A two-sided confidence interval."""
+
+    low: float
+    high: float
+
+
+class Rate(NamedTuple):
+    """So many successes among so many trials."""
+
+    successes: int
+    trials: int
+
+    @property
+    def rate(self) -> float | None:
+        """None without a trial."""
+        return self.successes / self.trials if self.trials else None
+
+    @property
+    def interval(self) -> Interval:
+        """Wilson's at 95 %."""
+        return wilson(self.successes, self.trials)
+
+
+@final
+@dataclass(frozen=True, kw_only=True)
+class Cell(Place):
+    """What came out where only seeds differ."""
+
+    trials: int
+    """Trials that count: those whose demonstration was right."""
+    successes: int
+    """The finished assembly is right."""
+    demonstrated: int
+    """Successes of which every contact was also made when and where it was shown."""
+    loose_successes: int
+    not_executed: int
+    """Failures of which no plan was carried out: nothing was corrected, too little was promised, the plan was refused
+    before anything moved, or the worker died. They count as failures."""
+    abstained: int
+    """Those of them whose plan promised too little."""
+    promised: float | None
+    """Mean of what plans promised; None where no plan did."""
+    brier: float | None
+    """Mean squared difference of promise and success over the trials whose plan promised anything and was executed."""
+    excluded: int
+    """Trials left out of every method alike, since the demonstration itself was not right."""
+    failures: Mapping[str, int]
+    """`stage: code` -> how many, most frequent first."""
+
+    @property
+    def counted(self) -> Rate:
+        return Rate(self.successes, self.trials)
+
+    @property
+    def rate(self) -> float | None:
+        """Success rate; None without a trial that counts."""
+        return self.counted.rate
+
+    @property
+    def interval(self) -> Interval:
+        """Wilson's 95 % interval of the success rate."""
+        return self.counted.interval
+
+    @property
+    def tightness(self) -> float | None:
+        """Clearance per side over level, mm per mm: small is tight; None where poses are seen exactly."""
+        return self.clearance_mm / self.level if self.level > 0 else None
+
+    @property
+    def demonstrated_rate(self) -> float | None:
+        return Rate(self.demonstrated, self.trials).rate
+
+    @property
+    def loose_rate(self) -> float | None:
+        return Rate(self.loose_successes, self.trials).rate
+
+    @property
+    def executed(self) -> Rate:
+        """Success among the trials whose plan was carried out."""
+        return Rate(self.successes, self.trials - self.not_executed)
+
+    @property
+    def wrong_when_executed(self) -> float | None:
+        """Share of failures among the trials whose plan was carried out; None without one."""
+        right, done = self.executed
+        return Rate(done - right, done).rate
+
+
+@lru_cache(maxsize=65536)
+def wilson(successes: int, trials: int) -> Interval:
+    """Wilson's score interval at 95 %; nothing is known without trials: 0 to 1."""
+    from scipy.stats import binomtest
+
+    if trials == 0:
+        return Interval(0.0, 1.0)
+    interval = binomtest(successes, trials).proportion_ci(confidence_level=CONFIDENCE, method="wilson")
+    return Interval(float(interval.low), float(interval.high))
+
+
+def tally(records: Records) -> tuple[Cell, ...]:
+    """Count trials into cells, sorted by scenario, clearance, noise, relations, carelessness, grasp, method, level.
+
+    Raises:
+        InputError: A trial is there twice.
+    """
+    return tuple(_cell(place, own) for place, own in by_place(trials_of(records)).items())
+
+
+def mean(numbers: Array) -> float | None:
+    """Of the numbers that are known; None without one."""
+    known = numbers[~np.isnan(numbers)]
+    return float(known.mean()) if len(known) else None
+
+
+def root_mean_square(x: Array) -> float | None:
+    """None without a number."""
+    return math.sqrt(float(np.mean(x**2))) if len(x) else None
+
+
+def was_executed(trials: Trials) -> Mask:
+    """(n,) whether a plan was carried out to its end, or to where something failed."""
+    return ~trials.holds("failure_stage", NOT_EXECUTED.__contains__)
+
+
+def _cell(place: Place, trials: Trials) -> Cell:
+    counted = trials.where(~np.isnan(trials.number("success")))
+    success = counted.number("success")
+    executed = was_executed(counted)
+    promised = counted.number("promised")
+    failed = counted.where(success == 0)
+    why = Counter(map("{}: {}".format, failed.values("failure_stage"), failed.values("failure_code")))
+    return Cell(
+        **vars(place),
+        trials=len(counted),
+        successes=int(success.sum()),
+        demonstrated=int(np.nansum(counted.number("as_demonstrated"))),
+        loose_successes=int(np.nansum(counted.number("loose_success"))),
+        not_executed=int((~executed).sum()),
+        abstained=int(failed.holds("failure_code", ("abstained",).__contains__).sum()),
+        promised=mean(promised),
+        brier=mean((promised - success)[executed] ** 2),
+        excluded=len(trials) - len(counted),
+        failures=MappingProxyType(dict(sorted(why.items(), key=lambda item: (-item[1], item[0])))),
+    )

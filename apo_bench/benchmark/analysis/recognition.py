@@ -1,0 +1,52 @@
+"""Contacts that were recognised in observations, against those of the scenario."""
+
+from typing import Any
+
+import numpy as np
+
+from apo_bench.benchmark.analysis.line import ALL, Line
+from apo_bench.benchmark.analysis.rates import Rate, Records
+from apo_bench.records import RECOGNISED
+from apo_bench.records.run.trials import Trials, trials_of
+
+_AXES = ("scenario", "noise", "eye", "relations", "careless", "level", "level_deg")
+
+
+def recognitions(records: Records) -> list[Line]:
+    """One line per scenario, noise, eye, way of recognising, carelessness and level; and over all scenarios.
+
+    Methods of one seed were told the same, so each observation counts once. Complete is a demonstration of which every
+    contact was recognised, and no other.
+    """
+    trials = trials_of(records)
+    known = ~np.isnan(trials.number("contacts_right")) & ~np.isnan(trials.number("level"))
+    told = trials.where(known & trials.holds("relations", RECOGNISED.__contains__))
+    observations = told.groups((*_AXES, "seed", "clearance_mm")).of
+    once = told.where(np.unique(observations, return_index=True)[1])
+    parts = once.parts(_AXES)
+    if len(once.distinct("scenario")) > 1:
+        parts |= {(ALL, *key): own for key, own in once.parts(_AXES[1:]).items()}
+    return [_line(dict(zip(_AXES, key, strict=True)), parts[key]) for key in sorted(parts, key=_order)]
+
+
+def _line(axes: Line, trials: Trials) -> Line:
+    right, missed, false = (trials.number(f"contacts_{of}") for of in ("right", "missed", "false"))
+    complete = Rate(int(((missed == 0) & (false == 0)).sum()), len(trials))
+    counts = {name: int(x.sum()) for name, x in (("right", right), ("missed", missed), ("false", false))}
+    return (
+        axes
+        | counts
+        | {
+            "demonstrations": len(trials),
+            "complete": complete.successes,
+            "all_right": complete,
+            "precision": Rate(counts["right"], counts["right"] + counts["false"]).rate,
+            "recall": Rate(counts["right"], counts["right"] + counts["missed"]).rate,
+        }
+    )
+
+
+def _order(key: tuple[Any, ...]) -> tuple[Any, ...]:
+    """All scenarios last; the ways of recognising in their own order."""
+    scenario, noise, eye, relations, *rest = key
+    return (scenario == ALL, scenario, noise, eye, RECOGNISED.index(relations), *rest)

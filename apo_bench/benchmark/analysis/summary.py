@@ -1,0 +1,31 @@
+"""All that a report says in numbers about who succeeds, in one call."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from apo_bench.benchmark.analysis.half_level import HalfLevel, half_levels
+from apo_bench.benchmark.analysis.paired import REFERENCES, Paired, paired
+from apo_bench.benchmark.analysis.rates import Cell, Records, tally
+from apo_bench.records.run.trials import trials_of
+
+
+class Summary(NamedTuple):
+    """Each sorted as `tally` sorts; nothing of it depends on chance or on the order of records."""
+
+    cells: tuple[Cell, ...]
+    pairs: tuple[Paired, ...]
+    half_levels: tuple[HalfLevel, ...]
+
+
+def summary(records: Records, references: Sequence[str] = REFERENCES) -> Summary:
+    """Rates, pairs and half levels of trials.
+
+    Args:
+        references: The methods that every other one is compared with.
+
+    Raises:
+        InputError: A trial is there twice.
+    """
+    trials = trials_of(records)
+    cells = tally(trials)
+    return Summary(cells, paired(trials, references), half_levels(cells))

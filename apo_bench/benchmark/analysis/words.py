@@ -1,0 +1,30 @@
+"""How rates, differences and intervals are written for people."""
+
+from apo_bench.benchmark.analysis.rates import Interval
+
+
+def percent(rate: float | None, digits: int = 1) -> str:
+    """`97.0 %`, or a dash where nothing counted; only what is all or nothing says 100.0 or 0.0."""
+    if rate is None:
+        return "–"
+    text = f"{100 * rate:.{digits}f}"
+    least = 10.0**-digits
+    if rate < 1.0 and float(text) == 100.0:
+        return f"> {100 - least:.{digits}f} %"
+    return f"< {least:.{digits}f} %" if rate > 0.0 and float(text) == 0.0 else f"{text} %"
+
+
+def percents(interval: Interval, digits: int = 1) -> str:
+    """`91.5 to 99.0 %`."""
+    return f"{100 * interval.low:.{digits}f} to {100 * interval.high:.{digits}f} %"
+
+
+def signed(x: float, digits: int) -> str:
+    """`+4.0`; what is nothing to so many digits has no minus."""
+    return f"{round(x, digits) + 0.0:+.{digits}f}"
+
+
+def points(share: float | Interval) -> str:
+    """`+4.0`, or `-0.3 to +9.1`: hundredths of a difference of two rates."""
+    ends = share if isinstance(share, tuple) else (share,)
+    return " to ".join(signed(100 * x, 1) for x in ends)

@@ -1,0 +1,118 @@
+"""Episodes as a Minari data set: HDF5 and JSON, written without Minari.
+
+The format is that of `Farama-Foundation/Minari`, `minari/dataset/_storages/hdf5_storage.py`: a group for each episode,
+with what was seen before the first action and after each; beside it the spaces and what is known of all.
+"""
+
+import json
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from apo_bench import __version__
+from apo_bench.benchmark.datasets.card import About, Field, Rollout, write_card
+from apo_bench.errors import missing_package
+from apo_bench.io import replace_file, write_file
+
+_OWN = {
+    "rewards": "reward of each action",
+    "terminations": "whether the episode is over after the action",
+    "truncations": "never: an episode ends by itself",
+    "infos/success": "whether it is over and right, by the judge, before the first action and after each",
+}
+_OF_EPISODE = {
+    "id": "from 0",
+    "seed": "number of the trial",
+    "total_steps": "how many actions",
+    **{f"rewards_{name}": f"{name} of all rewards" for name in ("max", "min", "mean", "std", "sum")},
+}
+
+
+def load_h5py() -> Any:
+    """Import h5py.
+
+    Raises:
+        InputError: It is not installed.
+    """
+    try:
+        import h5py
+    except ImportError as error:
+        raise missing_package("the format minari", "h5py") from error
+    return h5py
+
+
+def write_minari(rollouts: Iterable[Rollout], about: About, out: Path) -> tuple[int, int]:
+    """Write episodes, and the card.
+
+    Returns:
+        How many episodes there are, and how many of them are right.
+
+    Raises:
+        InputError: The package h5py is not installed.
+        OSError: Something cannot be written.
+    """
+    h5py = load_h5py()
+    folder = out / "data"
+    folder.mkdir(parents=True)
+    steps = right = episodes = 0
+    with replace_file(folder / "main_data.hdf5") as file, h5py.File(file, "w", track_order=True) as data:
+        for rollout in rollouts:
+            _add(data.create_group(f"episode_{episodes}"), rollout, episodes)
+            episodes += 1
+            steps += len(rollout.actions)
+            right += bool(rollout.more["success"])
+    metadata = {
+        "dataset_id": f"apo_bench/{about.name}-v0",
+        "total_episodes": episodes,
+        "total_steps": steps,
+        "dataset_size": round((folder / "main_data.hdf5").stat().st_size / 1e6, 1),
+        "data_format": "hdf5",
+        "jpeg_encoding": False,
+        "observation_space": json.dumps({"type": "Dict", "subspaces": {n: _box(f) for n, f in about.fields.items()}}),
+        "action_space": json.dumps(_box(about.action)),
+        "minari_version": "0.5.4",  # whose format this is
+        "algorithm_name": about.command,
+        "author": ["The apo_bench authors"],
+        "description": about.summary,
+        "requirements": [f"apo_bench=={__version__}"],
+        **({"env_spec": about.env_spec} if about.env_spec else {}),
+    }
+    write_file(folder / "metadata.json", json.dumps(metadata, indent=1))
+    observations = {f"observations/{name}": field for name, field in about.fields.items()}
+    where = "data/main_data.hdf5"
+    tables: dict[str, dict[str, Any]] = {
+        f"{where}: groups episode_0, ..": {**observations, "actions": about.action, **_OWN},
+        f"{where}: attributes of each": {**_OF_EPISODE, **about.episodes},
+    }
+    write_card(about, out, (episodes, right), tables)
+    return episodes, right
+
+
+def _add(group: Any, rollout: Rollout, episode: int) -> None:
+    """One episode."""
+    rewards = np.asarray(rollout.rewards, dtype=np.float64)
+    of_rewards = {f"rewards_{name}": getattr(rewards, name)() for name in ("max", "min", "mean", "std", "sum")}
+    told = {name: _plain(x) for name, x in rollout.more.items() if x is not None}
+    group.attrs.update({**told, "id": episode, "seed": rollout.seed, "total_steps": len(rewards), **of_rewards})
+    for name, numbers in rollout.observations.items():
+        group.create_dataset(f"observations/{name}", data=numbers.astype(np.float32))
+    group.create_dataset("actions", data=rollout.actions.astype(np.float32))
+    group.create_dataset("rewards", data=rewards)
+    over = np.arange(len(rewards) + 1) == len(rewards)
+    group.create_dataset("terminations", data=over[1:])
+    group.create_dataset("infos/success", data=over & bool(rollout.more["success"]))
+    group.create_dataset("truncations", data=np.zeros(len(rewards), dtype=np.bool_))
+
+
+def _plain(x: Any) -> Any:
+    """Texts in a list as HDF5 takes them."""
+    return np.array(x, dtype=object) if isinstance(x, list) and x and isinstance(x[0], str) else x
+
+
+def _box(field: Field) -> dict[str, Any]:
+    """A space of Gymnasium, as Minari writes it."""
+    high = np.broadcast_to(np.array(field.most, dtype=np.float32), len(field.names))
+    shape = [len(field.names)]
+    return {"type": "Box", "dtype": "float32", "shape": shape, "low": (-high).tolist(), "high": high.tolist()}

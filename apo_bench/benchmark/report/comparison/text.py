@@ -1,0 +1,187 @@
+"""A comparison in words: tables for the terminal and the page, the page itself, and one JSON object."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from apo_bench.benchmark.analysis import FEWEST_SEEDS, Interval, Line, percent, percents
+from apo_bench.benchmark.report.comparison.compare import Comparison
+from apo_bench.benchmark.report.facts import value_words
+from apo_bench.benchmark.report.page.page import Section, page
+from apo_bench.benchmark.report.tables.table import Column, Table, fill
+from apo_bench.benchmark.report.trials import NUMBERS
+from apo_bench.errors import InputError
+from apo_bench.io import check_folders, write_file
+
+_AGREEMENT = (
+    "The same trials in both: how often success is the same, with Wilson's interval, and how often stage and code of "
+    "a failure are as well. Trials of one seed share their random numbers, so those intervals are too narrow where "
+    "disagreements come in bunches; *same in all* counts the seeds with which every trial has the same verdict in "
+    "both, and these are independent. *Right in the first alone* are trials that the second lost. The difference of "
+    "success is the second minus the first, with Tango's interval for pairs (95 %), over trials too. Trials whose "
+    "demonstration was not right in either are left out here."
+)
+_NUMBERS = "Of trials that have the number in both: in how many it is not exactly the same, and by how much at most."
+_CELLS = (
+    "Rates over all trials of each side; alone and the difference, second minus first, over the trials that they share."
+)
+_MOST_LISTED = 2000
+"""Changed trials that are listed."""
+_DIFFERENCE = fill("{difference:points} ({difference_low_95:points} to {difference_high_95:points})")
+_WHERE = (
+    Column("scenario", "scenario", "place.scenario", words=True),
+    Column("conditions", "conditions", "place.conditions", words=True),
+    Column("method", "method", "place.method", words=True),
+    Column("level", "level", "place.level_words", words=True),
+)
+
+
+def comparison_tables(comparison: Comparison) -> dict[str, Table]:
+    """By the name of their file: verdicts that agree, by scenario and of all; how far numbers of the same trials are
+    apart; rates of both, cell by cell; trials whose verdicts differ, with sentences and commands; and what is not the
+    same in both."""
+    agreement = (
+        Column("scenario", "scenario", words=True),
+        Column("trials", "trials"),
+        Column("same verdict", "same verdict", fill("{same_verdict} ({same_verdict_rate:percent2})")),
+        Column("95 %", "95 %", fill(_between("same_verdict"))),
+        Column("seeds", "seeds"),
+        Column("same in all", "same in all", fill("{same_verdicts_in_all} ({same_verdicts_in_all_rate:percent2})")),
+        Column("95 % 2", "95 %", fill(_between("same_verdicts_in_all"))),
+        Column("same stage and code", "same stage and code", "same_stage_and_code"),
+        Column("right in the first alone", "right in the first alone", "right_in_first_alone"),
+        Column("right in the second alone", "right in the second alone", "right_in_second_alone"),
+        Column("difference of success [points]", "difference of success [points]", _DIFFERENCE),
+    )
+    numbers = (
+        Column("number", "number", _label, words=True),
+        Column("trials", "trials", "both"),
+        Column("differ", "differ"),
+        Column("largest difference", "largest difference", fill("{most:.3g}")),
+        Column("in one alone", "in one alone", "alone"),
+    )
+    cells = (
+        *_WHERE,
+        Column("first", "first", fill("{first.rate:percent}, n {first.trials}")),
+        Column("second", "second", fill("{second.rate:percent}, n {second.trials}")),
+        Column("shared", "shared"),
+        Column("first alone", "first alone", "right_in_first_alone"),
+        Column("second alone", "second alone", "right_in_second_alone"),
+        Column("difference [points]", "difference [points]", _DIFFERENCE),
+    )
+    changed = (
+        *_WHERE,
+        Column("seed", "seed", words=True),
+        Column("first", "first", fill("{first.verdict} {first.why}"), words=True),
+        Column("in words", "in words", "first.sentence", words=True),
+        Column("second", "second", fill("{second.verdict} {second.why}"), words=True),
+        Column("in words 2", "in words", "second.sentence", words=True),
+        Column("command of the first", "command of the first", "first.command", words=True),
+        Column("command of the second", "command of the second", "second.command", words=True),
+    )
+    first, second = (str(side.folder) for side in (comparison.first, comparison.second))
+    differences = (
+        Column("what", "what", words=True),
+        Column(first, first, _side("first"), words=True),
+        Column(second, second, _side("second"), words=True),
+    )
+    return {
+        "agreement": Table(comparison.agreements, agreement, note=_AGREEMENT),
+        "numbers": Table(comparison.numbers, numbers, note=_NUMBERS),
+        "cells": Table(comparison.cells, cells, note=_CELLS),
+        "changed": Table(comparison.changed[:_MOST_LISTED], changed, "No verdict differs."),
+        "differences": Table(comparison.differences, differences, "Nothing that is said of them differs."),
+    }
+
+
+def in_words(comparison: Comparison) -> str:
+    """The whole in some sentences, counts first."""
+    first, second = comparison.alone
+    shared = f"{_trials(comparison.shared)} in both, {first:,} in the first alone, {second:,} in the second alone."
+    identical = f"{_trials(comparison.identical)} the same to the last digit."
+    return f"{shared} {_agreed(comparison.agreements[-1])} {identical}"
+
+
+def _agreed(total: Line) -> str:
+    """How many verdicts agree, and at how many seeds all of them do; seeds are independent, trials are not."""
+    if not total["trials"]:
+        return "None of them counts: no demonstration was right itself."
+    counted = f", {total['excluded_in_one']:,} counted in one of the two alone" * bool(total["excluded_in_one"])
+    seeds = Interval(total["same_verdicts_in_all_low_95"], total["same_verdicts_in_all_high_95"])
+    sure = f"95 % interval {percents(seeds)} of seeds"
+    if total["seeds"] < FEWEST_SEEDS:
+        sure = f"too few for an interval: from {FEWEST_SEEDS} on there is one"
+    rate = percent(total["same_verdict_rate"], 2)
+    return (
+        f"Verdicts agree in {total['same_verdict']:,} of {total['trials']:,} ({rate}): "
+        f"{total['right_in_first_alone']:,} right in the first alone, {total['right_in_second_alone']:,} in the second "
+        f"alone{counted}. All of them agree at {total['same_verdicts_in_all']:,} of {total['seeds']:,} "
+        f"seed{'s' * (total['seeds'] != 1)} ({sure})."
+    )
+
+
+def write_comparison(comparison: Comparison, folder: Path) -> Path:
+    """Write the page and its tables (CSV and Parquet); returns the page.
+
+    Raises:
+        InputError: The folder cannot be written.
+    """
+    tables = comparison_tables(comparison)
+    folders = [str(side.folder) for side in (comparison.first, comparison.second)]
+    names = [Path(each).resolve().name for each in folders]
+    count = len(comparison.changed)
+    listed = f"; the first {_MOST_LISTED:,} are listed" if count > _MOST_LISTED else ""
+    changed = ("text", f"{count:,} of {comparison.shared:,} trials{listed}.")
+    sections = [
+        Section("verdicts", "Verdicts", [("table", tables["agreement"])]),
+        Section("changed", "Trials whose verdicts differ", [changed, ("table", tables["changed"])]),
+        Section("numbers", "Numbers", [("table", tables["numbers"])]),
+        Section("rates", "Rates", [("table", tables["cells"])]),
+        Section("differences", "What is not the same", [("table", tables["differences"])]),
+    ]
+    html = page(" against ".join(names), in_words(comparison), folders, sections)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        check_folders([folder])
+        for name, table in tables.items():
+            table.write(folder / f"{name}.csv")
+        write_file(folder / "compare.html", html)
+    except OSError as error:
+        raise InputError(f"--out {folder} cannot be written ({error.strerror}); choose another place.") from error
+    return folder / "compare.html"
+
+
+def comparison_form(comparison: Comparison) -> dict[str, Any]:
+    """A comparison as JSON holds it."""
+    return {
+        "schema": "apo-bench/comparison/1",
+        "first": str(comparison.first.folder),
+        "second": str(comparison.second.folder),
+        "verdict": "success",
+        "shared": comparison.shared,
+        "first_alone": comparison.alone[0],
+        "second_alone": comparison.alone[1],
+        "identical": comparison.identical,
+        "agreements": comparison.agreements,
+        "numbers": comparison.numbers,
+        "differences": comparison.differences,
+        "changed": [{name: x for name, x in line.items() if name != "place"} for line in comparison.changed],
+    }
+
+
+def _between(name: str) -> str:
+    """A template of both ends of an interval."""
+    return f"{{{name}_low_95:hundredths}} to {{{name}_high_95:hundredths}} %"
+
+
+def _label(line: Line) -> str:
+    return NUMBERS[line["name"]]
+
+
+def _trials(n: int) -> str:
+    return "1 trial is" if n == 1 else f"{n:,} trials are"
+
+
+def _side(name: str) -> Callable[[Line], str]:
+    """What a side says of something that is not the same in both."""
+    return lambda line: "not said" if line[name] is None else value_words(line[name])

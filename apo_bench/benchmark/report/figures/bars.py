@@ -1,0 +1,46 @@
+"""Bars of shares: how trials ended, and what was predicted and came of it."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from apo_bench.benchmark.report.figures.sheet import Figure, Panel, draw
+from apo_bench.benchmark.report.figures.style import COLORS, SOFT
+
+_BAR = 0.2
+"""Height of a bar with its space [inches]."""
+_AROUND = 1.1
+_LETTER = 0.075
+"""Width of a letter of a name [inches]."""
+_LONGEST = 40
+Shares = Mapping[str, Mapping[str, int]]
+"""Name of a bar -> its parts -> how many."""
+
+
+def bar_figure(title: str, panels: Mapping[str, Shares]) -> Figure:
+    """A panel for each that has bars; parts are in the order of `COLORS`, others are grey and come last."""
+    from matplotlib.patches import Patch
+
+    met = {part for bars in panels.values() for parts in bars.values() for part in parts}
+    ordered = [*(part for part in COLORS if part in met), *sorted(met - set(COLORS))]
+    drawn = [_panel(name, bars, ordered) for name, bars in panels.items()]
+    return draw(title, drawn, {part: Patch(color=COLORS.get(part, SOFT)) for part in ordered})
+
+
+def _panel(title: str, bars: Shares, ordered: Sequence[str]) -> Panel:
+    names = [name if len(name) <= _LONGEST else f"{name[: _LONGEST - 1]}…" for name in bars]
+    totals = [sum(parts.values()) for parts in bars.values()]
+
+    def draw_bars(axis: Any) -> None:
+        left = [0.0] * len(bars)
+        for part in ordered:
+            shares = [parts.get(part, 0) / total for parts, total in zip(bars.values(), totals, strict=True)]
+            axis.barh(range(len(bars)), shares, left=left, height=0.8, color=COLORS.get(part, SOFT))
+            left = [a + b for a, b in zip(left, shares, strict=True)]
+        for i, total in enumerate(totals):
+            axis.text(1.01, i, f"n {total}", va="center", fontsize=8, color=SOFT)
+        axis.set_yticks(range(len(bars)), names)
+        axis.set_xticks((0.0, 0.5, 1.0), ("0 %", "50 %", "100 %"))
+        axis.set(xlim=(0, 1.2), ylim=(len(bars) - 0.5, -0.5), xlabel="share of trials")
+        axis.grid(False)
+
+    return Panel(title, draw_bars, _AROUND + _BAR * len(bars), 0.3 + _LETTER * max(map(len, names)))

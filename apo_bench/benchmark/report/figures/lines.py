@@ -1,0 +1,97 @@
+"""Lines with bands: something of every method over levels, or over whatever else is tried at several values."""
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from apo_bench.benchmark.report.figures.sheet import Figure, Panel, draw
+from apo_bench.benchmark.report.figures.style import Style, styles
+from apo_bench.io import grouped
+
+_APART = 0.08
+_WITHIN = 0.4
+"""Methods stand this far from each other at one value, so that equal ones do not hide each other; and all of them
+within this part of the way to the next value."""
+
+
+class Mark(NamedTuple):
+    """A value with its interval, and where it stands."""
+
+    panel: str
+    line: str
+    at: Any
+    """Its place among the values of the horizontal axis, which stand side by side at equal distances, in order."""
+    label: str
+    """How the axis says it."""
+    value: float
+    low: float
+    high: float
+
+
+class Axes(NamedTuple):
+    """What the axes of a figure say."""
+
+    x: str
+    y: str
+    kind: str = "plain"
+    """`percent` from 0 to 100 %, `points` around a line at 0, `log`, or `plain`."""
+
+
+def line_figure(title: str, marks: Sequence[Mark], axes: Axes) -> Figure:
+    """A panel for each that has marks, and a line in it for each method."""
+    looks = styles(list(dict.fromkeys(mark.line for mark in marks)))
+    panels = grouped((mark.panel, mark) for mark in marks)
+    return draw(title, [_panel(name, own, axes, looks) for name, own in panels.items()], _legend(looks))
+
+
+def _panel(title: str, marks: Sequence[Mark], axes: Axes, looks: dict[str, Style]) -> Panel:
+    places = {at: i for i, at in enumerate(sorted({mark.at for mark in marks}))}
+    labels = {places[mark.at]: mark.label for mark in marks}
+    lines = grouped((mark.line, mark) for mark in marks)
+    step = min(_APART, _WITHIN / len(lines))
+
+    def draw_lines(axis: Any) -> None:
+        for i, (name, own) in enumerate(lines.items()):
+            x = np.array([places[mark.at] for mark in own]) + step * (i - (len(lines) - 1) / 2)
+            _line(axis, x, own, looks[name])
+        axis.set_xticks(list(labels), list(labels.values()))
+        axis.set_xlim(-0.5, len(places) - 0.5)
+        axis.set(xlabel=axes.x, ylabel=axes.y)
+        _scale(axis, axes.kind)
+
+    return Panel(title, draw_lines)
+
+
+def _line(axis: Any, x: Any, marks: Sequence[Mark], style: Style) -> None:
+    """A line with its band; of a single mark a bar."""
+    order = np.argsort(x, kind="stable")
+    value, low, high = np.array([mark[-3:] for mark in marks], dtype=float)[order].T
+    axis.plot(x[order], value, color=style.color, marker=style.marker, linestyle=style.dashes, markersize=6, zorder=3)
+    if len(marks) == 1:
+        axis.vlines(x, low, high, color=style.color, alpha=0.6)
+    else:
+        axis.fill_between(x[order], low, high, color=style.color, alpha=0.13, linewidth=0)
+
+
+def _scale(axis: Any, kind: str) -> None:
+    if kind == "percent":
+        axis.set_ylim(-0.02, 1.02)
+        axis.set_yticks((0.0, 0.25, 0.5, 0.75, 1.0), ("0 %", "25 %", "50 %", "75 %", "100 %"))
+    elif kind == "points":
+        axis.axhline(0.0, linewidth=1.0, color="black")
+        axis.yaxis.set_major_formatter(lambda y, _: f"{100 * y:+.0f}")
+    elif kind == "log":
+        axis.set_yscale("log")
+        # matplotlib's own labels are formulas, which are not parsed here
+        axis.yaxis.set_major_formatter("{x:g}")
+        axis.yaxis.set_minor_formatter("")
+
+
+def _legend(looks: dict[str, Style]) -> dict[str, Any]:
+    from matplotlib.lines import Line2D
+
+    return {
+        name: Line2D([], [], color=style.color, marker=style.marker, linestyle=style.dashes)
+        for name, style in looks.items()
+    }

@@ -1,0 +1,88 @@
+"""A page out of one template: sections of tables, figures and sentences in one file.
+
+It has no address outside it, and a policy that lets a browser load none.
+"""
+
+import base64
+import hashlib
+import re
+from collections.abc import Sequence
+from functools import cache
+from importlib import resources
+from typing import Any, NamedTuple
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+from markupsafe import Markup, escape
+
+from apo_bench.benchmark.analysis import percent, percents
+
+
+class Section(NamedTuple):
+    """A part of a page."""
+
+    name: str
+    """Its anchor."""
+    heading: str
+    blocks: Sequence[tuple[str, Any]]
+    """What stands in it, each with the name of the macro of the template that shows it."""
+
+
+def page(title: str, answer: str, lead: Sequence[str], sections: Sequence[Section], trials: str = "") -> str:
+    """HTML in one piece; whatever is not markup by its type is escaped.
+
+    Args:
+        answer: The sentences at the top, with `code` marked.
+        lead: Paragraphs below.
+        trials: What the script needs to show the trials of a cell.
+    """
+    script = _file("page.js")
+    known = base64.b64encode(hashlib.sha256(script.encode()).digest()).decode()
+    policy = (
+        f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{known}'; "
+        "base-uri 'none'; form-action 'none'"
+    )
+    html = _template().render(
+        title=title,
+        answer=answer,
+        lead=lead,
+        sections=sections,
+        trials=trials,
+        script=Markup(script),
+        style=Markup(_file("page.css")),
+        policy=policy,
+    )
+    return str(html).lstrip()  # macros of the template leave empty lines
+
+
+def prose(text: str) -> Markup:
+    """Sentences in which `code` and *emphasis* are marked as in Markdown; `%` stays with its number."""
+    code = re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text)).replace(" %", "\u00a0%"))
+    return Markup(re.sub(r"\*([^*]+)\*", r"<em>\1</em>", code))
+
+
+def as_data(content: bytes, kind: str) -> str:
+    """Bytes as an address of their own."""
+    return f"data:{kind};base64,{base64.b64encode(content).decode()}"
+
+
+def _svg(text: str) -> str:
+    return as_data(text.encode(), "image/svg+xml")
+
+
+@cache
+def _template() -> Any:
+    environment = Environment(
+        loader=PackageLoader("apo_bench.benchmark.report.page"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters |= {"prose": prose, "zip": zip, "svg": _svg, "percent": percent, "percents": percents}
+    return environment.get_template("report.html.j2")
+
+
+@cache
+def _file(name: str) -> str:
+    """A style sheet or script that lies beside this module."""
+    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")

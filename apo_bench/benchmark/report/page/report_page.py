@@ -1,0 +1,136 @@
+"""The page of a sweep: the answer, who succeeds, where and why not, with every trial under its cell."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from apo_bench.benchmark.analysis import Cell, members, place_of, settings
+from apo_bench.benchmark.report.facts import run_facts
+from apo_bench.benchmark.report.figures.sheet import Figure
+from apo_bench.benchmark.report.page.cells import matrix, pack_trials
+from apo_bench.benchmark.report.page.page import Section, as_data, page
+from apo_bench.benchmark.report.pictures import FailurePicture
+from apo_bench.benchmark.report.tables.table import Table
+from apo_bench.benchmark.report.trials import why
+from apo_bench.records.run.replay_command import replay_command
+from apo_bench.records.run.run_file import limits_of, scenario_files
+from apo_bench.records.run.trials import Trials
+
+_SUCCESS = (
+    "A level of L is a standard deviation of L mm and L degrees per axis, times what the noise model makes of it in a "
+    "direction or for a part; of the range finder it is one of L mm per ray. Success, that the finished assembly is "
+    "right, with Wilson's 95 % interval and the number of trials; below it, where it is not the same, how many were "
+    "also made as demonstrated: each contact when and where it was shown. A cell opens its trials, each with the "
+    "command that runs it again. `oracle` replays the drawn layout, without noise or carelessness; `none` replays what "
+    "was seen; neither is told what touches what. A method that refuses or does not converge counts as failed; success "
+    "among the trials that were carried out stands below where it differs. Demonstrations that were not right "
+    "themselves are left out of every method."
+)
+_RUN = (
+    "Commands on this page are to be run where the sweep was run; they give the same rows with the same versions "
+    "(trials that a limit ended: with the limits that `run.json` says, those of the last start of the sweep). Where "
+    "trials were drawn with a salt, `FILE` in a command stands for its file, without which nobody can draw them again."
+)
+_BANDS = "Bands are 95 % intervals; methods stand a little apart so that equal rates do not hide each other."
+
+
+class Contents(NamedTuple):
+    """What a page is made of."""
+
+    name: str
+    """Of the folder."""
+    answer: str
+    """The sentences at the top, with `code` marked."""
+    trials: Trials
+    cells: Sequence[Cell]
+    figures: Mapping[str, Figure]
+    tables: Mapping[str, Table]
+    run: Mapping[str, Any]
+    """What `run.json` says."""
+    pictures: Sequence[FailurePicture]
+    no_pictures: Sequence[str]
+    """Why pictures are missing, in sentences."""
+    beside: Sequence[str]
+    """Files beside the page, relative to it."""
+
+
+def report_page(c: Contents) -> str:
+    """The page, as HTML."""
+    numbers = {cell.place: i for i, cell in enumerate(c.cells)}
+    shown = [(place_of(picture.row), picture.row["seed"]) for picture in c.pictures]
+    pictured = {f"{numbers[place]}:{seed}": k for k, (place, seed) in enumerate(shown) if place in numbers}
+    by_setting = members(settings(c.cells), c.cells)
+    matrices = [matrix(setting, own, numbers) for setting, own in by_setting.items()]
+    differences = [name for name in c.figures if name.startswith("difference_to_")]
+    over = ("success_over_level", "success_over_tightness", "success_over_looks")
+    sections = [
+        Section("success", "Success", [("note", _SUCCESS), *(("matrix", each) for each in matrices)]),
+        Section("levels", "Success over level", [("text", _BANDS), *_shown(c, over, "half_levels")]),
+        Section("pairs", "Paired differences", _shown(c, differences, "pairs")),
+        Section("stages", "Where trials failed", _shown(c, ("failure_stages",))),
+        Section("pictures", "Some failures", _pictures(c)),
+        Section("gaps", "Gap before and after correction", _shown(c, ("gap_before_and_after",), "gaps")),
+        Section("prediction", "Prediction and physics", _shown(c, ("prediction",), "confusion")),
+        Section("felt", "What robots felt about themselves", _shown(c, (), "felt")),
+        Section("effort", "What it takes", _shown(c, (), "effort")),
+        Section("calibration", "Calibration", _shown(c, (), "calibration")),
+        Section("recognised", "Recognised contacts", _shown(c, ("recognised",), "recognised")),
+        Section("timing", "Timing", _shown(c, ("timing",), "times", "work")),
+        Section("run", "What was run", _run(c)),
+    ]
+    title = c.name if "sweep" in c.name.lower() else f"Sweep {c.name}"
+    packed = pack_trials(c.trials, scenario_files(c.run), limits_of(c.run), pictured)
+    return page(title, c.answer, [_scope(c.trials)], sections, packed)
+
+
+def _shown(c: Contents, figures: Sequence[str], *tables: str) -> list[tuple[str, Any]]:
+    """Figures that there are, then tables, each with what its numbers are."""
+    drawn = [("figure", c.figures[name]) for name in figures if name in c.figures]
+    return [*drawn, *(("table", c.tables[name]) for name in tables)]
+
+
+def _pictures(c: Contents) -> list[tuple[str, Any]]:
+    missing = "; ".join(c.no_pictures) or "None was asked for, or no trial that was carried out failed."
+    if not c.pictures:
+        return [("missing", f"No picture: {missing}")]
+    blocks: list[tuple[str, Any]] = [("picture", _picture(c, k)) for k in range(len(c.pictures))]
+    return [*blocks, *[("missing", f"Not drawn: {missing}")] * bool(c.no_pictures)]
+
+
+def _picture(c: Contents, number: int) -> dict[str, str]:
+    row, jpeg, words = c.pictures[number]
+    place = place_of(row)
+    where = "" if place is None else f"{place.title}, level {place.level:g}, "
+    return {
+        "name": f"picture-{number}",
+        "title": f"{row['method']}: {why(row)}.",
+        "words": f"{where}seed {row['seed']}: {row.get('sentence') or 'it failed'}. ({words})",
+        "command": replay_command(row, scenario_files(c.run), limits_of(c.run)),
+        "source": as_data(jpeg, "image/jpeg"),
+    }
+
+
+def _run(c: Contents) -> list[tuple[str, Any]]:
+    """Command and tables of what was run, and links to what lies beside the page."""
+    hosts = {line["host"] for line in c.tables["work"].items}
+    command = [("command", c.run["command"])] if "command" in c.run else []
+    none = "There is no run.json beside the rows, so versions and command are not known."
+    blocks: list[tuple[str, Any]] = [("text", _RUN), *command, *[("missing", none)] * (not c.run)]
+    facts = run_facts(c.run, c.trials, hosts)
+    return [*blocks, *(("folded", fact) for fact in facts.items()), ("links", c.beside)]
+
+
+def _scope(trials: Trials) -> str:
+    """What was tried, and what was left out."""
+    names = ("scenario", "clearance_mm", "seed", "careless")
+    tried = len(trials.groups(names).keys)
+    excluded = len(trials.where(np.isnan(trials.number("success"))).groups(names).keys)
+    scenarios, methods, seeds = (_many(len(trials.distinct(x)), x) for x in ("scenario", "method", "seed"))
+    fidelity = ", ".join(sorted(trials.distinct("fidelity")))
+    left_out = f"{excluded:,} of {_many(tried, 'demonstration')} not right and left out."
+    return f"{len(trials):,} trials of {scenarios}, {methods} and {seeds}, fidelity {fidelity}. {left_out}"
+
+
+def _many(n: int, what: str) -> str:
+    return f"{n:,} {what}{'' if n == 1 else 's'}"

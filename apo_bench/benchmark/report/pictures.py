@@ -1,0 +1,91 @@
+"""Which failures a report shows as pictures; others can draw them."""
+
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial, reduce
+from operator import or_
+from pathlib import Path
+from typing import Any, NamedTuple, cast
+
+import numpy as np
+
+from apo_bench.benchmark.analysis import Records, rank
+from apo_bench.benchmark.analysis.rates import was_executed
+from apo_bench.records import Row, Salt
+from apo_bench.records.run.replay_command import DATA_PREFIXES, Files, is_own_code, left_out
+from apo_bench.records.run.trials import Mask, Trials, trials_of
+
+
+class FailurePicture(NamedTuple):
+    """Of one trial."""
+
+    row: Row
+    jpeg: bytes
+    words: str
+    """How it was made."""
+
+
+Draw = Callable[..., tuple[list[FailurePicture], list[str]]]
+"""Runs failed trials again and draws them, as `failure_pictures` of `apo_bench.viz` does; the sentences say what could
+not be drawn."""
+
+
+class Pictures(NamedTuple):
+    """How a report gets pictures of failures."""
+
+    most: int = 0
+    draw: Draw | None = None
+    salt: Salt | None = None
+    trust_code: bool = False
+    """Run also trials that name code that does not come with the package."""
+
+
+def draw_failures(trials: Trials, folder: Path, files: Files, how: Pictures) -> tuple[list[FailurePicture], list[str]]:
+    """So many pictures at most, and sentences on those that are missing."""
+    if not how.most or how.draw is None:
+        return [], []
+    chosen = sample(trials, how.most, trust_code=how.trust_code)
+    pictures, missing = how.draw(chosen, folder, files, how.salt, trust_code=how.trust_code)
+    without = "" if how.trust_code else left_out(trials.where(_names_code(trials)).rows())
+    return pictures, [*missing, *([without] if without else [])]
+
+
+def sample(records: Records, most: int, *, trust_code: bool = False) -> list[Row]:
+    """Failures to be drawn: one for each way of failing, the most frequent first, methods and scenarios varied.
+
+    The same trials, in any order, give the same sample. Those that were not carried out have nothing to be seen.
+
+    Args:
+        trust_code: Also trials that name code of somebody's own.
+    """
+    trials = trials_of(records)
+    failed = (trials.number("success") == 0) & (trials.number("sim_seconds") > 0) & was_executed(trials)
+    failed &= ~np.isnan(trials.number("level"))
+    if not trust_code:
+        failed &= ~_names_code(trials)
+    ways = trials.where(failed).parts(("failure_stage", "failure_code"))
+    chosen: list[Row] = []
+    for way in sorted(ways, key=lambda way: (-len(ways[way]), way))[:most]:
+        shown = Counter(x for row in chosen for x in (row["method"], row["scenario"]))
+        chosen.append(min(_first(ways[way]), key=partial(_order, shown)))
+    return chosen
+
+
+def _names_code(trials: Trials) -> Mask:
+    """(n,) whether a trial names code of somebody's own."""
+    named = (trials.holds(column, partial(is_own_code, data=prefixes)) for column, prefixes in DATA_PREFIXES.items())
+    return reduce(or_, named)
+
+
+def _first(trials: Trials) -> Sequence[Row]:
+    """The trials of the first seed of each method and scenario."""
+    firsts = (
+        own.where(own.number("seed") == own.number("seed")[0]) for own in trials.parts(("method", "scenario")).values()
+    )
+    return cast(list[Row], [row for own in firsts for row in own.rows()])
+
+
+def _order(shown: Mapping[str, int], row: Row) -> tuple[Any, ...]:
+    where = (row["scenario"], row["clearance_mm"], row["noise"], row["relations"], row["careless"], row["level"])
+    often = shown[row["method"]] + shown[row["scenario"]]
+    return (often, row["seed"], rank(row["method"]) == 1, rank(row["method"]), row["method"], where)

@@ -1,0 +1,179 @@
+"""The report of a sweep: one page that answers, tables and figures beside it."""
+
+from collections.abc import Collection, Mapping, Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from apo_bench.benchmark.analysis import (
+    Cell,
+    Line,
+    Summary,
+    calibrations,
+    confusions,
+    efforts,
+    felt,
+    gaps,
+    read_timing,
+    recognitions,
+    settings,
+    summary,
+    trial_times,
+    work,
+)
+from apo_bench.benchmark.report.answer import answer
+from apo_bench.benchmark.report.figures.figures import figures
+from apo_bench.benchmark.report.page.report_page import Contents, report_page
+from apo_bench.benchmark.report.pictures import Draw, Pictures, draw_failures
+from apo_bench.benchmark.report.tables.cells import cell_table, half_table, pair_table
+from apo_bench.benchmark.report.tables.methods import (
+    calibration_table,
+    confusion_table,
+    effort_table,
+    felt_table,
+    gap_table,
+    recognition_table,
+    time_table,
+    work_table,
+)
+from apo_bench.errors import InputError, require
+from apo_bench.io import check_folders, check_target, has_parquet, write_columns, write_file
+from apo_bench.records import check_same_salt, read_salt
+from apo_bench.records.run.run_file import read_run, scenario_files
+from apo_bench.records.run.trials import COLUMNS, Trials, read_trials
+
+MOST_PANELS = 16
+"""Of a PNG; drawing more takes minutes."""
+PNG = ("success_over_level", "success_over_tightness", "success_over_looks", "recognised")
+"""Figures that are also kept as PNG."""
+FILES = ("cells", "pairs", "half_levels", "recognised", "gaps", "confusion", "felt", "times")
+"""Tables that are also kept as files; those of `_IF_ANY` if there is any line."""
+_IF_ANY = ("recognised", "felt", "times")
+_OURS = (*FILES, *PNG, "rows", "failure_stages", "gap_before_and_after", "prediction", "timing")
+"""Names of our tables and figures, without endings; `difference_to_..` is ours too."""
+PAGE = "report.html"
+TABLES = "tables"
+FIGURES = "figures"
+
+
+class Report(NamedTuple):
+    """Where the report of a sweep was written."""
+
+    page: Path
+    answer: str
+    """What the sweep says, in some sentences, with methods in backquotes."""
+    tables: Mapping[str, Path]
+    """All, as CSV, by what they are of: `cells` are rates, `pairs`, `confusion`, ...; beside each is the same as
+    Parquet, where the package pyarrow is installed."""
+    figures: tuple[Path, ...]
+    """All, as SVG, and as PNG where people put them into text."""
+    cells: tuple[Cell, ...]
+    confusions: Sequence[Line]
+    pictures: int
+    """Failures that were drawn."""
+    no_pictures: tuple[str, ...]
+    """Why others were not."""
+
+
+def report(
+    folder: str | Path,
+    pictures: int = 0,
+    salt_file: str | Path | None = None,
+    *,
+    trust_code: bool = False,
+    draw: Draw | None = None,
+) -> Report:
+    """Write the page, tables and figures beside the rows of a sweep.
+
+    Args:
+        pictures: So many failures are drawn at most; most are run again for it, which takes as long as it took.
+        salt_file: Of trials that were drawn with a salt; without it none of them is run again.
+        trust_code: Run also trials that name code that does not come with the package. Without it nothing that a file
+            of the folder names is imported.
+        draw: What draws failures; without it there is no picture.
+
+    Raises:
+        InputError: No rows there, another salt, or the folder cannot be written.
+    """
+    folder = Path(folder)
+    trials = read_trials(folder)
+    require(len(trials), f"'{folder}' holds no finished trial yet; run the sweep before its report.")
+    salt = None if salt_file is None else read_salt(salt_file)
+    if salt is not None:
+        check_same_salt(f"'{folder}'", salt.hash, trials.find_salt())
+    numbers = summary(trials)
+    require(
+        numbers.cells, f"'{folder}' holds replays of measured demonstrations alone, which belong to no cell of a sweep."
+    )
+    try:
+        check_target(folder / PAGE)
+        check_folders(folder / name for name in (TABLES, FIGURES))
+        for name in (TABLES, FIGURES):
+            (folder / name).mkdir(exist_ok=True)
+        return _write(folder, trials, numbers, Pictures(pictures, draw, salt, trust_code))
+    except OSError as error:
+        raise InputError(f"'{folder}' cannot be written ({error.strerror}); copy it to a place that can.") from error
+
+
+def _write(folder: Path, trials: Trials, numbers: Summary, how: Pictures) -> Report:
+    run = read_run(folder)
+    timing = read_timing(folder)
+    tables = {
+        "cells": cell_table(numbers.cells),
+        "pairs": pair_table(numbers.pairs),
+        "half_levels": half_table(numbers.half_levels),
+        "gaps": gap_table(gaps(trials)),
+        "confusion": confusion_table(confusions(trials)),
+        "recognised": recognition_table(recognitions(trials)),
+        "calibration": calibration_table(calibrations(trials)),
+        "felt": felt_table(felt(trials)),
+        "effort": effort_table(efforts(trials)),
+        "times": time_table(trial_times(timing)),
+        "work": work_table(work(timing)),
+    }
+    lines = (tables[name].items for name in ("gaps", "confusion", "recognised", "times"))
+    drawn = figures(numbers.cells, numbers.pairs, settings(numbers.cells), *lines)
+    wanted = [name for name in FILES if tables[name].items or name not in _IF_ANY]
+    written = {name: tables[name].write(folder / TABLES / f"{name}.csv") for name in wanted}
+    kept = [path for paths in written.values() for path in paths]
+    if has_parquet():
+        kept.append(_write_rows(trials, folder / TABLES / "rows.parquet"))
+    paths = [figure.write(folder / FIGURES / f"{name}.svg") for name, figure in drawn.items()]
+    small = [name for name in PNG if name in drawn and drawn[name].panels <= MOST_PANELS]
+    paths += [drawn[name].write(folder / FIGURES / f"{name}.png") for name in small]
+    pictures, no_pictures = draw_failures(trials, folder, scenario_files(run), how)
+    sentences = answer(trials, numbers.half_levels)
+    html = report_page(
+        Contents(
+            name=folder.resolve().name,
+            answer=sentences,
+            trials=trials,
+            cells=numbers.cells,
+            figures=drawn,
+            tables=tables,
+            run=run,
+            pictures=pictures,
+            no_pictures=no_pictures,
+            beside=[str(path.relative_to(folder)) for path in (*kept, *paths)],
+        )
+    )
+    _remove_older(folder, {path.resolve() for path in (*kept, *paths)})
+    write_file(folder / PAGE, html)
+    csv = {name: paths[0] for name, paths in written.items()}
+    confused = tables["confusion"].items
+    return Report(
+        folder / PAGE, sentences, csv, tuple(paths), numbers.cells, confused, len(pictures), tuple(no_pictures)
+    )
+
+
+def _remove_older(folder: Path, written: Collection[Path]) -> None:
+    """Remove what an earlier report wrote and this one did not, so that all tables and figures are of the same rows."""
+    for path in (*(folder / TABLES).glob("*"), *(folder / FIGURES).glob("*")):
+        ours = path.stem in _OURS or path.stem.startswith("difference_to_")
+        if ours and path.suffix in (".csv", ".parquet", ".svg", ".png") and path.resolve() not in written:
+            path.unlink()
+
+
+def _write_rows(trials: Trials, path: Path) -> Path:
+    """The trials themselves, what was predicted in columns of its own."""
+    write_columns(list(COLUMNS), [trials.values(name) for name in COLUMNS], path)
+    return path

@@ -1,0 +1,199 @@
+"""An entry: what a method scored, in a file that another person's table can read. Schema `apo-bench/entry/1`.
+
+An entry file may come from a stranger: every text and number has bounds, and what follows from the trials of its cells
+(counts, scores, intervals) must be what they give.
+"""
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Final, Literal
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from apo_bench.benchmark.analysis import Results, pooled_rate
+from apo_bench.errors import InputError, require
+from apo_bench.geometry import Array
+from apo_bench.io import HALF_LETTER, UNSHOWN, WHOLE_LETTERS, half_letter, parse_json, read_text, write_file
+
+SCHEMA: Final = "apo-bench/entry/1"
+_LARGEST_BYTES = 4_000_000
+RIGHT, WRONG, EXCLUDED = "10x"
+"""How a cell spells a trial: success, none, or one that does not count since the demonstration itself was not right."""
+LONGEST_NAME = 200
+_TOLERANCE = 1e-6
+"""Percentage points: a score or an interval may differ by rounding between processors."""
+
+Name = Annotated[str, Meta(min_length=1, max_length=LONGEST_NAME)]
+Text = Annotated[str, Meta(max_length=4000)]
+Hash = Annotated[str, Meta(pattern=r"^[0-9a-f]{16}\Z")]
+Trials = Annotated[str, Meta(pattern=rf"^[{RIGHT}{WRONG}{EXCLUDED}]+\Z")]
+Count = Annotated[int, Meta(ge=0, le=1_000_000)]
+Percent = Annotated[float, Meta(ge=0.0, le=100.0)]
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+
+
+class TrackScore(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a method scored in one track.
+
+    Raises:
+        InputError: Its numbers are not those of its trials.
+    """
+
+    track: Hash
+    """Hash of the track's file."""
+    overall: bool
+    """Whether it counts in the score over all."""
+    score: Percent
+    """Mean over cells of the success rate; a plan that is not carried out is no success."""
+    low: Percent
+    high: Percent
+    """Of the 95 % interval over seeds."""
+    trials: Count
+    """Those that count."""
+    executed: Count
+    """Those whose plan was carried out."""
+    promised: Share | None
+    """Mean of what plans promised; None where none did."""
+    brier: Share | None
+    """Mean squared difference of promise and success, of plans that were carried out."""
+    rows: Hash
+    """Over the rows, in any order."""
+    code: Hash
+    """The same over the source files and package versions they were made with."""
+    salt: Hash | None
+    """Hash of the secret that the trials were drawn with; None for trials that everybody can draw."""
+    cells: Mapping[Text, Trials]
+    """Settings of a cell -> its trials, one character each, the first seed first."""
+
+    def __post_init__(self) -> None:
+        trials = "".join(self.cells.values())
+        counted = len(trials) - trials.count(EXCLUDED)
+        require(
+            self.trials == counted and trials.count(RIGHT) <= self.executed <= counted,
+            f"{self.trials} trials, {self.executed} of them executed, are stated, and its cells have {counted} with "
+            f"{trials.count(RIGHT)} successes",
+        )
+        stated = (self.score, self.low, self.high)
+        given = score_of(self.cells)
+        require(
+            all(abs(a - b) < _TOLERANCE for a, b in zip(stated, given, strict=True)),
+            "the score {:.6g} ({:.6g} to {:.6g}) is stated, and its cells give {:.6g} ({:.6g} to {:.6g})".format(
+                *stated, *given
+            ),
+        )
+        require(
+            self.brier is None or (self.promised is not None and self.executed > 0),
+            "a Brier score is stated, and no plan that promised anything was carried out",
+        )
+
+    @property
+    def when_executed(self) -> float | None:
+        """Success rate of the plans that were carried out, in percent; None without one."""
+        right = sum(trials.count(RIGHT) for trials in self.cells.values())
+        return 100.0 * right / self.executed if self.executed else None
+
+
+class Entry(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a method scored.
+
+    Raises:
+        InputError: A text in it cannot be shown.
+    """
+
+    schema: Literal["apo-bench/entry/1"]
+    name: Name
+    """What the table calls it."""
+    method: Text
+    """As rows spell it."""
+    command: Text
+    """The command line that made it."""
+    quick: bool
+    """Whether it ran the few trials of `--quick`, which are no score."""
+    versions: Annotated[Mapping[Name, Name], Meta(max_length=50)]
+    """Of the packages that matter, and of Python."""
+    machine: Name
+    tracks: Annotated[Mapping[Name, TrackScore], Meta(min_length=1, max_length=50)]
+
+    def __post_init__(self) -> None:
+        shown = (self.name, self.method, self.command, self.machine, *self.tracks)
+        for text in (*shown, *self.versions, *self.versions.values()):
+            require(not UNSHOWN.search(text), f"the text {text[:40]!r} has control characters or half letters")
+
+    @property
+    def overall(self) -> tuple[float, float, float] | None:
+        """Mean over the tracks that count, in percent, and its 95 % interval, tracks taken for independent; None where
+        there is none."""
+        those = [track for track in self.tracks.values() if track.overall]
+        if not those:
+            return None
+        scores: Array = np.array([[track.score, track.low, track.high] for track in those])
+        mean = scores[:, 0].mean()
+        below, above = (np.linalg.norm(scores[:, 0] - scores[:, i]) / len(those) for i in (1, 2))
+        return float(mean), float(max(0.0, mean - below)), float(min(100.0, mean + above))
+
+
+def check_name(called: str, name: str) -> None:
+    """Raise an `InputError` unless an entry can hold a name.
+
+    Args:
+        called: What it names, for the message: `entry`.
+    """
+    require(
+        0 < len(name) <= LONGEST_NAME and not UNSHOWN.search(name),
+        f"the name of the {called} must have 1 to {LONGEST_NAME} characters and no control characters, "
+        f"{name[:40]!r} ({len(name)} characters) was given; choose another name.",
+    )
+
+
+def write_entry(entry: Entry, path: str | Path) -> None:
+    """Write an entry as JSON.
+
+    Raises:
+        InputError: The file cannot be written.
+    """
+    write_file(path, json.dumps(msgspec.to_builtins(entry), indent=1, allow_nan=False) + "\n")
+
+
+def read_entry(path: str | Path) -> Entry:
+    """An entry out of a file.
+
+    Raises:
+        InputError: It cannot be read, or is something else.
+    """
+    document = parse_json(read_text(path, "entry", _LARGEST_BYTES), str(path))
+    field = half_letter(document.value, HALF_LETTER)
+    require(field is None, f"{path}, {field}: {WHOLE_LETTERS}; score the method again.")
+    try:
+        return msgspec.convert(document.value, Entry)
+    except msgspec.ValidationError as error:
+        raise InputError(
+            f"{path}: this is not an entry that `apo-bench score` writes ({error}); score the method again."
+        ) from error
+
+
+def score_of(cells: Mapping[str, str]) -> tuple[float, float, float]:
+    """Mean over cells of the success rate, in percent, and its 95 % interval over seeds.
+
+    Cells in which no trial counts are left out; 0 (0 to 100) without any. Trials with the same place in their cells
+    have the same seed, as all grids of a track begin with the same one.
+    """
+    rates = [trials.count(RIGHT) / n for trials in cells.values() if (n := len(trials) - trials.count(EXCLUDED))]
+    if not rates:
+        return 0.0, 0.0, 100.0
+    score = 100.0 * sum(rates) / len(rates)
+    seeds = np.array([k for trials in cells.values() for k, letter in enumerate(trials) if letter != EXCLUDED])
+    success = np.array([letter == RIGHT for trials in cells.values() for letter in trials if letter != EXCLUDED])
+    results = Results(np.arange(len(seeds)), seeds, success.astype(float))
+    low, high = pooled_rate(results).interval
+    return score, min(100.0 * low, score), max(100.0 * high, score)
+
+
+def form_of(entry: Entry) -> dict[str, Any]:
+    """An entry without its single trials, for `--json`."""
+    form: dict[str, Any] = msgspec.to_builtins(entry)
+    for track in form["tracks"].values():
+        del track["cells"]
+    return form

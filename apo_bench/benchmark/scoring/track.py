@@ -1,0 +1,129 @@
+"""Tracks: scenarios, seeds and settings that are fixed, each in a file, so that all scores are of the same trials.
+
+A track is a sweep file without methods, and a table of its own:
+
+    [track]
+    schema = "apo-bench/track/1"
+    title = "Poses of a camera that errs by a millimetre or so"
+    overall = true        # whether it counts in the score over all tracks
+    quick_trials = 1      # seeds of each cell with --quick
+    arms = ["six_axis"]   # one sweep for each; without it, the usual arm
+"""
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import final
+
+from apo_bench.arguments import check_arguments
+from apo_bench.benchmark.sweeps.grid import SweepSettings
+from apo_bench.benchmark.sweeps.sweep_file import read_sweep
+from apo_bench.errors import require, unknown
+from apo_bench.io import read_bytes, read_toml
+from apo_bench.records import TrialSettings
+from apo_bench.resources import folder
+
+SCHEMA = "apo-bench/track/1"
+TABLE = "track"
+_HEX = 16
+
+
+@final
+@dataclass(frozen=True)
+class Track:
+    """Trials of one kind."""
+
+    name: str
+    title: str
+    overall: bool
+    """Whether it counts in the score over all tracks; the others are there for regression tests."""
+    quick_trials: int
+    arms: tuple[str, ...]
+    hash: str
+    """16 hexadecimal digits over the bytes of the file."""
+    grids: tuple[SweepSettings, ...]
+    """Their methods mean nothing."""
+
+    def of(self, method: str, arm: str, quick: bool = False) -> tuple[SweepSettings, ...]:
+        """The trials of a method on one of the arms."""
+        return tuple(
+            replace(
+                grid, methods=(method,), arm=arm, trials=min(grid.trials, self.quick_trials) if quick else grid.trials
+            )
+            for grid in self.grids
+        )
+
+
+def seen_by(track: Track, estimator: str) -> Track:
+    """A track whose poses err as an estimator's do; it is another one, and counts in no score over all.
+
+    Args:
+        estimator: A noise file, as `noise fit` writes it of estimates and ground truth.
+
+    Raises:
+        InputError: No such file.
+    """
+    content = read_bytes(estimator, "noise file (.toml)")
+    return replace(
+        track,
+        name=f"{track.name}-{Path(estimator).stem}",
+        overall=False,
+        hash=hashlib.sha256(track.hash.encode() + content).hexdigest()[:_HEX],
+        grids=tuple(replace(grid, noises=(estimator,), eyes=(TrialSettings.eye,)) for grid in track.grids),
+    )
+
+
+def track_names() -> tuple[str, ...]:
+    """The tracks that come with the package, in the order of the alphabet."""
+    return tuple(sorted(path.stem for path in (folder("scenarios") / "tracks").glob("*.toml")))
+
+
+@check_arguments
+def read_track(given: str | Path) -> Track:
+    """A track by name, or out of a file.
+
+    Raises:
+        InputError: No such track, or anything in its file that is not as described.
+    """
+    text = str(given)
+    if not text.endswith(".toml"):
+        require(text in track_names(), unknown("track", text, track_names()) + " Or give a track file (.toml).")
+        given = folder("scenarios") / "tracks" / f"{text}.toml"
+    path = Path(given)
+    top = read_toml(path, "track file")
+    top.require(isinstance(top.value, dict) and TABLE in top.value, f"a table [{TABLE}] is needed")
+    top.require("methods" not in top.value, "no methods are needed, they are those who enter")
+    said = top.child(top.value[TABLE], TABLE).fields_of(SCHEMA, ("title",), ("overall", "quick_trials", "arms"))
+    quick = said["quick_trials"].integer() if "quick_trials" in said else 1
+    require(quick >= 1, f"{path}, {TABLE}, quick_trials: a whole number from 1 is needed, {quick} was given.")
+    arms = [arm.text() for arm in said["arms"].items("arm")] if "arms" in said else [TrialSettings.arm]
+    require(arms, f"{path}, {TABLE}, arms: at least one is needed; leave the key out for the usual one.")
+    grids = read_sweep(path, besides=(TABLE,))
+    require(
+        len({grid.seed for grid in grids}) == 1,
+        f"{path}: all grids of a track begin with the same seed; remove the key 'seed' below [[also]].",
+    )
+    return Track(
+        name=path.stem,
+        title=said["title"].text(),
+        overall=said["overall"].flag() if "overall" in said else True,
+        quick_trials=quick,
+        arms=tuple(arms),
+        hash=hashlib.sha256(read_bytes(path, "track file")).hexdigest()[:_HEX],
+        grids=grids,
+    )
+
+
+@check_arguments
+def read_tracks(names: Sequence[str]) -> tuple[Track, ...]:
+    """Tracks by name or file; all that come with the package if none is named.
+
+    Raises:
+        InputError: As `read_track`, or two have one name.
+    """
+    tracks = tuple(read_track(name) for name in names or track_names())
+    called = [track.name for track in tracks]
+    for name in called:
+        require(called.count(name) == 1, f"the track {name} was given twice; name every track once.")
+    return tracks

@@ -1,0 +1,162 @@
+"""A Ray cluster whose nodes share the batches of a sweep; each node runs them as this machine would.
+
+Only the process that started the sweep writes rows. A node that is lost has its batches run again elsewhere.
+"""
+
+import importlib.util
+import os
+import re
+import shutil
+import signal
+import socket
+import tempfile
+from collections import deque
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack, suppress
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from pebble import ProcessPool
+
+from apo_bench.benchmark.sweeps.grid import Batch
+from apo_bench.benchmark.sweeps.pool import THREADS, Emit, process_pool, run_in_pool
+from apo_bench.benchmark.sweeps.worker import Ended, SweepInputs
+from apo_bench.errors import InputError, require
+from apo_bench.io import environment
+
+_TOUCH_S = 5.0
+"""What the port of a cluster gets to open."""
+_AHEAD = 2
+"""So many tasks for each CPU are handed out: one runs, the others wait."""
+_OBJECT_STORE = 100 * 2**20
+"""Bytes, of a cluster that is started here; rows are small."""
+_SETTINGS = {
+    "RAY_USAGE_STATS_ENABLED": "0",
+    "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0",
+    "RAY_OVERRIDE_JOB_RUNTIME_ENV": "1",
+}
+"""Ray tells nobody that it runs, hides no GPU from the renderer, and takes our files instead of those of a job."""
+
+_POOLS = ExitStack()
+"""Of the worker processes of Ray: their own processes, which end with them."""
+
+
+def check_ray(address: str | None) -> None:
+    """Raise an `InputError` unless Ray is installed, and something listens at the address.
+
+    Args:
+        address: `HOST:PORT` of the head of a cluster, `auto` for the one that runs on this machine, `local` for one of
+            one's own; None for `auto` if there is one, else `local`.
+    """
+    require(
+        importlib.util.find_spec("ray") is not None,
+        "the backend 'ray' needs a package that is not installed; pip install 'apo_bench[ray]'.",
+    )
+    named = (os.environ.get("RAY_ADDRESS") or "auto") if address in (None, "auto") else str(address)
+    if named in ("auto", "local"):
+        return
+    match = re.fullmatch(r"\[?([^\[\]/]+)\]?:(\d{1,5})", named)
+    if match is None or not 0 < int(match[2]) < 2**16:
+        raise InputError(
+            f"the address '{named}' of a Ray cluster was given; HOST:PORT of its head is allowed, such as "
+            "10.0.0.5:6379, or auto, or local."
+        )
+    try:
+        socket.create_connection((match[1], int(match[2])), timeout=_TOUCH_S).close()
+    except (OSError, UnicodeError) as error:
+        raise InputError(
+            f"no Ray cluster answers at {named} ({error}); start one there with: ray start --head --port={match[2]}"
+        ) from error
+
+
+def run_on_cluster(
+    batches: Sequence[Batch],
+    inputs: SweepInputs,
+    workers: int | None,
+    limit_s: float,
+    emit: Emit,
+    address: str | None,
+    files: Mapping[str, Path],
+) -> None:
+    """Run all batches on a Ray cluster.
+
+    Args:
+        workers: At most so many at a time; None for as many as the cluster takes.
+        address: As in `check_ray`.
+        files: What every node needs in its current folder: path from there -> file.
+
+    Raises:
+        InputError: No such cluster, or one whose nodes cannot work as this machine does.
+        RuntimeError: The cluster was lost, or a trial could not be run.
+    """
+    import ray
+    from ray.exceptions import RayError, RayTaskError
+
+    _join(address, workers, files)
+    task = ray.remote(num_cpus=1)(run_on_node)
+    at_once = workers or _AHEAD * int(ray.cluster_resources().get("CPU", 1))
+    waiting = deque(batches)
+    running: list[Any] = []
+    try:
+        while waiting or running:
+            while waiting and len(running) < at_once:
+                running.append(task.remote(waiting.popleft(), inputs, limit_s))
+            done, running = ray.wait(running)
+            for ended in ray.get(done[0]):
+                emit(*ended)
+    except RayTaskError as error:
+        kind = InputError if isinstance(error.cause, InputError) else RuntimeError
+        raise kind(str(error.cause)) from error
+    except RayError as error:
+        raise RuntimeError(
+            f"the Ray cluster was lost ({' '.join(str(error).split())[:200]}); finished rows are kept, and the same "
+            "command goes on."
+        ) from error
+    finally:
+        ray.shutdown()
+
+
+def run_on_node(batch: Batch, inputs: SweepInputs, limit_s: float) -> list[Ended]:
+    """The task of the cluster: run a batch in a process of the node, which may die of it."""
+    import ray
+
+    node = {"node": ray.get_runtime_context().get_node_id()}
+    ended: list[Ended] = []
+    run_in_pool(_pool_of_node(), [batch], inputs, 1, limit_s, lambda row, wall: ended.append((row, wall | node)))
+    return ended
+
+
+@lru_cache(maxsize=1)
+def _pool_of_node() -> ProcessPool:
+    """The process that serves one CPU of a node; Ray gives the tasks of a sweep to the same few."""
+    return _POOLS.enter_context(process_pool(1))
+
+
+def _join(address: str | None, workers: int | None, files: Mapping[str, Path]) -> None:
+    """Join the cluster that was named, or that runs here, or one that is started for the time of the sweep.
+
+    Raises:
+        InputError: It cannot be joined.
+    """
+    import ray
+    from ray.exceptions import RayError
+
+    handler = signal.getsignal(signal.SIGTERM)
+    alone = {"num_cpus": max(workers or 1, os.cpu_count() or 1), "object_store_memory": _OBJECT_STORE}
+    with tempfile.TemporaryDirectory() as folder, environment(_SETTINGS):
+        for name, path in files.items():
+            (Path(folder) / name).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, Path(folder) / name)
+        (Path(folder) / "made-for-a-sweep").touch()  # without a file in it, Ray takes the current folder
+        rendering = {name: os.environ[name] for name in ("MUJOCO_GL",) if name in os.environ}
+        runtime = {"env_vars": dict.fromkeys(THREADS, "1") | rendering, "working_dir": folder}
+        quiet: dict[str, Any] = {"runtime_env": runtime, "log_to_driver": False, "logging_level": "error"}
+        try:
+            ray.init(address=address or "auto", **quiet, **(alone if address == "local" else {}))
+        except (ConnectionError, ValueError, RuntimeError, RayError) as error:
+            if address is not None or not isinstance(error, ConnectionError):
+                raise InputError(f"the Ray cluster cannot be joined: {' '.join(str(error).split())}") from error
+            ray.init(address="local", include_dashboard=False, **quiet, **alone)
+    with suppress(ValueError):
+        signal.signal(signal.SIGTERM, handler)  # Ray takes it, in the main thread

@@ -1,0 +1,204 @@
+"""Many trials: spread over processes or machines, rows written as their batches end, resumed where it was left."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from apo_bench.arguments import check_arguments
+from apo_bench.benchmark.sweeps.grid import Batch, SweepSettings, check_grids, described, load_all, units
+from apo_bench.benchmark.sweeps.pool import check_limit, run_locally
+from apo_bench.benchmark.sweeps.progress import progress
+from apo_bench.benchmark.sweeps.stopping import stoppable
+from apo_bench.benchmark.sweeps.worker import SweepInputs, Timing, Worker
+from apo_bench.correction.correctors import checked_corrector
+from apo_bench.errors import require, require_known
+from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.relations import make_relations
+from apo_bench.records import (
+    CORRECTOR,
+    RECOGNISED,
+    UNCORRECTED,
+    Limits,
+    Row,
+    TrialSettings,
+    level_pair,
+    parsed,
+    salt_of_sweep,
+    trial_key,
+    with_simulated,
+)
+from apo_bench.records.run.run_file import run_record
+from apo_bench.records.run.run_folder import RunFolder
+from apo_bench.scenario import Scenario, is_named
+from apo_bench.simulation.arms.finding import find_arm
+from apo_bench.simulation.physics import physics
+from apo_bench.trial.fingerprint import code_files, content_hash, spec_hash, versions
+from apo_bench.trial.inputs import content_pieces, noise_content, own_content
+
+_LARGEST_WORKERS = 256
+_BACKENDS = ("local", "ray")
+BATCH = 8
+"""Trials that a worker does at a time, at most: some seconds."""
+
+
+@check_arguments
+def run_sweep(
+    grids: SweepSettings | Sequence[SweepSettings],
+    out: str | Path,
+    *,
+    workers: int | None = None,
+    limit_s: float = 600.0,
+    backend: str = "local",
+    address: str | None = None,
+    command: str = "",
+    salt_file: str | Path | None = None,
+) -> list[Row]:
+    """Run every trial of a sweep that has no row yet.
+
+    The rows depend on neither the number of workers, nor where they run, nor the order in which trials end.
+
+    Args:
+        grids: One, or several whose trials are united.
+        out: The folder of the rows; made if it is not there, continued if it holds rows of the same sweep.
+        workers: Processes; they are spawned, so a script that calls this needs the usual
+            `if __name__ == "__main__":`. None stands for this process with `local`: then no trial has a limit. With
+            `ray`, None stands for all that the cluster has.
+        limit_s: Wall time that a trial may take in a worker; what takes longer is a failed row.
+        backend: `local`, or `ray` for a cluster.
+        address: Of a cluster that runs already.
+        command: What to note in `run.json` as the command line.
+        salt_file: Holds the salt of the trials, and is made if it is not there; None for trials that everybody can
+            draw.
+
+    Returns:
+        All rows of the folder, in the order in which they were written.
+
+    Raises:
+        InputError: A setting that is not allowed, or a folder with trials of another sweep.
+        RuntimeError: A trial could not be run, or a row could not be written.
+        KeyboardInterrupt: After Ctrl-C or a signal; the rows of the batches that had ended are written.
+    """
+    grids = (grids,) if isinstance(grids, SweepSettings) else tuple(grids)
+    _check_executor(workers, limit_s, backend, address)
+    check_grids(grids)
+    # everything that has a name is found before a folder is made or a process started
+    loaded = load_all(grids)
+    _check_names(grids)
+    physics(grids[0].timestep_s)
+    arm_name = grids[0].arm
+    arm = find_arm(arm_name)
+    content = {source: content_hash(scenario, source, arm.files) for source, scenario in loaded.items()}
+    inputs = SweepInputs(content, versions())
+    salt = None if salt_file is None else salt_of_sweep(salt_file, out)
+    here = workers is None and backend == "local"
+    run = run_record(
+        described(grids, loaded),
+        _content(grids, loaded, arm.files),
+        code_files(),
+        inputs.versions,
+        {loaded[source].name: source for source in loaded if not is_named(source)},
+        command,
+        salt,
+        Limits(None if here else limit_s),
+    )
+    with stoppable(), RunFolder(Path(out), run) as store:
+        batches = list(_left(units(grids, loaded, salt), loaded, inputs, store))
+        with progress(sum(map(len, batches))) as count:
+
+            def emit(row: Row, timing: Timing) -> None:
+                store.append(row, timing)
+                count()
+
+            if here:
+                worker = Worker(inputs, {"worker": 0})
+                for batch in batches:
+                    for ended in worker.run(batch):
+                        emit(*ended)
+            elif backend == "local":
+                run_locally(batches, inputs, workers or 1, limit_s, emit)
+            else:
+                from apo_bench.benchmark.sweeps.cluster import run_on_cluster
+                from apo_bench.benchmark.sweeps.travelling import travelling_files
+
+                names = (*_names(grids, "methods"), *_names(grids, "noises"), *_names(grids, "relations"), arm_name)
+                files = travelling_files(loaded, arm.files, names)
+                run_on_cluster(batches, inputs, workers, limit_s, emit, address, files)
+        return store.rows()
+
+
+def _left(
+    work: Iterable[Batch], loaded: Mapping[str, Scenario], inputs: SweepInputs, store: RunFolder
+) -> Iterator[Batch]:
+    """Batches of the trials that have no row yet; the rows that there are must be what those trials would give."""
+    hashes: dict[TrialSettings, str] = {}
+    for unit in work:
+        left = []
+        for trial in unit:
+            found = store.finished.get(trial_key(trial, loaded[trial.scenario].name))
+            cell = replace(trial, method=CORRECTOR, seed=0)
+            if found is None:
+                left.append(trial)
+            elif cell not in hashes:
+                hashes[cell] = spec_hash(trial, inputs.content[trial.scenario])
+            require(
+                found is None or found == hashes[cell],
+                f"'{store.folder}' holds a row of {loaded[trial.scenario].name}, method {trial.method}, seed "
+                f"{trial.seed}, that was made with other code or settings; choose another folder.",
+            )
+        for first in range(0, len(left), BATCH):
+            yield tuple(left[first : first + BATCH])
+
+
+def _check_executor(workers: int | None, limit_s: float, backend: str, address: str | None) -> None:
+    require(
+        workers is None or 1 <= workers <= _LARGEST_WORKERS,
+        f"{workers} workers were given; a whole number from 1 to {_LARGEST_WORKERS} is allowed.",
+    )
+    check_limit(limit_s)
+    require_known("backend", backend, _BACKENDS)
+    require(
+        address is None or backend == "ray",
+        f"the address '{address}' was given, but the backend {backend} has none; say --backend ray.",
+    )
+    if backend == "ray":
+        from apo_bench.benchmark.sweeps.cluster import check_ray
+
+        check_ray(address)
+
+
+def _check_names(grids: Sequence[SweepSettings]) -> None:
+    """Raise an `InputError` unless noise models, relations and correctors can be had here."""
+    for grid in grids:
+        highest = max(max(level_pair(level)) for level in grid.levels)
+        for noise in grid.noises:
+            make_noise(noise, Level(highest, highest))
+        for relations in grid.relations:
+            if relations not in RECOGNISED:
+                make_relations(relations)
+        for method in grid.methods:
+            plan = parsed(method).plan
+            if plan not in UNCORRECTED:
+                checked_corrector(with_simulated(plan))
+
+
+def _names(grids: Sequence[SweepSettings], axis: str) -> tuple[str, ...]:
+    """What all grids name on an axis, each once."""
+    return tuple(dict.fromkeys(name for grid in grids for name in getattr(grid, axis)))
+
+
+def _content(
+    grids: Sequence[SweepSettings], loaded: Mapping[str, Scenario], arm_files: tuple[Path, ...]
+) -> dict[str, str]:
+    """What the trials are made of besides the package, piece by piece, so that a change can be named."""
+    pieces = {
+        f"{scenario.name}, {piece}": hashed
+        for source, scenario in loaded.items()
+        for piece, hashed in content_pieces(scenario, source, arm_files).items()
+    }
+    return {
+        **pieces,
+        **noise_content(*_names(grids, "noises")),
+        **own_content("relations", *_names(grids, "relations")),
+        **own_content("method", *_names(grids, "methods")),
+        **own_content("arm", grids[0].arm),
+    }

@@ -1,0 +1,36 @@
+"""The user's own files that every node of a cluster needs."""
+
+import os
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+from apo_bench.perception.observation.noise_file import noise_path
+from apo_bench.scenario import Scenario, is_named
+from apo_bench.scenario.parts import part_files_of
+from apo_bench.trial.inputs import own_files
+
+
+def travelling_files(
+    loaded: Mapping[str, Scenario], arm_files: Iterable[Path], names: Iterable[str]
+) -> dict[str, Path]:
+    """Files below the current folder: path from there -> file. What lies elsewhere does not travel.
+
+    Scenario files and the files of their parts, the arm, noise files, and the modules of what is given as
+    `module:name` with what they import from the same place.
+
+    Args:
+        loaded: Every scenario by what was given for it.
+        names: Methods, noise models, relations and the arm.
+    """
+    files = [*arm_files]
+    for source, scenario in loaded.items():
+        if not is_named(source):
+            files.append(Path(source))
+            for part in scenario.part_files.values():
+                files.extend(part_files_of(part))
+    for name in names:
+        noise = noise_path(name)
+        files.extend(own_files(name) if noise is None else (noise,))
+    here = Path.cwd()
+    whole = [Path(os.path.normpath(here / path)) for path in files]
+    return {path.relative_to(here).as_posix(): path for path in whole if path.is_relative_to(here)}

@@ -1,0 +1,99 @@
+"""What a worker does, in whatever process on whatever machine: batches of trials become rows."""
+
+import platform
+import time
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any, final
+
+from apo_bench.benchmark.sweeps.grid import Batch
+from apo_bench.errors import require
+from apo_bench.records import KEY, Row, TrialSettings, row_key
+from apo_bench.simulation.execution import ReplayCache
+from apo_bench.simulation.scene import Scene
+from apo_bench.trial.fingerprint import content_hash, versions
+from apo_bench.trial.stages import demonstration_of, scene_key, scene_of
+from apo_bench.trial.trial import trial_row
+
+Timing = dict[str, Any]
+"""One line of `timing.jsonl`: what no specification determines."""
+Ended = tuple[Row, Timing]
+
+
+@final
+@dataclass(frozen=True)
+class SweepInputs:
+    """What all rows of a sweep are made with, as the process that started it found it."""
+
+    content: Mapping[str, str]
+    """What was given for a scenario -> its `content_hash`."""
+    versions: Mapping[str, str]
+    """Package -> version."""
+
+
+@final
+class Worker:
+    """Runs batches; compiles each scene once."""
+
+    def __init__(self, inputs: SweepInputs, name: Mapping[str, Any]) -> None:
+        """Args:
+            name: Tells workers apart in `timing.jsonl`.
+
+        Raises:
+            InputError: Packages of other versions are installed here.
+        """
+        here = versions()
+        for package, version in inputs.versions.items():
+            require(
+                here.get(package) == version,
+                f"a worker on '{platform.node()}' has {package} {here.get(package)}, the process that started the "
+                f"sweep {version}; install the same everywhere.",
+            )
+        self._inputs = inputs
+        self._name = name
+        self._scenes: dict[tuple[Any, ...], Scene] = {}
+
+    def run(self, batch: Batch) -> Iterator[Ended]:
+        """Run the trials of a batch in their order; the demonstration and the beginnings of replays are shared.
+
+        Raises:
+            InputError: The request cannot be honoured, or there is other code here than where the sweep was started.
+        """
+        cache = ReplayCache()
+        simulated = None
+        for spec in batch:
+            start = time.perf_counter()
+            scene = self._scene(spec)
+            compiled = time.perf_counter()
+            simulated = simulated or demonstration_of(spec, scene)
+            shown = time.perf_counter()
+            row = trial_row(spec, scene, simulated, self._inputs.content[spec.scenario], cache=cache)
+            ended = time.perf_counter()
+            yield row, timing(row, compiled - start, shown - compiled, ended - shown, self._name)
+
+    def _scene(self, spec: TrialSettings) -> Scene:
+        key = scene_key(spec)
+        if key not in self._scenes:
+            scene = scene_of(spec)
+            require(
+                content_hash(scene.scenario, spec.scenario, scene.arm.files) == self._inputs.content[spec.scenario],
+                f"a worker on '{platform.node()}' has other code or other files for '{spec.scenario}' than the process "
+                "that started the sweep; install the same everywhere, or start the same command again if a file was "
+                "changed.",
+            )
+            self._scenes[key] = scene
+        return self._scenes[key]
+
+
+def timing(
+    row: Row, compile_s: float | None, demonstrate_s: float | None, trial_s: float | None, worker: Mapping[str, Any]
+) -> Timing:
+    """Wall times of a trial; compiling and demonstrating are paid by the first trial that needs them."""
+    return {
+        **dict(zip(KEY, row_key(row), strict=True)),
+        "compile_s": compile_s,
+        "demonstrate_s": demonstrate_s,
+        "trial_s": trial_s,
+        "host": platform.node(),
+        **worker,
+    }

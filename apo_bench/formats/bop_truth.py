@@ -1,0 +1,141 @@
+"""Where parts truly were in images: a results file that holds the truth, or the `scene_gt.json` of the BOP format."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Annotated, Any
+
+import msgspec
+import numpy as np
+from msgspec import Meta
+
+from apo_bench.errors import InputError, require
+from apo_bench.formats.bop import LARGEST_ID, LARGEST_MM, PoseRows, check_rows, read_results
+from apo_bench.io import convert_typed, read_typed
+
+LARGEST_TRUTH_BYTES = 64_000_000
+"""A scene of a video in the BOP format has up to some 20 MB."""
+_Number = Annotated[float, Meta(ge=-LARGEST_MM, le=LARGEST_MM)]
+_Three = tuple[_Number, _Number, _Number]
+_Nine = tuple[_Number, _Number, _Number, _Number, _Number, _Number, _Number, _Number, _Number]
+
+
+class TruthEntry(msgspec.Struct, frozen=True):
+    """Where an object is in an image; other keys than these are not read."""
+
+    obj_id: Annotated[int, Meta(ge=0, le=LARGEST_ID)]
+    cam_R_m2c: _Nine
+    cam_t_m2c: _Three
+
+
+def read_truth(path: str | Path, estimates: PoseRows, scene: int | None = None) -> PoseRows:
+    """The truth that estimates are compared with.
+
+    A `.json` file holds one scene, and does not say which: it is `scene`, else the number of its folder, else the only
+    scene that was estimated. It holds all images of that scene, so those with no estimate at all are left out, as they
+    were probably not asked for. A folder holds scenes, as `000001/scene_gt.json`. Every row of a `.csv` file was asked
+    for.
+
+    Args:
+        scene: Only this one.
+
+    Raises:
+        InputError: Anything that is not as described; no image of the truth has an estimate.
+    """
+    path = Path(path)
+    of_scenes = path.is_dir() or path.suffix.lower() == ".json"
+    if path.is_dir():
+        truth = _read_folder(path, scene)
+    elif of_scenes:
+        scene = _which_scene(path, estimates) if scene is None else scene
+        truth = _read_scene(path, scene)
+    else:
+        truth = read_results(path)
+    estimated_rows = _among(truth.where[:, :2], estimates.where[:, :2])
+    if scene is not None:
+        estimated_rows &= truth.where[:, 0] == scene
+    if not estimated_rows.any():
+        s, i = truth.where[0, :2]
+        raise InputError(
+            f"{path}: no image of {'the truth' if scene is None else f'scene {scene}'} has an estimate in "
+            f"{estimates.file}; the first of the truth is image {i} of scene {s}; give the truth of the "
+            "images that were estimated."
+        )
+    kept = estimated_rows if of_scenes else np.ones(len(estimated_rows), dtype=np.bool_)
+    if scene is not None:
+        kept &= truth.where[:, 0] == scene
+    truth = _only(truth, kept)
+    behind = truth.t_mm[:, 2] <= 0.0
+    if behind.any():
+        k = int(np.argmax(behind))
+        raise InputError(f"{truth.spot(k)}, t: the third number is the depth before the camera and must be above 0.")
+    return truth
+
+
+def _only(rows: PoseRows, kept: Any) -> PoseRows:
+    """The rows of a mask."""
+    return PoseRows(rows.file, rows.where[kept], rows.R[kept], rows.t_mm[kept], rows.place[kept], rows.score[kept])
+
+
+def _among(where: Any, known: Any) -> Any:
+    """Whether each pair (n, 2) is one of the known, -> (n,)."""
+    size = LARGEST_ID + 1
+    return np.isin(where[:, 0] * size + where[:, 1], known[:, 0] * size + known[:, 1])
+
+
+def _which_scene(path: Path, estimates: PoseRows) -> int:
+    folder = path.resolve().parent.name
+    if _is_number(folder):
+        return int(folder)
+    scenes = np.unique(estimates.where[:, 0])
+    if len(scenes) > 1:
+        named = ", ".join(str(s) for s in scenes[:6]) + (", ..." if len(scenes) > 6 else "")
+        raise InputError(
+            f"{path}: the file does not say which scene it is of, and the estimates are of {named}; "
+            "name it with --scene-id."
+        )
+    return int(scenes[0])
+
+
+def _read_folder(path: Path, scene: int | None) -> PoseRows:
+    """The truth of all scenes in a folder, or of one of them."""
+    found = [file for file in sorted(path.glob("*/scene_gt.json")) if _is_number(file.parent.name)]
+    files = [file for file in found if scene in (None, int(file.parent.name))]
+    require(
+        files,
+        f"{path}: the folder holds no scene_gt.json in a folder that is numbered "
+        f"{'as its scene' if scene is None else scene}, such as 000001; give a folder of scenes, or one scene_gt.json.",
+    )
+    scenes = [_read_scene(file, int(file.parent.name)) for file in files]
+    return PoseRows(
+        str(path),
+        where=np.concatenate([rows.where for rows in scenes]),
+        R=np.concatenate([rows.R for rows in scenes]),
+        t_mm=np.concatenate([rows.t_mm for rows in scenes]),
+        place=np.array([f"{rows.where[0, 0]:06}, {at}" for rows in scenes for at in rows.place]),
+        score=np.concatenate([rows.score for rows in scenes]),
+    )
+
+
+def _is_number(name: str) -> bool:
+    """Whether a folder is named by the number of its scene."""
+    return name.isascii() and name.isdigit() and len(name) <= 9
+
+
+def _read_scene(path: Path, scene: int) -> PoseRows:
+    images = read_typed(path, dict[str, Any], "truth of one scene", syntax="json", limit=LARGEST_TRUTH_BYTES)
+    rows = list(_entries(path, images))
+    require(rows, f"{path}: no pose stands in the file; give the scene_gt.json of a scene with parts.")
+    where = [(scene, image, entry.obj_id) for image, _, entry in rows]
+    R = np.array([entry.cam_R_m2c for _, _, entry in rows]).reshape(-1, 3, 3)
+    t = np.array([entry.cam_t_m2c for _, _, entry in rows])
+    place = np.array([at for _, at, _ in rows])
+    score = np.full(len(rows), np.nan)
+    return check_rows(PoseRows(str(path), np.array(where, dtype=np.int64), R, t, place, score))
+
+
+def _entries(path: Path, images: dict[str, Any]) -> Iterator[tuple[int, str, TruthEntry]]:
+    """Image, where it stands, and what stands there, of every entry."""
+    for image, entries in images.items():
+        require(_is_number(image), f"{path}: the keys are numbers of images, '{image[:40]}' was given.")
+        for i, entry in enumerate(convert_typed(entries, list[TruthEntry], f"{path}, image {image}"), start=1):
+            yield int(image), f"image {image}, entry {i}", entry

@@ -1,0 +1,142 @@
+"""Observed poses as comma-separated values: one row per operation, columns known by their names.
+
+    operation,part,x_mm,y_mm,z_mm,qw,qx,qy,qz,deviation_mm,deviation_deg,seen
+
+The unit stands in the name: lengths in `_mm` or `_m`, angles in `_deg` or `_rad`. The order of the columns is free,
+that of the quaternion too. The last three may be left out, as columns or in single rows: standard deviations along and
+about each axis of the part (then those that are assumed), and whether the operation was seen (then it was). One more
+column, `play_mm`, is the room that parts which fit have per side (else the scenario's clearance), the same in each row.
+"""
+
+import csv
+import io
+import math
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from apo_bench.assembly import Assembly, Observation
+from apo_bench.errors import require
+from apo_bench.formats.deviations import DEVIATION_DEG, DEVIATION_MM, SHIFT_M, TURN_RAD, is_within
+from apo_bench.geometry import FARTHEST_M, Array, pose
+from apo_bench.io import Columns, CsvRow, check_quaternion, read_csv
+from apo_bench.scenario import Scenario, layout_at
+
+_POSITION = ("x", "y", "z")
+_QUATERNION = ("qw", "qx", "qy", "qz")
+_LENGTHS = {"mm": 1e-3, "m": 1.0}
+_ANGLES = {"deg": math.pi / 180.0, "rad": 1.0}
+_COLUMNS: Columns = {
+    **{name: (name, 1.0) for name in ("operation", "part")},
+    **{f"{name}_{unit}": (name, size) for name in _POSITION for unit, size in _LENGTHS.items()},
+    **{name: (name, 1.0) for name in _QUATERNION},
+    **{f"deviation_{unit}": ("deviation", size) for unit, size in _LENGTHS.items()},
+    **{f"deviation_{unit}": ("turn deviation", size) for unit, size in _ANGLES.items()},
+    "seen": ("seen", 1.0),
+    **{f"play_{unit}": ("play", size) for unit, size in _LENGTHS.items()},
+}
+"""What a column stands for, and its unit in m or rad."""
+_REQUIRED = ("operation", "part", *_POSITION, *_QUATERNION)
+_FLAGS = {"true": True, "yes": True, "1": True, "": True, "false": False, "no": False, "0": False}
+
+
+def read_table(
+    path: str | Path,
+    scenario: Scenario,
+    *,
+    deviation_mm: float = DEVIATION_MM,
+    deviation_deg: float = DEVIATION_DEG,
+) -> tuple[Observation, bool]:
+    """An observation from a CSV file, and whether a standard deviation had to be assumed.
+
+    Parts start where those of the scenario do.
+
+    Raises:
+        InputError: Anything in the file that is not as described, naming line and column.
+    """
+    assembly = scenario.assembly
+    rows = dict[int, CsvRow]()
+    for row in read_csv(path, _COLUMNS, _REQUIRED):
+        k = _operation(row, assembly)
+        row.require(k not in rows, "operation", "every operation once is needed")
+        rows[k] = row
+    for k, operation in enumerate(assembly.operations):
+        require(k in rows, f"{path}: the row of operation {k + 1} ({operation.main}) is missing.")
+    ordered = [rows[k] for k in range(len(assembly))]
+    shift = [_deviation(row, "deviation", deviation_mm * 1e-3, SHIFT_M) for row in ordered]
+    turn = [_deviation(row, "turn deviation", math.radians(deviation_deg), TURN_RAD) for row in ordered]
+    stated = all(row.text("deviation") and row.text("turn deviation") for row in ordered)
+    observation = Observation(
+        assembly=assembly,
+        start=layout_at(scenario, 0.0, 0.0, 0.0, clearance_mm=scenario.clearance_mm).start,
+        goals=np.array([_pose(row) for row in ordered]).reshape(-1, 4, 4),
+        covariance=np.array([np.diag([s] * 3 + [t] * 3) ** 2 for s, t in zip(shift, turn, strict=True)]).reshape(
+            -1, 6, 6
+        ),
+        seen=np.array([_flag(row) for row in ordered], dtype=np.bool_),
+        gap_m=scenario.gap_mm * 1e-3,
+        play_m=_play(ordered, scenario.clearance_mm * 1e-3),
+    )
+    return observation, not stated
+
+
+def table(assembly: Assembly, goals: Array) -> str:
+    """Goals (n, 4, 4) as such a table, in mm, numbers to the last digit."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["operation", "part", *(f"{name}_mm" for name in _POSITION), *_QUATERNION])
+    for k, (operation, T) in enumerate(zip(assembly.operations, goals, strict=True)):
+        packed = pose.pack(T) * [1e3, 1e3, 1e3, 1, 1, 1, 1]
+        writer.writerow([k + 1, operation.main, *map(repr, packed.tolist())])
+    return text.getvalue()
+
+
+def _operation(row: CsvRow, assembly: Assembly) -> int:
+    """Which operation a row is of, counted from 0."""
+    text = row.text("operation")
+    row.require(
+        text.isdecimal() and len(text) <= 9 and 1 <= int(text) <= len(assembly),
+        "operation",
+        f"a whole number from 1 to {len(assembly)} is needed",
+    )
+    k = int(text) - 1
+    row.require(
+        row.text("part") == assembly.operations[k].main,
+        "part",
+        f"'{assembly.operations[k].main}' is needed, the part that operation {k + 1} moves",
+    )
+    return k
+
+
+def _pose(row: CsvRow) -> Array:
+    position = [row.number(name, FARTHEST_M) for name in _POSITION]
+    units = {row.cells[name].unit for name in _POSITION}
+    require(len(units) == 1, f"{row.file}: the columns of a position are of different units; give all in mm, or in m.")
+    w, x, y, z = (row.number(name, 2.0) for name in _QUATERNION)
+    q = check_quaternion((w, x, y, z), f"{row.file}, line {row.line}, columns qw to qz")
+    return pose.unpack(np.array([*position, *q]))
+
+
+def _deviation(row: CsvRow, meaning: str, assumed: float, limits: tuple[float, float]) -> float:
+    """A standard deviation; the assumed one if the cell is empty."""
+    if not row.text(meaning):
+        return assumed
+    x = row.number(meaning, math.inf)
+    low, high = (limit / row.cells[meaning].unit for limit in limits)
+    row.require(is_within(x, limits), meaning, f"a standard deviation from {low:g} to {high:g} is needed")
+    return x
+
+
+def _play(rows: Sequence[CsvRow], assumed: float) -> float:
+    """The play of parts that fit, [m], which is one number for all rows."""
+    stated = [(row, row.number("play", FARTHEST_M)) for row in rows if row.text("play")]
+    for row, x in stated:
+        row.require(x >= 0.0 and x == stated[0][1], "play", "one length from 0 for all rows is needed")
+    return stated[0][1] if stated else assumed
+
+
+def _flag(row: CsvRow) -> bool:
+    text = row.text("seen").lower()
+    row.require(text in _FLAGS, "seen", "true or false is needed")
+    return _FLAGS[text]

@@ -1,6 +1,0 @@
-"""Assemblies that a seed draws: parts, contacts, order and grasps by construction."""
-
-from apo_bench.generated.families import FAMILIES
-from apo_bench.generated.names import drawn, generated_file, is_generated, whole_name, write_generated
-
-__all__ = ("FAMILIES", "drawn", "generated_file", "is_generated", "whole_name", "write_generated")

@@ -1,0 +1,100 @@
+"""Parts at their final poses: a file of poses is read, one table per copy of a part."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, final
+
+import msgspec
+import numpy as np
+
+from apo_bench.errors import InputError, require
+from apo_bench.geometry import Array, Solid, pose, world_bounds
+from apo_bench.importers.cad.solids.naming import free_name
+from apo_bench.io import read_bytes
+from apo_bench.scenario.parts import load_part, part_path
+from apo_bench.scenario.parts.allowed import FACE_OR_PART_NAME
+
+TABLE = "table"
+_TAKEN = (TABLE, "arm")
+"""What a part of the scenario cannot be called: these are there already."""
+_MOST = 49
+_Share = Annotated[float, msgspec.Meta(ge=0.0, le=1.0)]
+UPS = {"x": (0, 1), "y": (1, 1), "z": (2, 1), "-x": (0, -1), "-y": (1, -1), "-z": (2, -1)}
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class PosedPart:
+    """One copy of a part, where it is in the finished assembly."""
+
+    name: str
+    file: Path
+    solid: Solid
+    T: Array
+    """(4, 4), in the frame of the assembly, [m]."""
+    color: tuple[float, ...] | None = None
+    fit: Mapping[str, float] = field(default_factory=dict)
+    """Faces that recede although the file does not say so, and by how much before the clearance, [mm]."""
+    title: str = ""
+    """What the CAD file calls it, where that cannot be its name."""
+
+
+class _Pose(msgspec.Struct, forbid_unknown_fields=True):
+    """One table of a file of poses."""
+
+    part: str
+    at_mm: tuple[float, float, float]
+    name: Annotated[str, msgspec.Meta(pattern=f"^({FACE_OR_PART_NAME.pattern})?$")] = ""
+    title: str = ""
+    quaternion_wxyz: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
+    color: tuple[_Share, _Share, _Share] | None = None
+
+
+class _PoseFile(msgspec.Struct, forbid_unknown_fields=True):
+    """A file of poses."""
+
+    pose: list[_Pose]
+
+
+def read_posed(poses: Path, files: Sequence[str] = ()) -> tuple[PosedPart, ...]:
+    """Every copy of a part that a file of poses names.
+
+    Args:
+        files: Part files, or names of parts of the package. What is not among them is looked for beside the poses.
+
+    Raises:
+        InputError: A file cannot be read, a part is missing, or has no pose.
+    """
+    try:
+        stated = msgspec.toml.decode(read_bytes(poses, "file of poses"), type=_PoseFile).pose
+    except (msgspec.DecodeError, ValueError) as error:
+        raise InputError(f"{poses}: {' '.join(str(error).split())}.") from error
+    paths = {part_path(file).stem: part_path(file) for file in files}
+    solids: dict[Path, Solid] = {}
+    parts: list[PosedPart] = []
+    used = {*_TAKEN}
+    for each in stated:
+        file = paths.get(each.part, poses.parent / f"{each.part}.xml")
+        solids[file] = solids[file] if file in solids else load_part(file)
+        name = free_name(each.name or each.part, used)
+        used.add(name)
+        T = pose.unpack(np.array([*np.multiply(1e-3, each.at_mm), *each.quaternion_wxyz]))
+        parts.append(PosedPart(name, file, solids[file], T, each.color, title=each.title))
+    require(2 <= len(parts) <= _MOST, f"{poses}: {len(parts)} poses were given; 2 to {_MOST} parts make an assembly.")
+    left = [name for name, file in paths.items() if file not in solids]
+    require(not left, f"{poses}: {', '.join(left)} has no pose; add [[pose]] part = ..., or leave the part out.")
+    return tuple(parts)
+
+
+def on_the_table(parts: Sequence[PosedPart], up: str = "z") -> tuple[PosedPart, ...]:
+    """The same assembly, upright, its lowest point on the table, the middle of the box around it over the origin.
+
+    Args:
+        up: The axis of the poses that looks up, of `UPS`.
+    """
+    axis, sign = UPS[up]
+    turned = pose.at(np.zeros(3), ((0, -90 * sign, 0), (90 * sign, 0, 0), (0 if sign > 0 else 180, 0, 0))[axis])
+    low, high = world_bounds([(each.solid, turned @ each.T) for each in parts])
+    shift = pose.at([-(low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2]])
+    return tuple(replace(each, T=shift @ turned @ each.T) for each in parts)

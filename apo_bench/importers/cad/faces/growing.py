@@ -1,0 +1,222 @@
+"""Cylinders and cones in a mesh: grown from smooth parts of its surface, or from single edges in them."""
+
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from apo_bench.geometry import WHOLE_TURN, Array
+from apo_bench.importers.cad.faces.facets import Facets
+from apo_bench.importers.cad.faces.fitting import ON_WALL, Round, axis_of, circle_through, on_it, refined
+from apo_bench.importers.cad.solids.raw_solid import Mesh, connected
+
+_FEWEST = 3
+_MOST_WORK = 3_000_000
+_MOST_FAILED = 100
+_MOST_SEED = 100
+"""How many flat pieces are looked at, over all trials, in one part; trials in vain, one after the other, in one smooth
+part of its surface; flat pieces that a trial begins with."""
+_SAME_BEND = 0.15
+
+
+class FoundWall(NamedTuple):
+    """A round surface and the flat pieces on it."""
+
+    surface: Round
+    members: Any
+    hole: bool
+    spans: Array
+
+    @property
+    def sides(self) -> int:
+        """Of a whole turn of it."""
+        return round(WHOLE_TURN / float(np.median(self.spans)))
+
+
+def walls_of(mesh: Mesh, facets: Facets) -> list[FoundWall]:
+    """Cylinders and cones, in each smooth part of the surface: first all of it, then from edges in it."""
+    walls: list[FoundWall] = []
+    work = _MOST_WORK
+    for group in smooth_groups(facets, np.unique(facets.smooth)):
+        if len(group) < _FEWEST:
+            continue
+        inside = np.isin(facets.smooth[:, 0], group)
+        # Most smooth surfaces are one wall, such as a hole: then one fit to all of it is enough.
+        points = mesh.corners[np.unique(facets.along[inside])]
+        axes = ((axis_of(facets.normals[group], cone), cone) for cone in (False, True))
+        starts = ((refined(circle_through(points, axis), points, cone), cone) for axis, cone in axes)
+        whole = _grown(mesh, facets, group, inside, starts)
+        work -= 2 * len(group)
+        if whole is not None and len(whole.members) == len(group):
+            walls.append(whole)
+        else:
+            found, work = _from_edges(mesh, facets, group, inside, work)
+            walls += _together(mesh, facets, group, inside, found)
+    return walls
+
+
+def _together(mesh: Mesh, facets: Facets, group: Any, inside: Any, found: list[FoundWall]) -> list[FoundWall]:
+    """Walls of a smooth part of the surface, the large ones with what small ones had taken of them.
+
+    Few sides lie on many a wall beside the true one.
+    """
+    walls: list[FoundWall] = []
+    left = group
+    for wall in sorted(found, key=lambda wall: -len(wall.members)) if len(found) > 1 else found:
+        mine = np.isin(wall.members, left)
+        rest = wall._replace(members=wall.members[mine], spans=wall.spans[mine])
+        if len(rest.members) < _FEWEST:
+            continue
+        near, _, _ = on_it(mesh, facets, left, wall.surface, ON_WALL * mesh.extent)
+        if len(near) > len(rest.members):
+            untaken = inside & np.isin(facets.smooth, left).all(axis=1)
+            start = (wall.surface, wall.surface.slope != 0.0)
+            more = _grown(mesh, facets, left, untaken, [start], int(rest.members[0]))
+            rest = more if more is not None and len(more.members) > len(rest.members) else rest
+        walls.append(rest)
+        left = np.setdiff1d(left, rest.members)
+    return walls
+
+
+def _from_edges(mesh: Mesh, facets: Facets, group: Any, inside: Any, work: int) -> tuple[list[FoundWall], int]:
+    """Round surfaces in part of a smooth surface, the longest edges first, and what work is left."""
+    walls = list[FoundWall]()
+    taken = np.zeros(len(facets.areas), dtype=bool)
+    rows = np.flatnonzero(inside)
+    around: dict[int, list[int]] = {}  # the smooth edges of each flat piece
+    for row, pieces in zip(rows.tolist(), facets.smooth[rows].tolist(), strict=True):
+        for piece in pieces:
+            around.setdefault(piece, []).append(row)
+    ends = mesh.corners[facets.along[rows]]
+    length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+    failed = 0
+    for row in rows[np.argsort(-length, kind="stable")]:
+        if taken[facets.smooth[row]].any():
+            continue
+        if work < 0 or failed > _MOST_FAILED:
+            break
+        # A cylinder is tried before a cone, as a cone fits to every cylinder, too; a start that does not even hold the
+        # pieces that it was made of is not worth a fit.
+        best = None
+        for cone in (False, True):
+            start, near = (_seed_cone if cone else _seed_cylinder)(mesh, facets, row, around, taken)
+            if start is None or len(on_it(mesh, facets, near, start, 3.0 * (ON_WALL * mesh.extent))[0]) < _FEWEST:
+                continue
+            left = group[~taken[group]]
+            untaken = inside & ~taken[facets.smooth].any(axis=1)
+            best = _grown(mesh, facets, left, untaken, [(start, cone)], int(facets.smooth[row, 0]))
+            work -= 4 * len(left)
+            if best is not None:
+                break
+        failed += 1
+        if best is not None:
+            failed = 0
+            walls.append(best)
+            taken[best.members] = True
+    return walls, work
+
+
+def _seed_cylinder(
+    mesh: Mesh, facets: Facets, row: int, around: dict[int, list[int]], taken: Any
+) -> tuple[Round | None, Any]:
+    """The cylinder along an edge, through the edges beside it; and the flat pieces there."""
+    a, b = mesh.corners[facets.along[row]]
+    length = np.linalg.norm(b - a)
+    rows = np.array([r for f in facets.smooth[row].tolist() for r in around[f] if not taken[facets.smooth[r]].any()])
+    near = np.unique(facets.smooth[rows])
+    # Edges of a cylinder's strips are parallel to its axis, so all ends of those beside this one lie on the cylinder.
+    axis = (b - a) / max(length, 1e-300)
+    ends = mesh.corners[facets.along[rows]]
+    along = ends[:, 1] - ends[:, 0]
+    straight = np.linalg.norm(np.cross(along, axis), axis=1) < 0.02 * np.linalg.norm(along, axis=1)
+    are_enough = length >= 1e-9 * mesh.extent and straight.sum() >= 2
+    return circle_through(ends[straight].reshape(-1, 3), axis) if are_enough else None, near
+
+
+def _seed_cone(
+    mesh: Mesh, facets: Facets, row: int, around: dict[int, list[int]], taken: Any
+) -> tuple[Round | None, Any]:
+    """The cone of the pieces that meet at one angle, one after the other; and these pieces."""
+    # Strips of one tessellated cone meet at one angle; from the first piece outwards over edges with nearly this angle.
+    angle = facets.angle[row]
+    members = {int(facets.smooth[row, 0])}
+    rows = set()
+    to_visit = [int(facets.smooth[row, 0])]
+    while to_visit and len(members) < _MOST_SEED:
+        for r in around[to_visit.pop()]:
+            if abs(facets.angle[r] - angle) < _SAME_BEND * abs(angle) and not taken[facets.smooth[r]].any():
+                rows.add(r)
+                more = set(facets.smooth[r].tolist()) - members
+                members |= more
+                to_visit += sorted(more)
+    near = np.array(sorted(members))
+    if len(members) < 5:
+        return None, near
+    points = mesh.corners[np.unique(facets.along[sorted(rows)])]
+    return refined(circle_through(points, axis_of(facets.normals[near], True)), points, True), near
+
+
+def _grown(
+    mesh: Mesh,
+    facets: Facets,
+    among: Any,
+    inside: Any,
+    starts: Iterable[tuple[Round | None, bool]],
+    seed: int | None = None,
+) -> FoundWall | None:
+    """The flat pieces on a surface, connected with a seed or all of them, and the surface fitted to them.
+
+    Args:
+        inside: Which smooth edges may be used, (s,).
+        starts: Surfaces to begin with, and whether they are cones; the first one that holds is taken.
+    """
+    for start, cone in starts:
+        surface = start
+        # In turns: what lies on the surface, loosely at first, and the surface nearest to that, until nothing changes.
+        count = 0
+        loose = 3.0
+        best = None
+        for _ in range(8):
+            if surface is None or not surface.radius < 50.0 * mesh.extent:
+                break
+            members, hole, spans = on_it(mesh, facets, among, surface, loose * (ON_WALL * mesh.extent))
+            if seed is not None:
+                members, spans = _with_seed(facets, inside, members, spans, seed)
+            if len(members) < _FEWEST:
+                best = None
+                break
+            best = FoundWall(surface, members, hole, spans)
+            if len(members) == count and loose == 1.0:
+                break
+            count = len(members)
+            loose = 1.0
+            # Only corners of edges within the surface: those on its border may belong to a chamfer or a fillet.
+            both = inside & np.isin(facets.smooth, members).all(axis=1)
+            points = mesh.corners[np.unique(facets.along[both])]
+            surface = refined(surface, points, cone) if len(points) >= 6 else None
+        if best is not None and (not cone or abs(best.surface.slope) > 1e-3):
+            return best
+    return None
+
+
+def _with_seed(facets: Facets, inside: Any, members: Any, spans: Array, seed: int) -> tuple[Any, Array]:
+    """Those that hang together with a seed; none if it is not among them."""
+    if seed not in members:
+        return members[:0], spans[:0]
+    _, group = _smoothly_connected(facets.smooth[inside], members)
+    same = group == group[np.searchsorted(members, seed)]
+    return members[same], spans[same]
+
+
+def smooth_groups(facets: Facets, members: Any) -> list[Any]:
+    """Flat pieces that hang together smoothly, over those of the list alone."""
+    if not len(members):
+        return []
+    count, group = _smoothly_connected(facets.smooth, members)
+    order = np.argsort(group, kind="stable")
+    return np.split(members[order], np.cumsum(np.bincount(group, minlength=count))[:-1])
+
+
+def _smoothly_connected(smooth: Any, members: Any) -> tuple[int, Any]:
+    """How many groups members, ascending, are by the pairs among them, and the group of each."""
+    return connected(np.searchsorted(members, smooth[np.isin(smooth, members).all(axis=1)]), len(members))

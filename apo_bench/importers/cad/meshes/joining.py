@@ -1,0 +1,23 @@
+"""Corners of triangles that are in one place become one corner, [mm]."""
+
+from typing import Any
+
+import numpy as np
+
+from apo_bench.importers.cad.solids.raw_solid import Mesh, connected
+
+SAME_CORNER = 1e-7
+"""Corners nearer to each other than this part of the size are one."""
+
+
+def join_corners(mesh: Mesh, near: float) -> tuple[Mesh, Any]:
+    """The mesh with near corners as the first of them, and which of its triangles, (t,), have three corners then."""
+    from scipy.spatial import cKDTree
+
+    corners, index = np.unique(mesh.corners, axis=0, return_inverse=True)
+    _, group = connected(cKDTree(corners).query_pairs(near, output_type="ndarray"), len(corners))
+    first = np.unique(group, return_index=True)[1]
+    triangles = group[index.ravel()][mesh.triangles]
+    a, b, c = triangles.T
+    has_three = (a != b) & (b != c) & (c != a)
+    return Mesh(corners[first], triangles[has_three]), has_three

@@ -1,0 +1,53 @@
+"""Volume, centroid and inertia of solids: of their meshes, with round walls as they were fitted."""
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from apo_bench.geometry import Hull
+from apo_bench.importers.cad.pieces.cutting import Cut
+from apo_bench.importers.cad.solids.bodies import mesh_of
+from apo_bench.importers.cad.solids.raw_solid import Mesh, RawSolid, Region
+from apo_bench.scenario.parts.making.moments import Moments, frustum_moments
+
+
+def solid_moments(raw: RawSolid, cut: Cut) -> Moments:
+    """[m]: of the mesh and what lies between its sides and walls that pieces are rebuilt for.
+
+    Of the pieces where these stand for free shapes, or fill holes.
+    """
+    if cut.hulls or cut.filled:
+        return moments_of_pieces(cut.pieces)
+    moments = _mesh_moments(raw.mesh)
+    for region in raw.regions:
+        if region.square:
+            moments = moments.plus(_behind_sides(raw.mesh, region), -1.0 if region.hole else 1.0)
+    return moments.in_metres
+
+
+def moments_of_pieces(pieces: Iterable[Hull]) -> Moments:
+    """[m]: of what the pieces fill."""
+    import manifold3d
+
+    hulls = [manifold3d.Manifold.hull_points(1e3 * piece.corners) for piece in pieces]
+    return _mesh_moments(mesh_of(manifold3d.Manifold.batch_boolean(hulls, manifold3d.OpType.Add))).in_metres
+
+
+def _mesh_moments(mesh: Mesh) -> Moments:
+    """Of a closed mesh, [mm]."""
+    import trimesh
+
+    found = trimesh.Trimesh(mesh.corners, mesh.triangles, process=False).mass_properties
+    # The integral of x x^T about the centroid is trace(J) / 2 - J, J being the inertia.
+    second = np.trace(found.inertia) / 2.0 * np.eye(3) - found.inertia
+    return Moments(float(found.volume), np.zeros(3), second).moved(np.eye(3), found.center_mass)
+
+
+def _behind_sides(mesh: Mesh, wall: Region) -> Moments:
+    """Between a round wall and its sides, [mm]."""
+    import manifold3d
+
+    corners = mesh.corners[np.unique(mesh.triangles[wall.triangles])]
+    within = _mesh_moments(mesh_of(manifold3d.Manifold.hull_points(corners)))
+    true = frustum_moments(*wall.span, *wall.radii).moved(np.column_stack([*wall.across, wall.direction]), wall.point)
+    return true.plus(within, -1.0)

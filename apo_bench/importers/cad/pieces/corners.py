@@ -1,0 +1,133 @@
+"""Corners of convex pieces: each once, and not more of them than a piece may have, [mm]."""
+
+from typing import Any
+
+import numpy as np
+
+from apo_bench.geometry import Array, Hull
+from apo_bench.importers.cad.solids.raw_solid import SAME_CORNER_MM, square_to
+
+_MOST_CORNERS = 600
+_MOST_SIDES = 300
+_MOST_DIRECTIONS = 190
+"""Of a piece; of one that has more, the farthest corners are kept."""
+_INSIDE_M = 5e-8
+"""Corners so far inside of a piece are none of it."""
+_THIN_MM = 0.02
+"""Pieces thinner than this across are left out."""
+_ON_MM = 2e-4
+_DIGITS = 9
+"""As they are written."""
+_NO_PLANES = np.zeros((0, 4))
+_MOST_TRIED = 500
+_IN_PLANE = (16, 8, 4)
+"""In how many directions corners of a flat face are kept first."""
+_FEWEST = 12
+_AT_A_TIME = 3
+LEFT_MM = 0.02
+"""How far off a piece with fewer corners the surface may lie where others come by."""
+
+
+def corners_of(body: Any) -> Array:
+    """Of a body of manifold3d, (k, 3)."""
+    raw = body.to_mesh64()
+    return np.asarray(raw.vert_properties)[np.unique(np.asarray(raw.tri_verts)), :3].astype(np.float64)
+
+
+def extremes(points: Array, flats: Array, cuts: Array = _NO_PLANES) -> Array:
+    """The corners of the convex hull of points, each once; of too many the farthest ones, in flat faces and in space.
+
+    Args:
+        flats: Planes of flat faces, (k, 4).
+        cuts: Those along which the piece was cut from its neighbours; it stays in touch with them if that is possible.
+    """
+    from scipy.spatial import ConvexHull
+
+    points = np.round(without_near(points), _DIGITS)
+    corners = points[np.sort(ConvexHull(points).vertices)]
+    hull = Hull("", 1e-3 * corners)
+    # Sides of a hull that differ by rounding are one; a corner between two such sides is then inside of the piece.
+    for _ in range(4):
+        inside = (hull.planes[:, 3] - hull.corners @ hull.planes[:, :3].T).min(axis=1) > _INSIDE_M
+        if not inside.any():
+            break
+        corners = corners[~inside]
+        hull = Hull("", 1e-3 * corners)
+    if _is_simple(hull):
+        return np.asarray(corners)
+    return reduced(corners, flats, cuts)
+
+
+def reduced(corners: Array, flats: Array, cuts: Array) -> Array:
+    """The corners of a convex piece, or of too many those that leave out the least of it; see `extremes`."""
+    from scipy.spatial import ConvexHull
+
+    corners = corners[np.sort(ConvexHull(corners).vertices)]
+    if _is_simple(Hull("", 1e-3 * corners)):
+        return np.asarray(corners)
+    for many in _IN_PLANE:
+        kept = np.union1d(_on_flats(corners, np.concatenate([flats, cuts]), many), _farthest(corners, _FEWEST))
+        best = corners[kept]
+        if _is_simple(Hull("", 1e-3 * best)):
+            break
+    while _is_simple(Hull("", 1e-3 * corners[kept])):
+        best = corners[kept]
+        planes = ConvexHull(best).equations
+        off = (corners @ planes[:, :3].T + planes[:, 3]).max(axis=1)
+        if off.max() < LEFT_MM:
+            break
+        kept = np.union1d(kept, np.argsort(-off)[:_AT_A_TIME])
+    return np.asarray(best)
+
+
+def _is_simple(hull: Hull) -> bool:
+    return (
+        len(hull.corners) <= _MOST_CORNERS and len(hull.planes) <= _MOST_SIDES and len(hull.edges) <= _MOST_DIRECTIONS
+    )
+
+
+def _on_flats(corners: Array, flats: Array, many: int) -> Any:
+    """Those that are farthest in a flat face, in so many directions."""
+    kept = [np.zeros(0, dtype=np.intp)]
+    turn = 2.0 * np.pi * np.arange(many) / many
+    for n, d in zip(flats[:, :3], flats[:, 3], strict=True):
+        mine = np.flatnonzero(np.abs(corners @ n - d) < _ON_MM)
+        if len(mine) >= 3:
+            x, y = square_to(n)
+            way = np.outer(x, np.cos(turn)) + np.outer(y, np.sin(turn))
+            kept.append(mine[(corners[mine] @ way).argmax(axis=0)])
+    return np.unique(np.concatenate(kept))
+
+
+def _farthest(corners: Array, many: int) -> Any:
+    """Those that are farthest in so many directions in space, and along the axes of the frame; none in none."""
+    if not many:
+        return np.zeros(0, dtype=np.intp)
+    # Evenly spread directions: equal steps of height, turned by the golden angle from one to the next.
+    k = np.arange(many) + 0.5
+    up = 1.0 - 2.0 * k / many
+    turn = np.pi * (1.0 + 5.0**0.5) * k
+    flat = np.sqrt(1.0 - up**2)
+    way = np.concatenate([np.column_stack([np.cos(turn) * flat, np.sin(turn) * flat, up]), np.eye(3), -np.eye(3)])
+    return np.unique((corners @ way.T).argmax(axis=0))
+
+
+def without_near(points: Array) -> Array:
+    """Points without those that are near to an earlier one."""
+    from scipy.spatial import cKDTree
+
+    return np.delete(points, [k for _, k in cKDTree(points).query_pairs(SAME_CORNER_MM)], axis=0)
+
+
+def is_thick(points: Array) -> bool:
+    """Whether points span more than a sheet."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        planes = ConvexHull(points).equations
+    except QhullError:
+        return False
+    # The width of a hull is least across one of its sides, or between two edges, which is not looked at.
+    planes = planes[:: -(-len(planes) // _MOST_TRIED)]
+    depth = -(points @ planes[:, :3].T + planes[:, 3]).min(axis=0)
+    return bool(depth.min() > _THIN_MM)

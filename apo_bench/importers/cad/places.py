@@ -1,0 +1,48 @@
+"""The file of poses that says where a CAD file has its parts."""
+
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from apo_bench.geometry import pose
+from apo_bench.importers.cad.solids.naming import part_name, title_of
+from apo_bench.importers.cad.solids.raw_solid import SolidPlace
+from apo_bench.io import write_file
+from apo_bench.scenario.parts.making import quoted
+
+
+def named_places(parts: Mapping[str, Iterable[SolidPlace]]) -> list[tuple[str, str, SolidPlace]]:
+    """Part, name and place of each copy: as the file calls it, with a number where that is taken.
+
+    Args:
+        parts: Places of each part file.
+    """
+    used: set[str] = set()
+    copies = []
+    for part, places in parts.items():
+        for place in places:
+            name = part_name(place.name, used)
+            used.add(name)
+            copies.append((part, name, place))
+    return copies
+
+
+def write_places(places: Iterable[tuple[str, str, SolidPlace]], folder: Path, source: str) -> Path:
+    """Write `poses.toml`, which `scenario new` reads beside the part files."""
+    lines = [f"# where {source} has its parts".replace("\n", " ")]
+    for part, name, place in places:
+        packed = pose.pack(place.T)
+        lines += ["", "[[pose]]", f'part = "{part}"', f'name = "{name}"']
+        lines += [f"title = {quoted(title_of(place.name))}"] * (name != place.name)
+        lines.append(f"at_mm = {_list(packed[:3])}")
+        lines.append(f"quaternion_wxyz = {_list(packed[3:])}")
+        if place.color is not None:
+            lines.append(f"color = {_list(np.round(place.color, 4))}")
+    path = folder / "poses.toml"
+    write_file(path, "\n".join(lines) + "\n")
+    return path
+
+
+def _list(values: Iterable[float]) -> str:
+    return "[" + ", ".join(f"{round(float(x), 12) + 0.0:.12g}" for x in values) + "]"

@@ -1,0 +1,30 @@
+"""Meshes as bodies of manifold3d, and back."""
+
+from typing import Any
+
+import numpy as np
+
+from apo_bench.importers.cad.solids.raw_solid import Mesh
+
+_FLAT = 1e-6
+"""Corners this near to a flat piece, in parts of the size, are left out of it."""
+
+
+def body_of(mesh: Mesh) -> Any:
+    """Of manifold3d."""
+    import manifold3d
+
+    # Copies, as it takes no arrays that are only to be read.
+    corners = np.array(mesh.corners, order="C")
+    return manifold3d.Manifold(manifold3d.Mesh64(corners, np.array(mesh.triangles, dtype=np.uint64, order="C")))
+
+
+def mesh_of(body: Any) -> Mesh:
+    """Of a body of manifold3d."""
+    raw = body.to_mesh64()
+    return Mesh(np.asarray(raw.vert_properties)[:, :3], np.asarray(raw.tri_verts).astype(np.int64))
+
+
+def simplify(mesh: Mesh) -> Mesh:
+    """A closed mesh without corners in its flat pieces."""
+    return mesh_of(body_of(mesh).simplify(_FLAT * mesh.extent))

@@ -1,0 +1,107 @@
+"""Solids of a B-rep become closed meshes whose triangles belong to faces with the parameters of the file."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from apo_bench.errors import require
+from apo_bench.geometry import WHOLE_TURN
+from apo_bench.importers.cad.faces.fitting import Round, border_of, plane_region, round_region, turn_of
+from apo_bench.importers.cad.meshes.joining import SAME_CORNER, join_corners
+from apo_bench.importers.cad.meshes.shells import INSIDE_OUT, check_closed
+from apo_bench.importers.cad.solids.naming import with_names
+from apo_bench.importers.cad.solids.raw_solid import Mesh, RawSolid, Region, connected, put_together
+from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Flat, Wall, is_same
+
+_LEVEL = 1e-6
+"""Corners of an end are level within this part of the size."""
+
+
+def raw_of(path: Path, solid: BrepSolid) -> RawSolid:
+    """A solid with its faces, in its own frame.
+
+    Raises:
+        InputError: A face of it could not be cut into triangles, or its shell is open.
+    """
+    is_whole = all(len(face.triangles) for face in solid.faces)
+    require(is_whole, f"{path}: a face of '{solid.name}' cannot be cut into triangles; mend it where it was drawn.")
+    mesh, owner = _mesh(solid.faces)
+    check_closed(path, mesh)
+    surfaces = [face.surface for face in solid.faces]
+    mended = (INSIDE_OUT,) if mesh.volume < 0.0 else ()
+    mesh = mesh.flipped() if mended else mesh
+    # Faces that touch on one surface are one region; from here on `owner` is the region of each triangle.
+    beside = np.unique(np.sort(owner[mesh.neighbours], axis=1), axis=0)
+    pairs = [(i, k) for i, k in beside.tolist() if i != k and is_same(surfaces[i], surfaces[k], mesh.extent)]
+    _, group = connected(np.array(pairs, dtype=np.int64).reshape(-1, 2), len(surfaces))
+    mesh, owner = _in_strips(mesh, group[owner], [surfaces[int(k)] for k in np.unique(group, return_index=True)[1]])
+    regions = []
+    for g in np.unique(owner):
+        members = [surface for surface, k in zip(surfaces, group, strict=True) if k == g]
+        residual = max((each.residual for each in members if each is not None), default=0.0)
+        region = _region(mesh, np.flatnonzero(owner == g), members[0])
+        regions.append(replace(region, residual=max(region.residual, residual)))
+    named = with_names(mesh, sorted(regions, key=lambda region: int(region.triangles[0])))
+    return RawSolid(solid.name, mesh, solid.places, mended, named)
+
+
+def _mesh(faces: tuple[BrepFace, ...]) -> tuple[Mesh, Any]:
+    """The triangles of all faces with common corners, and the face of each."""
+    whole = put_together([Mesh(face.corners, face.triangles) for face in faces])
+    owner = np.repeat(np.arange(len(faces)), [len(face.triangles) for face in faces])
+    mesh, has_three = join_corners(whole, SAME_CORNER * max(whole.extent, 1e-9))
+    return mesh, owner[has_three]
+
+
+def _in_strips(mesh: Mesh, owner: Any, surfaces: list[Flat | Wall | None]) -> tuple[Mesh, Any]:
+    """With walls between two circles as strips from end to end.
+
+    Args:
+        owner: The surface of each triangle.
+    """
+    for k, wall in enumerate(surfaces):
+        mine = np.flatnonzero(owner == k)
+        if not isinstance(wall, Wall) or not len(mine) or turn_of(mesh, mine, wall.surface) < WHOLE_TURN:
+            continue
+        strips = _strips(mesh, mine, wall.surface)
+        if strips is not None:
+            mesh = Mesh(mesh.corners, np.concatenate([np.delete(mesh.triangles, mine, axis=0), strips]))
+            owner = np.append(np.delete(owner, mine), np.full(len(strips), k))
+    return mesh.part(np.arange(len(mesh.triangles))), owner
+
+
+def _strips(mesh: Mesh, triangles: Any, wall: Round) -> Any:
+    """Other triangles, (s, 3), for those of a wall: the sides of the hull of its border, and of the tip of a cone.
+
+    None if its ends are not two level circles, nor one and a tip.
+    """
+    from scipy.spatial import ConvexHull
+
+    near = _LEVEL * mesh.extent
+    every = np.unique(mesh.triangles[triangles])
+    every = every[np.isin(every, border_of(mesh, triangles)) | (wall.polar(mesh.corners[every])[1] < near)]
+    points = mesh.corners[every]
+    height = wall.polar(points)[0]
+    if (np.minimum(height - height.min(), height.max() - height) > near).any():
+        return None
+    hull = ConvexHull(points).simplices
+    sides = hull[np.ptp(height[hull], axis=1) > near]
+    # They look the way that the triangles did: outwards, or towards the axis for a hole.
+    across = np.cross(points[sides[:, 1]] - points[sides[:, 0]], points[sides[:, 2]] - points[sides[:, 0]])
+    outward = (across * wall.polar(points[sides].mean(axis=1))[2]).sum(axis=1)
+    before = (mesh.across[triangles] * wall.polar(mesh.corners[mesh.triangles[triangles]].mean(axis=1))[2]).sum()
+    return every[np.where((outward * before > 0.0)[:, None], sides, sides[:, ::-1])]
+
+
+def _region(mesh: Mesh, triangles: Any, surface: Flat | Wall | None) -> Region:
+    if surface is None:
+        return Region("other", triangles)
+    across = mesh.across[triangles]
+    if isinstance(surface, Flat):
+        sign = float(np.sign(across.sum(axis=0) @ surface.normal)) or 1.0
+        return plane_region(mesh, triangles, sign * surface.normal, surface.point)
+    _, _, out = surface.surface.polar(mesh.corners[mesh.triangles[triangles]].mean(axis=1))
+    hole = bool((across * out).sum() < 0.0)
+    return round_region(mesh, triangles, surface.surface, hole, turn_of(mesh, triangles, surface.surface))

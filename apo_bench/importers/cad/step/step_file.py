@@ -1,0 +1,78 @@
+"""STEP files become raw solids, each shape once with all of its places."""
+
+import re
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+
+from apo_bench.errors import InputError, require
+from apo_bench.importers.cad.meshes.mesh_file import MOST_CAD_TRIANGLES, CadFile, check_size, read_cad_bytes
+from apo_bench.importers.cad.solids.raw_solid import RawSolid, without_copies
+from apo_bench.importers.cad.step.from_brep import raw_of
+from apo_bench.importers.cad.step.surfaces import BrepSolid
+
+STEP_SUFFIXES = (".step", ".stp")
+_MOST_SOLIDS = 200
+_PREFIXES = {"": "m", "MILLI": "mm", "CENTI": "cm", "MICRO": "um"}
+_UNIT_NAMES = {
+    "INCH": "in",
+    "FOOT": "ft",
+    "FEET": "ft",
+    "METRE": "m",
+    "CENTIMETRE": "cm",
+    "MILLIMETRE": "mm",
+}
+
+
+def read_step(path: Path, unit: str | None) -> tuple[CadFile, list[RawSolid]]:
+    """The solids of a STEP file, each once, with all of its places.
+
+    Raises:
+        InputError: The extra is missing, the file cannot be read, or it holds no closed solid of a size for a part.
+    """
+    require(unit is None, f"--unit {unit} was given, and a STEP file states its own; leave --unit out.")
+    raw = read_cad_bytes(path, "STEP")
+    require(b"ISO-10303-21" in raw[:2000], f"{path}: this is no STEP file; save the part again.")
+    require(find_spec("OCP"), f"{path}: reading STEP needs the extra cad; run: pip install 'apo_bench[cad]'")
+    own_unit = _unit(raw)
+    solids = _read_solids(path)
+    require(solids, f"{path}: the file holds no solid; save the part as a solid, not as curves or a drawing.")
+    count = sum(len(face.triangles) for solid in solids for face in solid.faces)
+    require(len(solids) <= _MOST_SOLIDS, f"{path}: the file has {len(solids)} solids; {_MOST_SOLIDS} are the most.")
+    require(
+        count <= MOST_CAD_TRIANGLES, f"{path}: the file has {count:,} triangles; {MOST_CAD_TRIANGLES:,} are the most."
+    )
+    for solid in solids:
+        size = float(np.ptp(np.concatenate([face.corners for face in solid.faces]), axis=0).max())
+        check_size(path, size, f"of a solid in it; unit {own_unit}, stated in the file")
+    raws = list[RawSolid]()
+    left_out = list[str]()
+    for solid in solids:
+        try:
+            raws.append(raw_of(path, solid))
+        except InputError as error:
+            if len(solids) == 1:
+                raise
+            left_out.append(f"{solid.name}: {str(error).removeprefix(f'{path}: ')}")
+    return CadFile(own_unit, "stated in the file", tuple(left_out)), without_copies(raws)
+
+
+def _read_solids(path: Path) -> list[BrepSolid]:
+    from apo_bench.importers.cad.step.open_cascade import solids_of
+
+    try:
+        return solids_of(path)
+    except (RuntimeError, ValueError, TypeError) as error:
+        raise InputError(f"{path}: the file cannot be read as STEP; save the part again.") from error
+
+
+def _unit(raw: bytes) -> str:
+    """The unit of lengths, as the file names it."""
+    text = raw.decode("latin-1")
+    lengths = re.findall(r"=\s*\(([^;]*?LENGTH_UNIT[^;]*?)\)\s*;", text)
+    named = re.findall(r"CONVERSION_BASED_UNIT\s*\(\s*'([^']*)'", ";".join(lengths))
+    if named:
+        return _UNIT_NAMES.get(named[0].strip().upper(), named[0].strip().lower())
+    si = re.search(r"LENGTH_UNIT[^;]*?SI_UNIT\s*\(\s*(?:\.(\w+)\.|\$)\s*,\s*\.METRE\.", text)
+    return _PREFIXES.get(si[1] or "", f"{si[1]}metre".lower()) if si else "mm"

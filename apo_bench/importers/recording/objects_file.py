@@ -1,0 +1,100 @@
+"""OBJECTS.toml: which id of a log is which part, and where the part's frame lies in the tracker's model."""
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, NamedTuple, final
+
+from apo_bench.errors import InputError, one_line, require, unknown
+from apo_bench.geometry import Array
+from apo_bench.importers.recording.camera_file import NamedEntries
+from apo_bench.importers.recording.tracks import Log, PoseTrack
+from apo_bench.io import Table, convert_typed, read_typed
+from apo_bench.scenario.values import AnyPose
+
+_MOST_IDS = 12
+"""So many ids are named in a sentence."""
+
+
+class ObjectTable(Table, frozen=True, kw_only=True):
+    """One part; ids are texts, or whole numbers as in BOP files."""
+
+    id: str | int
+    frame: AnyPose = AnyPose(at_mm=(0.0, 0.0, 0.0))
+
+
+class ObjectsTable(Table, frozen=True, kw_only=True):
+    """What stands in the file."""
+
+    schema: Literal["apo-bench/objects/1"]
+    objects: NamedEntries
+    ignore: tuple[str | int, ...] = ()
+
+
+class TrackedPart(NamedTuple):
+    """A part as a tracker knows it."""
+
+    id: str
+    T_model_part: Array
+    """(4, 4), [m]."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ObjectsFile:
+    """What an objects file states."""
+
+    file: str
+    parts: Mapping[str, TrackedPart]
+    ignored: frozenset[str]
+    """Ids that are no parts."""
+
+    @property
+    def models(self) -> Mapping[str, Array]:
+        """Part -> where its frame lies in the tracker's model, (4, 4), [m]."""
+        return {part: tracked.T_model_part for part, tracked in self.parts.items()}
+
+
+def read_objects(path: str | Path) -> ObjectsFile:
+    """What an objects file states.
+
+    Raises:
+        InputError: Anything that is not as described, naming file and key.
+    """
+    top = read_typed(path, ObjectsTable, "objects file")
+    parts: dict[str, TrackedPart] = {}
+    for part, value in top.objects.items():
+        place = f"{path}, objects, {part}"
+        stated = convert_typed(value, ObjectTable, place)
+        require(
+            all(tracked.id != str(stated.id) for tracked in parts.values()),
+            f"{place}: the id '{stated.id}' is that of another part already.",
+        )
+        parts[part] = TrackedPart(str(stated.id), stated.frame.matrix(f"{place}, frame"))
+    return ObjectsFile(str(path), parts, frozenset(map(str, top.ignore)))
+
+
+def name_tracks(log: Log, objects: ObjectsFile, hands: Collection[str] = ()) -> Mapping[str, PoseTrack]:
+    """The tracks of parts, camera from part.
+
+    Args:
+        hands: Ids of hands and grippers, which are no parts.
+
+    Raises:
+        InputError: An id of the log is no part, or a part is not in the log.
+    """
+    known = {tracked.id for tracked in objects.parts.values()} | objects.ignored
+    strange = [f"'{one_line(name, 60)}'" for name in log.tracks if name not in known and name not in hands]
+    require(
+        not strange,
+        f"{log.file}: the id {', '.join(strange[:_MOST_IDS])} is no part; name its part in {objects.file}, or add it "
+        f"to its key `ignore`. Known: {', '.join(sorted(known))}.",
+    )
+    tracks: dict[str, PoseTrack] = {}
+    for part, tracked in objects.parts.items():
+        if tracked.id not in log.tracks:
+            sentence = unknown("id", tracked.id, log.tracks).replace("Known", "In the log")
+            raise InputError(f"{objects.file}, {part}: {sentence}")
+        t, T = log.tracks[tracked.id]
+        tracks[part] = PoseTrack(t, T @ tracked.T_model_part)
+    return tracks

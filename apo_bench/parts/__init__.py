@@ -1,6 +1,0 @@
-"""Part files become solids with named faces."""
-
-from apo_bench.parts.load import load_part, part_names, part_path
-from apo_bench.parts.part_file import PartFile, part_files_of, read_part
-
-__all__ = ["PartFile", "load_part", "part_files_of", "part_names", "part_path", "read_part"]

@@ -1,0 +1,201 @@
+"""Follow a demonstration from range image to range image: what moved, which part it was, where it went."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly import Assembly, Poses
+from apo_bench.geometry import Array, nearest_symmetric_pose, physical_pieces, pose, symmetries, turned_alike
+from apo_bench.perception.depth_camera.locate import ALIKE, Appearance, LocatedModel, Model, compare_models, locate
+from apo_bench.perception.depth_camera.range_finder import PinholeView, RangeFinder
+from apo_bench.perception.depth_camera.rays import RayCaster
+from apo_bench.perception.depth_camera.regions import Regions, find_regions
+from apo_bench.perception.depth_camera.surface import Surface, join_surfaces, sample_surface
+
+_GONE = 0.5
+"""A part has moved if so much of what was seen of it has vanished."""
+_GRID = 3
+"""Every so many pixels are asked what is seen there."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Event:
+    """One operation as the range finder saw it."""
+
+    first: int
+    """Number of the image before it."""
+    last: int
+    """Number of the image after it."""
+    regions: tuple[Regions, ...]
+    """Per view."""
+    moved: frozenset[str]
+    """The parts that are gone from where they were."""
+    explained: Mapping[str, float]
+    """How much of what appeared each model explains."""
+    found: LocatedModel | None
+    """Where the main part is now; None if nothing was recognised."""
+    model: Model | None
+    """What was fitted; None if it is not known what moved."""
+    operation: int | None
+    """Which operation this was, counted from 0; None if none that was expected."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Expected:
+    """What is known before looking: topology, models, where parts start, and roughly how they will be turned."""
+
+    assembly: Assembly
+    start: Poses
+    turns: Array
+    """(n, 3, 3), the planned rotation of each goal, world; how the whole is turned is learnt from the first part."""
+    play_m: float = 0.0
+    """Clearance per side: the models are the parts as they are made."""
+
+
+def follow_demonstration(
+    images: Sequence[Array], finder: RangeFinder, level_m: float, expected: Expected, cast: RayCaster
+) -> tuple[Event, ...]:
+    """Find every operation in range images, one per quiet spell, each (views, height, width), [m]; the first is before.
+
+    An operation is over in the last spell before something else moves than it does, so that a hand may pause. Only
+    what was manipulated is looked for: whatever else moved by less than a pixel or two is not noticed, and stays for
+    this sensor where it was. Of operations in a row that move the same parts only where the last one ended is known: a
+    pause of the hand looks the same as the end of an operation, so the others are not seen.
+    """
+    assembly = expected.assembly
+    believed = {part: expected.start[part] for part in assembly.solids}
+    surfaces = {
+        part: sample_surface(physical_pieces(solid, expected.play_m))
+        for part, solid in assembly.solids.items()
+        if part not in assembly.fixed
+    }
+    events: list[Event] = []
+    frame = np.eye(3)
+    k = 0
+    first = 0
+    while first + 1 < len(images) and k < len(assembly):
+        owners = [_find_owners(view, believed, cast) for view in finder.views]
+        spell = _spell(images, first, level_m, assembly, k, owners)
+        if spell is None:
+            break
+        last, which, compared, moved = spell
+        appearance = Appearance(
+            finder.views, images[last], [r.appeared for r in compared], level_m, finder.bias * level_m, cast
+        )
+        group = None if which is None else _moving_model(assembly, surfaces, believed, which)
+        shares, located = _recognise(expected, surfaces, group, which, appearance)
+        if which is not None and located is not None:
+            operation = assembly.operations[which]
+            solid = assembly.solids[operation.main]
+            turn = frame @ expected.turns[which]
+            T = turned_alike(solid, nearest_symmetric_pose(located.T, symmetries(solid), turn), turn)
+            if not any(event.found for event in events):
+                frame = T[:3, :3] @ expected.turns[which].T
+            located = LocatedModel(T, _turn_covariance(located, T), located.explained)
+            step = T @ pose.inverse(believed[operation.main])
+            believed |= {part: step @ believed[part] for part in operation.moves}
+        k = k + 1 if which is None else which + 1
+        events.append(Event(first, last, compared, moved, shares, located, group, which))
+        first = last
+    return tuple(events)
+
+
+def _spell(
+    images: Sequence[Array],
+    first: int,
+    noise_m: float,
+    assembly: Assembly,
+    k: int,
+    owners: Sequence[NDArray[np.int64]],
+) -> tuple[int, int | None, tuple[Regions, ...], frozenset[str]] | None:
+    """The spell in which the next operation was over: image, operation, what changed, what moved; None if none was.
+
+    Operation k is looked for first; one that moves something else may come instead, if k was not seen. Of operations in
+    a row that move the same parts it is the last, since the spell ends when something else moves.
+    """
+    spell = None
+    for last in range(first + 1, len(images)):
+        compared = tuple(find_regions(a, b, noise_m) for a, b in zip(images[first], images[last], strict=True))
+        moved = _find_gone(owners, tuple(assembly.solids), compared) - assembly.fixed
+        if not moved:
+            continue
+        which = next((j for j in range(k, len(assembly)) if moved == set(assembly.operations[j].moves)), None)
+        while which is not None and which + 1 < len(assembly) and moved == set(assembly.operations[which + 1].moves):
+            which += 1
+        if spell is None or (spell[1] is None and moved >= spell[3]) or which == spell[1]:
+            spell = last, which, compared, moved
+        elif spell[1] is not None and not moved <= spell[3]:
+            break
+    return spell
+
+
+def _find_gone(
+    owners: Sequence[NDArray[np.int64]], parts: tuple[str, ...], compared: Sequence[Regions]
+) -> frozenset[str]:
+    """The parts of whose visible surface most has vanished."""
+    owner = np.array(owners)
+    vanished = np.array([region.vanished[::_GRID, ::_GRID] for region in compared])
+    seen = np.bincount(owner[owner >= 0], minlength=len(parts))
+    gone = np.bincount(owner[(owner >= 0) & vanished], minlength=len(parts))
+    return frozenset(part for part, n, m in zip(parts, seen, gone, strict=True) if n and m >= _GONE * n)
+
+
+def _find_owners(view: PinholeView, believed: Poses, cast: RayCaster) -> NDArray[np.int64]:
+    """Which part every few pixels of a view should show, by number, -1 for none."""
+    pixels = np.arange(view.height * view.width).reshape(view.height, view.width)[::_GRID, ::_GRID]
+    _, owner = cast(believed, view.origin, view.rays[pixels.ravel()])
+    return owner.reshape(pixels.shape)
+
+
+def _recognise(
+    expected: Expected,
+    surfaces: Mapping[str, Surface],
+    group: Model | None,
+    which: int | None,
+    appearance: Appearance,
+) -> tuple[Mapping[str, float], LocatedModel | None]:
+    """How much each model explains, and where the one that moved is, if none explains more."""
+    assembly = expected.assembly
+    points = appearance.points()
+    shares: dict[str, float] = {}
+    located = None
+    if which is not None and group is not None:
+        located = locate(group, appearance, points)
+        shares["+".join(assembly.operations[which].moves)] = located.explained if located else 0.0
+    models: dict[str, Model] = {}
+    known = [] if group is None else [group.surface]
+    for part, surface in surfaces.items():
+        if not any(surface.looks_like(other) for other in known):
+            models[part] = _model_alone(assembly, surfaces, part)
+            known.append(surface)
+    shares |= compare_models(models, appearance, points)
+    if located is not None and located.explained < max(shares.values()) - ALIKE:
+        located = None
+    return shares, located
+
+
+def _model_alone(assembly: Assembly, surfaces: Mapping[str, Surface], part: str) -> Model:
+    return Model({part: np.eye(4)}, surfaces[part], symmetries(assembly.solids[part]))
+
+
+def _moving_model(assembly: Assembly, surfaces: Mapping[str, Surface], believed: Poses, which: int) -> Model:
+    """What an operation moves, as one rigid thing."""
+    operation = assembly.operations[which]
+    if not operation.carries:
+        return _model_alone(assembly, surfaces, operation.main)
+    back = pose.inverse(believed[operation.main])
+    parts = {part: back @ believed[part] for part in operation.moves}
+    posed = {part: (surfaces[part], T) for part, T in parts.items()}
+    carried = join_surfaces(posed[part] for part in operation.carries)
+    return Model(parts, join_surfaces(posed.values()), np.eye(4)[None], surfaces[operation.main], carried)
+
+
+def _turn_covariance(located: LocatedModel, T: Array) -> Array:
+    """The covariance of a pose that looks the same: body twists turn along, S^-1 xi S."""
+    A = pose.adjoint(pose.inverse(T) @ located.T)
+    return np.asarray(A @ located.covariance @ A.T)

@@ -1,0 +1,64 @@
+"""The range finder as a sensor of poses: from true range images of a demonstration to an observation of it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly import Assembly, Demonstration, Observation
+from apo_bench.geometry import Array, frozen
+from apo_bench.perception.depth_camera.follow import Event, Expected, follow_demonstration
+from apo_bench.perception.depth_camera.range_finder import RangeFinder, RangeImage
+from apo_bench.perception.depth_camera.rays import MakeRayCaster
+from apo_bench.perception.observation.models import floored
+
+_UNSEEN = frozen(np.diag(np.repeat([0.1, 1.0], 3) ** 2), 6, 6)
+"""The covariance that stands beside an operation that was not seen, [m, rad]."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class RangeSensor:
+    """Called like a noise model, it measures poses instead of drawing them: `(assembly, shown, rng) -> Observation`.
+
+    Of what was shown only the topology, where parts started and how careless people are is looked at; goals are
+    fitted to range images. Where a part looks the same when turned, the turn nearest to the planned one is reported,
+    and nothing else is taken from the plan.
+    """
+
+    finder: RangeFinder
+    images: tuple[RangeImage, ...]
+    """Without error: before the demonstration and in every quiet spell."""
+    level_m: float
+    """Standard deviation of a ray."""
+    turns: Array
+    """(n, 3, 3), the planned rotation of each goal, world."""
+    play_m: float
+    """Clearance per side, as the models are those of the parts as they are made."""
+    make_caster: MakeRayCaster
+    """What casts rays at these models."""
+
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
+        events = self.events(demonstration, self.sensed(rng))
+        goals = np.array([demonstration.start[operation.main] for operation in assembly.operations])
+        covariance = np.repeat(_UNSEEN[None], len(assembly), axis=0)
+        seen = np.zeros(len(assembly), dtype=np.bool_)
+        for event in events:
+            k = event.operation
+            if event.found is not None and k is not None:
+                goals[k] = event.found.T
+                covariance[k] = event.found.covariance
+                seen[k] = True
+        return Observation(assembly, demonstration.start, goals, floored(covariance + demonstration.careless), seen)
+
+    def sensed(self, rng: np.random.Generator) -> list[Array]:
+        """The images with the errors of the sensor, (views, height, width) each, [m]."""
+        return [self.finder.sense(image, self.level_m, rng) for image in self.images]
+
+    def events(self, demonstration: Demonstration, images: Sequence[Array]) -> tuple[Event, ...]:
+        """What the sensor makes of measured images, operation by operation."""
+        assembly = demonstration.assembly
+        expected = Expected(assembly, demonstration.start, self.turns, self.play_m)
+        cast = self.make_caster(assembly.solids, self.play_m)
+        return follow_demonstration(images, self.finder, self.level_m, expected, cast)

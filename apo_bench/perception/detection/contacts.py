@@ -1,0 +1,142 @@
+"""Which face touches which, from what was seen: solids, poses and their stated noise (Section 1, first half).
+
+Operation by operation, faces of the parts that moved are held against faces of the parts that stand there. A pair is a
+candidate if its normals are opposite within an angle, its gap is small and its overlap large enough. Noise moves whole
+parts, so the contacts of an operation are not judged one by one: the likeliest is believed, the goals are put where
+that one closes, and the others are looked at from there. Where that leaves candidates over, other beginnings are tried
+and the likeliest set wins (joint compatibility: Neira and Tardos, "Data association in stochastic mapping using the
+joint compatibility test", 2001).
+"""
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.arguments import check_arguments
+from apo_bench.assembly import Contact, Facing, Observation, placements
+from apo_bench.assembly.touching import facing
+from apo_bench.geometry import Array
+from apo_bench.perception.detection.belief import Belief, PartBeliefs, initial_belief
+from apo_bench.perception.detection.candidate import Candidate, judged
+from apo_bench.perception.detection.evidence import Evidence, Recognised, evidence_of, with_contacts, without_contacts
+from apo_bench.perception.detection.thresholds import RULES_BY_NOISE, Rules
+
+_BEGINNINGS = 12
+"""Candidates that are tried as the first of an operation, at most."""
+
+
+@check_arguments
+def recognise(observation: Observation, rules: Rules = RULES_BY_NOISE) -> Recognised:
+    """Find the face contacts of every operation; those that the observation came with are not looked at.
+
+    Only what an operation puts somewhere is held against what it does not move, so parts that are carried keep the
+    contacts among themselves. Operations that were not seen, and what depends on them, make no contact.
+
+    Args:
+        rules: `RULES_BY_NOISE` of `apo_bench.perception.detection.thresholds`, or your own.
+
+    Raises:
+        InputError: Something else was given.
+    """
+    observation = without_contacts(observation)
+    assembly = observation.assembly
+    belief = initial_belief(observation)
+    evidence = list[Evidence]()
+    as_seen = placements(assembly, observation.start, belief.goals)
+    standing = set(assembly.fixed)
+    for k, (operation, poses) in enumerate(zip(assembly.operations, as_seen, strict=True)):
+        others = tuple(p for p in assembly.solids if p in standing - set(operation.moves))
+        around = _Around(observation, rules, k, others)
+        best = around.likeliest(belief)
+        belief = best.belief
+        evidence += evidence_of(assembly, k, [(c.contact, c.pair, c.most) for c in best.taken], poses)
+        standing |= set(operation.moves)
+    return Recognised(with_contacts(assembly, evidence), tuple(evidence))
+
+
+class _Found(NamedTuple):
+    """Contacts that go together."""
+
+    taken: tuple[Candidate, ...]
+    belief: Belief
+    score: float
+    """Sum of the squared lengths, less what each equation that was not implied gains by closing: see `_gain`."""
+    left: tuple[Contact, ...]
+    """Candidates at the beginning that were not taken."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Around:
+    """One operation and what stands around it."""
+
+    seen: Observation
+    rules: Rules
+    k: int
+    others: tuple[str, ...]
+
+    def candidates(self, belief: Belief, taken: Collection[Contact] = ()) -> tuple[Candidate, ...]:
+        """The pairs within the thresholds that were not taken yet, the likeliest first."""
+        now = belief.standing(self.k)
+        solids = self.seen.assembly.solids
+        rules = self.rules
+        bounds = {"gap_m": rules.gap_m, "angle_rad": rules.angle_rad, "share": rules.share}
+        candidates = list[Candidate]()
+        for a in self.seen.assembly.operations[self.k].moves:
+            for b in self.others:
+                known = {(m.face, e.face) for m, e in taken if (m.part, e.part) == (a, b)}
+                for pair in facing(solids[a], now.poses[a], solids[b], now.poses[b], **bounds, known=known):
+                    candidates += self._judged(a, b, pair, now, belief)
+        return tuple(sorted(candidates, key=lambda c: (c.distance * (3 / len(c.pair.residual)), c.contact)))
+
+    def likeliest(self, belief: Belief) -> _Found:
+        """The contacts that go together: of all beginnings, the set with the least score."""
+        best = self._followed(belief, None)
+        for first in best.left[:_BEGINNINGS]:
+            other = self._followed(belief, first)
+            if other.score < best.score:
+                best = other
+        return best
+
+    def _followed(self, belief: Belief, first: Contact | None) -> _Found:
+        """Take the likeliest candidate (or a given one), put the goals where it closes, and look again."""
+        at_first = at_hand = self.candidates(belief)
+        taken = list[Candidate]()
+        total = 0.0
+        while at_hand:
+            chosen = next((c for c in at_hand if c.contact == first), at_hand[0])
+            if chosen.distance > self.rules.most_of(len(chosen.pair.residual)):
+                break
+            belief = belief.conditioned(chosen.pair.residual, chosen.slope, chosen.noise)
+            taken.append(chosen)
+            total += chosen.distance - chosen.gain
+            at_hand = self.candidates(belief, [c.contact for c in taken])
+        have = {c.contact for c in taken}
+        return _Found(tuple(taken), belief, total, tuple(c.contact for c in at_first if c.contact not in have))
+
+    def _judged(self, a: str, b: str, pair: Facing, now: PartBeliefs, belief: Belief) -> Iterator[Candidate]:
+        """The pair as a candidate, if it is one."""
+        # Body twists of all goals -> world twist of part a beside part b -> gap and tilts of the pair.
+        slope = pair.slope @ (now.reach[a] - now.reach[b])
+        if slope.reshape(len(slope), -1, 6)[:, ~self.seen.seen].any():
+            return
+        C = slope @ belief.covariance @ slope.T
+        candidate = judged(self.seen, self.rules, a, b, now.poses[b], pair, slope, C)
+        if candidate is not None:
+            yield candidate._replace(gain=_gain(C, candidate.noise, self.rules, pair.lengths))
+
+
+def _gain(C: Array, noise: Array, rules: Rules, lengths: int) -> float:
+    """What a pair that closes gains, before its squared length is taken off.
+
+    Along every axis in which the goals leave it uncertain, (range)^2 / (2 pi variance), the range being that within
+    the bounds. What earlier contacts imply anyway gains nothing: it is no coincidence.
+    """
+    # Scaled by the range, eigenvectors of C are axes that are independent; an axis along which goals are no less sure
+    # than contacts are exact was decided before.
+    span = np.array([2 * rules.gap_m] * lengths + [2 * rules.angle_rad] * (len(C) - lengths))
+    variance, V = np.linalg.eigh(C / np.outer(span, span))
+    real = np.einsum("ij,ik,kj->j", V, noise / np.outer(span, span), V)
+    new = variance > real
+    return float(np.maximum(-np.log(2 * np.pi * (variance + real)[new]), 0.0).sum())

@@ -1,0 +1,107 @@
+"""Goals and contacts together: where the goals are if a set of contacts holds, and how likely the set is.
+
+Given a set, the observation is Gaussian about the contact manifold. Without it, parts lie anywhere in a room that is
+much wider than the noise. What contacts leave at the observation, r = J xi - e, has the covariance J C J^t + S in the
+first case and J (C + R) J^t + S in the second, with C the noise, R the room and S what play and soft contacts add. The
+set explains the observation better than chance by
+
+    log |J (C + R) J^t + S| - log |J C J^t + S| - r^t (J C J^t + S)^-1 r,
+
+twice the logarithm of a Bayes factor (of Savage and Dickey, with a room so wide that only its size counts). An equation
+that others imply adds as much to one determinant as to the other, so it gains nothing, as it should.
+"""
+
+from dataclasses import dataclass
+from math import radians
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly import Assembly, Observation, joint_covariance, lowered
+from apo_bench.assembly.equations import equations
+from apo_bench.assembly.pattern import pattern
+from apo_bench.geometry import Array, frozen, pose, right_jacobian
+from apo_bench.perception.detection.thresholds import CONTACT_SOFT_M
+
+_ROOM = frozen(np.repeat([40e-3, radians(23.0)], 3), 6)
+"""(6,): standard deviation of where a part may lie by chance, near others that it does not touch, [m, rad]."""
+_CARRIED = 3.0
+"""So many plays, each in its own direction, a contact of parts is off by that were carried inside another one."""
+_TURNS = 6
+_SMALL = 1e-5
+"""Steps of Gauss and Newton at most; they end when no goal moves by more, [m, rad]."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class GoalEstimate:
+    """The likeliest goals of the first operations if some contacts hold."""
+
+    assembly: Assembly
+    """The first n operations, with these contacts."""
+    goals: Array
+    """(n, 4, 4), world frame, [m]."""
+    covariance: Array
+    """(6 n, 6 n), of the body twists by which they are wrong, [m, rad]."""
+    room: Array
+    """(6 n, 6 n), the same if nothing had been seen but the contacts."""
+    badness: float
+    """-2 log of the Bayes factor of the contacts against none."""
+
+
+def estimate(seen: Observation, assembly: Assembly, begin: Array) -> GoalEstimate:
+    """Solve for goals and contacts together.
+
+    Args:
+        seen: What was seen; its contacts do not matter.
+        assembly: Its first n operations, with the contacts that are supposed.
+        begin: (n, 4, 4), goals to begin with.
+    """
+    n = len(begin)
+    C = joint_covariance(seen.goals, seen.covariance, seen.shared)[: 6 * n, : 6 * n]
+    room = C + np.diag(np.tile(_ROOM**2, n))
+    back = pose.inverse(seen.goals[:n])
+    goals = begin
+    system = equations(assembly, seen.start, begin)
+    S = _softness(assembly, seen.play_m)
+    xi = pose.log(back @ goals)
+    for _ in range(_TURNS):
+        # Goals are seen.goals exp(xi); equations are linear in body twists at the goals, which are Jr d(xi).
+        e, J = system.linearised(goals)
+        Jr = right_jacobian(xi)
+        J = (J.reshape(-1, n, 1, 6) @ Jr).reshape(-1, 6 * n)
+        CJ = C @ J.T
+        r = J @ xi.ravel() - e
+        A = J @ CJ + S
+        # The likeliest xi of covariance C for which J xi - r is of covariance S: C J^t (J C J^t + S)^-1 r.
+        new = (CJ @ np.linalg.solve(A, r)).reshape(n, 6)
+        step = np.abs(new - xi).max(initial=0.0)
+        xi = new
+        goals = seen.goals[:n] @ pose.exp(xi)
+        if step < _SMALL:
+            break
+    # |A| and |B| are what contacts leave with the noise and in the room: see the head of this file.
+    B = J @ room @ J.T + S
+    badness = float(r @ np.linalg.solve(A, r) - (np.linalg.slogdet(B)[1] - np.linalg.slogdet(A)[1]))
+    return GoalEstimate(assembly, goals, _left(C, J, A, Jr), _left(room, J, B, Jr), badness)
+
+
+def _left(C: Array, J: Array, A: Array, Jr: Array) -> Array:
+    """What is uncertain of goals once equations hold, as body twists at these goals."""
+    n = len(Jr)
+    JC = J @ C
+    left = C - JC.T @ np.linalg.solve(A, JC)
+    turned = np.einsum("kab,kblc,ldc->kald", Jr, left.reshape(n, 6, n, 6), Jr).reshape(6 * n, 6 * n)
+    return np.asarray((turned + turned.T) / 2)
+
+
+def _softness(assembly: Assembly, play_m: float) -> Array:
+    """(m, m): covariance of all equations of contacts that are there, [m^2]; their vertices together are off as one."""
+    each = []
+    flat = lowered(assembly)
+    for operation in flat.operations:
+        for contact in operation.contacts:
+            carried = (_CARRIED - 1.0) * bool(operation.carries) * play_m**2
+            each.append(CONTACT_SOFT_M**2 + (flat.play(contact, play_m) ** 2 + carried) / 3.0)
+    count = np.diff(pattern(assembly).begin)
+    return np.diag(np.repeat(np.array(each).reshape(-1) * count, count))

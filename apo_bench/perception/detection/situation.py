@@ -1,0 +1,112 @@
+"""Where operations put things if some contacts hold: which faces may touch then, and how sure that is."""
+
+from collections.abc import Collection, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from math import hypot, radians
+from typing import final
+
+import numpy as np
+
+from apo_bench.assembly import Contact, Facing, Observation
+from apo_bench.assembly.touching import facing
+from apo_bench.geometry import Array, pose
+from apo_bench.perception.detection.belief import Belief, PartBeliefs
+from apo_bench.perception.detection.candidate import Candidate, judged
+from apo_bench.perception.detection.estimate import GoalEstimate
+from apo_bench.perception.detection.thresholds import PairThresholds, Rules, pair_thresholds
+
+_FLAT_M = 0.2e-3
+_FLAT_RAD = radians(0.3)
+"""Gaps and tilts of so much say nothing of whether faces touch: what is linear here is not more exact."""
+_LOOSE = PairThresholds(2e-3, radians(2.0))
+"""Added to the bounds of two parts, since overlaps lie off their middles."""
+_NARROW_M = 10e-3
+"""Overlaps that parts with play may tilt in are about as narrow."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Situation:
+    """The parts after operation k, the last of those that were estimated."""
+
+    seen: Observation
+    others: tuple[str, ...]
+    """The parts that stand there, and are not moved by the operation."""
+    estimate: GoalEstimate
+
+    @property
+    def k(self) -> int:
+        """The operation, counted from 0."""
+        return len(self.estimate.goals) - 1
+
+    @property
+    def moves(self) -> tuple[str, ...]:
+        """The parts that it moved."""
+        return self.seen.assembly.operations[self.k].moves
+
+    @cached_property
+    def now(self) -> PartBeliefs:
+        """Where every part is, and what errors of the goals do to it."""
+        known = self.estimate
+        return Belief(known.assembly, self.seen.start, known.goals, known.covariance).standing(self.k)
+
+    def pairs(self) -> Iterator[tuple[str, str]]:
+        """A part that was moved and one that stands there, both where something was seen."""
+        for a in self.moves:
+            for b in self.others:
+                if not self._reach(a, b).reshape(6, -1, 6)[:, ~self.seen.seen[: self.k + 1]].any():
+                    yield a, b
+
+    def variances(self, a: str, b: str, directions: Array, at: Array) -> Array:
+        """How uncertain it is where a point of part a, at (3,), is beside part b along directions, (k, 3), [m^2]."""
+        # A world twist (v, w) moves a point p by v + w x p, so along d by d . v + (p x d) . w.
+        J = np.concatenate([directions, np.cross(at, directions)], axis=1) @ self._reach(a, b)
+        return np.maximum(np.einsum("ki,ij,kj->k", J, self.estimate.covariance, J), 0.0)
+
+    def middle(self, part: str) -> Array:
+        """The middle of the box around a part, (3,), world, [m]."""
+        return pose.apply(self.now.poses[part], self.seen.assembly.solids[part].bounds.mean(axis=0)[None])[0]
+
+    def candidates(self, rules: Rules, taken: Collection[Contact]) -> tuple[Candidate, ...]:
+        """The pairs of faces within the thresholds that were not taken yet."""
+        candidates = list[Candidate]()
+        for a, b in self.pairs():
+            known = {(m.face, e.face) for m, e in taken if (m.part, e.part) == (a, b)}
+            of_a = self.seen.assembly.solids[a]
+            of_b = self.seen.assembly.solids[b]
+            most = self._bounds(rules, a, b)
+            bounds = {"gap_m": most.gap_m, "angle_rad": most.angle_rad, "share": rules.share}
+            for pair in facing(of_a, self.now.poses[a], of_b, self.now.poses[b], **bounds, known=known):
+                candidates += self._judged(rules, a, b, pair)
+        return tuple(candidates)
+
+    def _judged(self, rules: Rules, a: str, b: str, pair: Facing) -> Iterator[Candidate]:
+        """The pair as a candidate, if it is one."""
+        J = pair.slope @ self._reach(a, b)
+        C = J @ self.estimate.covariance @ J.T
+        candidate = judged(self.seen, rules, a, b, self.now.poses[b], pair, J, C)
+        if candidate is not None:
+            soft = candidate.noise + np.diag([_FLAT_M**2] * pair.lengths + [_FLAT_RAD**2] * (len(C) - pair.lengths))
+            room = J @ self.estimate.room @ J.T
+            gain = float(np.linalg.slogdet(room + soft)[1] - np.linalg.slogdet(C + soft)[1])
+            yield candidate._replace(gain=gain)
+
+    def _bounds(self, rules: Rules, a: str, b: str) -> PairThresholds:
+        """No pair of faces of two parts has wider thresholds: those of the worst point in the worst direction."""
+        at = self.middle(a)
+        reach = self._reach(a, b)
+        shifted = np.concatenate([reach[:3] + np.cross(reach[3:].T, at).T, reach[3:]])
+        C = shifted @ self.estimate.covariance @ shifted.T
+        shift, turn = (max(float(np.linalg.eigvalsh(block)[-1]), 0.0) for block in (C[:3, :3], C[3:, 3:]))
+        boxes = [self.seen.assembly.solids[part].bounds for part in (a, b)]
+        worst = np.diag(
+            [shift + turn * min(float(np.linalg.norm(np.ptp(box, axis=0))) / 2 for box in boxes) ** 2, turn, turn]
+        )
+        play_m = self.seen.play_m
+        loose = PairThresholds(_LOOSE.gap_m + play_m, _LOOSE.angle_rad + 2.0 * hypot(play_m, play_m) / _NARROW_M)
+        return pair_thresholds(rules, worst, loose)
+
+    def _reach(self, a: str, b: str) -> Array:
+        """(6, 6 n): the world twist of part a beside part b that body twists of the goals make."""
+        return self.now.reach[a] - self.now.reach[b]

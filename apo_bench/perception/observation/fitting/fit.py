@@ -1,0 +1,162 @@
+"""Fit the noise of a camera to residuals: tails by maximum likelihood, rates of outliers and of misses."""
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.geometry import Array
+from apo_bench.perception.observation.models import (
+    INLIER_MM,
+    LEAST_FREEDOM,
+    SMALLEST_SCALE,
+    TURNED_DEG,
+    MeasuredNoise,
+    Residuals,
+    Split,
+    log_density_across,
+    log_density_along,
+    of_numbers,
+)
+
+_FEWEST = 30
+"""Four numbers are not fitted to fewer errors."""
+_CHANCE = 1.358
+"""95 % quantile of Kolmogorov's distribution."""
+_BANDS = 5
+PERCENTILES = (25, 50, 75, 90, 95)
+
+
+class Figures(NamedTuple):
+    """What was measured and what the fitted distribution says, by `PERCENTILES`."""
+
+    name: str
+    unit: str
+    observed: Array
+    fitted: Array
+    distance: float
+    """Kolmogorov and Smirnov's distance: the largest difference of the two cumulative distributions."""
+    by_chance: float
+    """What it is not above in 95 % of cases, if errors are independent and distributed like that."""
+
+
+class Band(NamedTuple):
+    """Estimates of similar scores."""
+
+    least: float
+    """Score."""
+    outliers: float
+    """Part of them."""
+
+
+def fit_noise(residuals: Residuals, source: str) -> MeasuredNoise:
+    """The noise that makes the residuals most likely: shifts of upright inliers, turns of those whose turn is known.
+
+    Errors are taken about the truth, not about their mean: a bias of the estimator is part of their size, and the noise
+    that is drawn has none.
+
+    Raises:
+        InputError: Too few inliers, or they are all exactly right.
+    """
+    found = residuals.found
+    upright = residuals.upright
+    known = residuals.turn_known
+    near = f"{INLIER_MM:g} mm and {TURNED_DEG:g} deg"
+    for kept, limit in ((upright, near), (known, f"{near} and do not look alike when turned by any angle")):
+        if kept.sum() < _FEWEST:
+            raise InputError(
+                f"{int(kept.sum())} of {len(kept)} parts have an estimate within {limit}; at least {_FEWEST} are "
+                "needed for a fit, so give more images, or the truth of the same ones."
+            )
+    far = residuals.off_mm[found & ~residuals.inlier]
+    return MeasuredNoise(
+        source=source,
+        shift_mm=fit_split(residuals.shift_mm[upright], INLIER_MM, "places"),
+        turn_deg=fit_split(residuals.turn_deg[known], TURNED_DEG, "rotations"),
+        missed=float(1.0 - found.mean()),
+        outliers=float(1.0 - residuals.inlier.sum() / found.sum()),
+        farthest_mm=INLIER_MM * float(np.exp(2.0 * np.log(far / INLIER_MM).mean())) if len(far) else 2.0 * INLIER_MM,
+    )
+
+
+def fit_split(errors: Array, limit: float, name: str = "errors") -> Split:
+    """The scales and degrees of freedom under which errors (n, 3), all within the limit, are most likely.
+
+    The likelihood is that of the limited distribution, so what is missing beyond the limit is no sign of short tails.
+    """
+    from scipy.optimize import minimize
+
+    r = np.linalg.norm(errors[:, :2], axis=1)
+    x = errors[:, 2]
+    if max(np.median(r), np.median(np.abs(x))) <= SMALLEST_SCALE * limit:
+        raise InputError(
+            f"the {name} that were estimated are the true ones, or nearly: half of them are off by less than "
+            f"{SMALLEST_SCALE * limit:g}; give the estimates of an estimator."
+        )
+
+    def surprise(at: Array) -> float:
+        split = of_numbers(at, limit)
+        seen = log_density_across(split.across, r).mean() + log_density_along(split.along, x).mean()
+        return float(np.log(max(split.inside, 1e-300)) - seen)
+
+    # Medians of a Gaussian: 1.18 s of a length across (Rayleigh), 0.675 s of a size along.
+    low = np.log(SMALLEST_SCALE * limit)
+    high = np.log(limit)
+    start = [np.log(max(size, SMALLEST_SCALE * limit)) for size in (np.median(r) / 1.18, np.median(np.abs(x)) / 0.675)]
+    best = minimize(
+        surprise,
+        [start[0], 0.15, start[1], 0.15],
+        bounds=[(low, high), (0.0, 1.0 / LEAST_FREEDOM)] * 2,
+        method="L-BFGS-B",
+        options={"ftol": 1e-13, "gtol": 1e-7},
+    )
+    return of_numbers(best.x, limit)
+
+
+def outliers_by_score(residuals: Residuals) -> tuple[Band, ...]:
+    """Outlier rates of `_BANDS` as large parts of what was found, the lowest scores first; none without scores."""
+    found = residuals.found & np.isfinite(residuals.score)
+    order = np.argsort(residuals.score[found], kind="stable")
+    if len(order) < _BANDS * _FEWEST:
+        return ()
+    score = residuals.score[found][order]
+    inlier = residuals.inlier[found][order]
+    each = [
+        Band(float(s[0]), 1.0 - float(i.mean()))
+        for s, i in zip(*(np.array_split(x, _BANDS) for x in (score, inlier)), strict=True)
+    ]
+    return tuple(each) if len({band.least for band in each}) == _BANDS else ()
+
+
+def goodness_of_fit(residuals: Residuals, measured: MeasuredNoise) -> tuple[Figures, ...]:
+    """Goodness of fit: of the four distributions that were fitted, to what they were fitted to."""
+    shift = measured.shift_mm
+    turn = measured.turn_deg
+    turned = residuals.turn_deg[residuals.turn_known]
+    tilt = np.linalg.norm(turned[:, :2], axis=1)
+    about = np.abs(turned[:, 2])
+    return (
+        _figures("across the ray", "mm", residuals.across_mm[residuals.upright], shift.cdf_across, shift.limit),
+        _figures("along the ray", "mm", residuals.along_mm[residuals.upright], shift.cdf_along, shift.limit),
+        _figures("tilt", "deg", tilt, turn.cdf_across, turn.limit),
+        _figures("turn about the ray", "deg", about, turn.cdf_along, turn.limit),
+    )
+
+
+def _figures(name: str, unit: str, sizes: Array, cdf: Callable[[Array], Array], limit: float) -> Figures:
+    grid = limit * np.linspace(0.0, 1.0, 2001) ** 2
+    chance = np.maximum.accumulate(cdf(grid))
+    ordered = np.sort(sizes)
+    n = len(sizes)
+    at = np.interp(ordered, grid, chance)
+    # The empirical distribution steps from (i - 1) / n to i / n at the i-th size; the distance is largest at a step.
+    step = np.arange(n + 1) / n
+    return Figures(
+        name=name,
+        unit=unit,
+        observed=np.percentile(sizes, PERCENTILES),
+        fitted=np.interp(np.array(PERCENTILES) / 100.0, chance, grid),
+        distance=float(max((step[1:] - at).max(), (at - step[:-1]).max())),
+        by_chance=_CHANCE / float(np.sqrt(n)),
+    )

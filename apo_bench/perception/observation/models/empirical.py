@@ -1,0 +1,181 @@
+"""Noise that draws from the residuals of a pose estimator themselves; `noise fit --residuals` writes a file of them."""
+
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import ClassVar, final
+
+import numpy as np
+
+from apo_bench.assembly import Assembly, Demonstration, Observation, measured_rates
+from apo_bench.errors import InputError, require
+from apo_bench.geometry import Array, frozen, pose
+from apo_bench.io import CsvRow, read_csv
+from apo_bench.perception.observation.models.camera import Camera
+from apo_bench.perception.observation.models.facts import Facts, Level
+from apo_bench.perception.observation.models.fitted import LEVEL_UNITS, check_measured_level, observe_in_ray_frames
+from apo_bench.perception.observation.models.residuals import Residuals
+
+_INLIER = "inlier"
+_TURNED = "turned"
+_OUTLIER = "outlier"
+_MISSED = "missed"
+_KINDS = (_INLIER, _TURNED, _OUTLIER, _MISSED)
+_ERRORS = ("x_mm", "y_mm", "along_mm", "turn_x_deg", "turn_y_deg", "turn_along_deg")
+_COLUMNS = ("scene_id", "im_id", "obj_id", "kind", *_ERRORS)
+MOST_RESIDUALS = 8000
+"""A file holds no more residuals; of more, every so-many-th is written."""
+_LARGEST_MM = 1e5
+_LARGEST_DEG = 180.01
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """Residuals to draw from, as errors in the frames of rays, [m, rad], whose shift acts in the frame that is seen."""
+
+    inliers: Array
+    """(k, 6), those that are not turned."""
+    outliers: Array
+    """(m, 6)."""
+    missed: float
+    """Part of all that nothing was found for."""
+    gross: float
+    """Part of those that were found, that are outliers."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "inliers", frozen(self.inliers, None, 6))
+        object.__setattr__(self, "outliers", frozen(self.outliers, None, 6))
+
+    @property
+    def covariance(self) -> Array:
+        """(6, 6), of an inlier taken with either sign: its mean square."""
+        return self.inliers.T @ self.inliers / len(self.inliers)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Empirical:
+    """Noise whose every error is one that was measured of a pose estimator, its six numbers drawn together.
+
+    It is taken as it is or with the opposite sign, both alike often, so that it is 0 in the mean: a bias of the
+    estimator becomes part of the spread. Misses and outliers come as often as measured; residuals of inliers whose turn
+    is not known, as the part looks alike when turned, are left out.
+    """
+
+    sample: Sample
+    level: Level
+    camera: Camera = field(default_factory=Camera)
+
+    FACTS: ClassVar[Facts] = Facts(
+        title="the residuals of a pose estimator themselves, drawn at random",
+        formula=("T_seen = T exp(xi), xi = (R_seen^t F d, R^t F w), (d, w) = L times a residual, or minus that",),
+        frame="F of the ray from the camera to the origin of the part, as of the model `camera`",
+        parameters=("all in the file: the residuals, which of them are outliers, and how many parts were missed",),
+        states="the mean square of the residuals of what is no outlier, turned into the part that is seen",
+        notes=("Level 1 is as measured", "At level 0 nothing is missed"),
+        measured=True,
+    )
+
+    def __post_init__(self) -> None:
+        check_measured_level(self.level, self.sample.covariance)
+
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
+        n = len(assembly)
+        sample = self.sample
+        # Columns of chance: which residual, whether an outlier, whether missed; drawn for all, whatever comes of them.
+        chance = rng.random((n, 3))
+        sign = rng.choice([-1.0, 1.0], (n, 1))
+        errors = _picked(sample.inliers, chance[:, 0])
+        if len(sample.outliers):
+            errors = np.where(chance[:, 1:2] < sample.gross, _picked(sample.outliers, chance[:, 0]), errors)
+        missed = chance[:, 2] < sample.missed
+        seen = observe_in_ray_frames(
+            self.camera, self.level, demonstration, assembly, sign * errors, sample.covariance, missed
+        )
+        return replace(seen, outliers=measured_rates(sample.gross))
+
+
+def empirical_noise(path: Path, level: Level) -> Empirical:
+    """The noise model of a file of residuals; a file is read once.
+
+    Raises:
+        InputError: Anything in the file that is not as described, with the line where it stands.
+    """
+    try:
+        state = path.stat()
+    except (OSError, ValueError) as error:
+        raise InputError(
+            f"{path}: the file of residuals cannot be read; check the path behind 'empirical:'."
+        ) from error
+    return Empirical(_read_once(path, state.st_mtime_ns, state.st_size), level)
+
+
+def residuals_text(residuals: Residuals) -> str:
+    """A file of residuals: one row for every part that was there, mm and degrees in the frame of its ray."""
+    every = -(-len(residuals.where) // MOST_RESIDUALS)
+    lines = [",".join(_COLUMNS)]
+    for k in range(0, len(residuals.where), every):
+        kind = _kind_of(residuals, k)
+        numbers = np.concatenate([residuals.shift_mm[k], residuals.turn_deg[k]])
+        cells = [""] * 6 if kind == _MISSED else [f"{x:.3f}" for x in numbers]
+        lines.append(",".join([*map(str, residuals.where[k].tolist()), kind, *cells]))
+    return "\n".join(lines) + "\n"
+
+
+def _kind_of(residuals: Residuals, k: int) -> str:
+    """What became of one part."""
+    if not residuals.found[k]:
+        return _MISSED
+    if not residuals.inlier[k]:
+        return _OUTLIER
+    return _INLIER if residuals.turn_known[k] else _TURNED
+
+
+def read_residuals(path: str | Path) -> Sample:
+    """The residuals of a file; see `empirical_noise`."""
+    columns = {name: (name, 1.0) for name in _COLUMNS}
+    errors: dict[str, list[list[float]]] = {kind: [] for kind in _KINDS}
+    for row in read_csv(path, columns, _COLUMNS):
+        kind = row.text("kind")
+        if kind not in _KINDS:
+            row.fail("kind", f"{', '.join(_KINDS[:-1])} or {_KINDS[-1]} is needed")
+        errors[kind].append([] if kind == _MISSED else _error(row))
+    count = {kind: len(estimates) for kind, estimates in errors.items()}
+    estimates = sum(count.values()) - count[_MISSED]
+    require(
+        count[_INLIER], f"{path}: no residual of an inlier stands in the file; write one with noise fit --residuals."
+    )
+    return Sample(
+        inliers=_acting_where_seen(errors[_INLIER]),
+        outliers=_acting_where_seen(errors[_OUTLIER]),
+        missed=count[_MISSED] / (estimates + count[_MISSED]),
+        gross=count[_OUTLIER] / estimates,
+    )
+
+
+@lru_cache(maxsize=8)
+def _read_once(path: Path, _changed: int, _size: int) -> Sample:
+    return read_residuals(path)
+
+
+def _error(row: CsvRow) -> list[float]:
+    return [row.number(name, _LARGEST_MM if name.endswith("_mm") else _LARGEST_DEG) for name in _ERRORS]
+
+
+def _acting_where_seen(errors: list[list[float]]) -> Array:
+    """Residuals [mm, deg] as the errors (d, w) [m, rad] that `Camera.twists` takes.
+
+    There a part that is turned by w is shifted by V(-w) d, with V of the exponential exp(d, w) = (exp w, V(w) d): so d
+    is the shift that was measured, times the inverse of V(-w), and the pose that was estimated comes back exactly.
+    """
+    # log of the pose with rotation exp(-w) and position d is (V(-w)^-1 d, -w).
+    measured = np.array(errors).reshape(-1, 6) * LEVEL_UNITS
+    back = np.concatenate([np.zeros((len(measured), 3)), -measured[:, 3:]], axis=1)
+    T = pose.exp(back)
+    T[:, :3, 3] = measured[:, :3]
+    return np.concatenate([pose.log(T)[:, :3], measured[:, 3:]], axis=1)
+
+
+def _picked(rows: Array, chance: Array) -> Array:
+    return rows[np.minimum((chance * len(rows)).astype(np.int64), len(rows) - 1)]

@@ -1,0 +1,230 @@
+"""How cameras fail: some operations are seen where their part is not, with the covariance of a right pose.
+
+What is false is drawn apart from the noise, so that a later look can repeat it: a model keeps no state.
+"""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from types import MappingProxyType
+from typing import NamedTuple, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly import Assembly, Demonstration, Observation, measured_rates, placements
+from apo_bench.errors import require
+from apo_bench.geometry import Array, approximate_symmetries, pose
+from apo_bench.perception.observation.models.camera import Camera
+from apo_bench.perception.observation.models.displaced import observe_displaced
+from apo_bench.perception.observation.models.facts import Facts, Level
+
+RATE = 0.3
+"""Share of operations that are seen falsely."""
+NEAREST_M = 0.02
+FARTHEST_M = 0.06
+"""An error along the ray."""
+VIEW_SHIFT_M = 0.02
+VIEW_TURN_RAD = float(np.radians(5.0))
+"""Standard deviations of the displacement of a view, along and about each axis."""
+_MOST_REPEAT = 0.999
+"""A corrector is told no more than this, which no number of looks proves."""
+
+
+class FalseViews(NamedTuple):
+    """What is false in one look at n operations."""
+
+    false: NDArray[np.bool_]
+    """(n,)."""
+    goals: Array
+    """(n, 4, 4), where the parts seem to be before any noise, world frame, [m]; the true goals where nothing is."""
+
+
+class Failure(NamedTuple):
+    """A way in which a camera fails, and how often."""
+
+    displace: Callable[[Array, Demonstration, Camera, float, np.random.Generator], None]
+    """(goals (n, 4, 4), shown, camera, rate, rng): replaces those of the goals that are false, in place."""
+    title: str
+    formula: str
+    notes: tuple[str, ...] = ()
+    rate: float = RATE
+    """Share of operations."""
+    by_part: bool = True
+    """Whether operations on different parts fail independently of each other."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class CameraFailures:
+    """Isotropic noise about poses some of which are false: a mixture of failures. At level 0 nothing is false."""
+
+    level: Level
+    failures: tuple[Failure, ...]
+    """One after the other."""
+    repeat: float = 0.0
+    """Probability that a later look repeats what was false in the first one."""
+    camera: Camera = field(default_factory=Camera)
+
+    def __post_init__(self) -> None:
+        shares = [("failures", failure.rate) for failure in self.failures]
+        for name, share in (*shares, ("repeated failures", self.repeat)):
+            require(0.0 <= share <= 1.0, f"a share of {name} of {share:g} was given; give a number from 0 to 1.")
+
+    @property
+    def FACTS(self) -> Facts:
+        """What its card prints."""
+        formula = ", or ".join(failure.formula for failure in self.failures)
+        notes = [note for failure in self.failures for note in failure.notes]
+        return Facts(
+            title=", or ".join(failure.title for failure in self.failures),
+            formula=(f"T_seen = S exp(L e), {formula} of a failure, else S = T",),
+            frame="of the part that is seen, the same in every direction",
+            parameters=(
+                f"p = {RATE:g} if nothing else is stated: share of operations that fail",
+                "r = 0 if nothing else is stated: probability that a later look repeats what was false in the first",
+            ),
+            states="L^2, the covariance of what is no failure, with p, r and where the camera stands",
+            notes=(*notes, "At level 0 nothing fails; how far a failure is off does not depend on the level"),
+        )
+
+    @property
+    def by_part(self) -> bool:
+        """Whether errors of operations on different parts are independent."""
+        return all(failure.by_part for failure in self.failures)
+
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
+        return self._observe(demonstration, rng, self.draw_false(demonstration, rng))
+
+    def again(
+        self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator, first: np.random.Generator
+    ) -> Observation:
+        """A later look.
+
+        Args:
+            first: A fresh copy of the generator that the first observation was drawn from.
+        """
+        before = self.draw_false(demonstration, first)
+        now = self.draw_false(demonstration, rng)
+        repeated = before.false & (rng.random(len(assembly)) < self.repeat)
+        goals = np.where(repeated[:, None, None], before.goals, now.goals)
+        return self._observe(demonstration, rng, FalseViews(repeated | now.false, goals))
+
+    def draw_false(self, demonstration: Demonstration, rng: np.random.Generator) -> FalseViews:
+        """What a first look has wrong: the first draws of `__call__`."""
+        goals = demonstration.goals.copy()
+        if max(self.level) > 0.0 and len(goals):
+            for failure in self.failures:
+                failure.displace(goals, demonstration, self.camera, failure.rate, rng)
+        return FalseViews(np.abs(goals - demonstration.goals).max(axis=(1, 2), initial=0.0) > 0.0, goals)
+
+    def _observe(self, demonstration: Demonstration, rng: np.random.Generator, views: FalseViews) -> Observation:
+        sigma = self.level.sigma()
+        xi = rng.standard_normal((len(views.goals), 6)) * sigma
+        seeming = replace(demonstration, goals=views.goals)
+        seen = observe_displaced(demonstration.assembly, seeming, xi, np.diag(sigma**2))
+        x, y, z = self.camera.T_world_camera[:3, 3].tolist()
+        gross = min(1.0, sum(failure.rate for failure in self.failures))
+        rates = replace(measured_rates(gross, 0.0), repeat=min(self.repeat, _MOST_REPEAT), camera_m=(x, y, z))
+        return replace(seen, outliers=rates)
+
+
+def draw_failing(n: int, rate: float, rng: np.random.Generator) -> list[int]:
+    """The operations that are false, each as likely."""
+    return [int(k) for k in np.flatnonzero(rng.random(n) < rate)]
+
+
+def _flip(goals: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
+    """Parts are seen turned by one of their approximate symmetries, T F; one that has none is seen rightly."""
+    assembly = shown.assembly
+    for k in draw_failing(len(goals), rate, rng):
+        turns = approximate_symmetries(assembly.solids[assembly.operations[k].main]).turns
+        if len(turns):
+            goals[k] = goals[k] @ turns[rng.integers(len(turns))]
+
+
+def _leave_behind(goals: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
+    """Parts are seen where they were before the operation moved them."""
+    before = (shown.start, *placements(shown.assembly, shown.start, shown.goals))
+    for k in draw_failing(len(goals), rate, rng):
+        goals[k] = before[k][shown.assembly.operations[k].main]
+
+
+def _swap(goals: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
+    """The views of two operations on like parts are exchanged; where no two parts are alike, of any two."""
+    assembly = shown.assembly
+    parts = [operation.main for operation in assembly.operations]
+    free = set(range(len(parts)))
+    for k in range(len(parts)):
+        # Both of a pair are false, so each operation starts one with half the rate.
+        starts = rng.random() < rate / 2.0
+        others = [i for i in sorted(free - {k}) if parts[i] != parts[k]]
+        like = [i for i in others if assembly.solids[parts[i]] is assembly.solids[parts[k]]] or others
+        if starts and k in free and like:
+            i = like[int(rng.integers(len(like)))]
+            goals[[k, i]] = shown.goals[[i, k]]
+            free -= {i, k}
+
+
+def _shift_along_ray(goals: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
+    """Parts are seen 20 to 60 mm too near or too far, on the ray of the camera."""
+    rays = camera.rays(goals)
+    for k in draw_failing(len(goals), rate, rng):
+        goals[k, :3, 3] += rays[k] * rng.choice((-1.0, 1.0)) * rng.uniform(NEAREST_M, FARTHEST_M)
+
+
+def _displace_view(goals: Array, shown: Demonstration, camera: Camera, rate: float, rng: np.random.Generator) -> None:
+    """Operations one after the other, as many as the rate says and two at least, share one displacement."""
+    many = min(len(goals), max(2, round(rate * len(goals)))) if rate > 0.0 else 0
+    first = int(rng.integers(len(goals) - many + 1))
+    error = rng.standard_normal(6) * np.repeat([VIEW_SHIFT_M, VIEW_TURN_RAD], 3)
+    # T -> P exp(e) P^-1 T, P the axes of the camera in the middle of what is displaced.
+    view = slice(first, first + many)
+    if many:
+        P = camera.T_world_camera.copy()
+        P[:3, 3] = goals[view, :3, 3].mean(axis=0)
+        goals[view] = P @ pose.exp(error) @ pose.inverse(P) @ goals[view]
+
+
+PRESETS: Mapping[str, Failure] = MappingProxyType(
+    {
+        "flips": Failure(
+            _flip,
+            "parts that nearly look the same after a turn are seen turned",
+            "S = T F, F one of the turns after which the part nearly fills the same space",
+            ("A part without such a turn is seen rightly",),
+        ),
+        "stale": Failure(
+            _leave_behind,
+            "parts are seen where they were before they were moved",
+            "S the pose of the part before the operation",
+        ),
+        "swaps": Failure(
+            _swap,
+            "two parts are taken for each other",
+            "S the pose of another operation, which has this one's",
+            ("Operations on like parts are exchanged, of any two parts where none are alike",),
+            by_part=False,
+        ),
+        "rays": Failure(
+            _shift_along_ray,
+            "parts are seen too near or too far",
+            f"S = T shifted by {1e3 * NEAREST_M:g} to {1e3 * FARTHEST_M:g} mm towards the camera or away",
+        ),
+        "displaced-view": Failure(
+            _displace_view,
+            "operations in a row are displaced together",
+            "S = P exp(c) P^-1 T, P the axes of the camera in the middle of them, one c",
+            (
+                f"c: {1e3 * VIEW_SHIFT_M:g} mm and {np.degrees(VIEW_TURN_RAD):g} deg along and about each axis",
+                "As many as p says, two at least",
+            ),
+            by_part=False,
+        ),
+    }
+)
+"""Failures that have a name."""
+
+
+def make_failures(name: str, level: Level, rate: float = RATE, repeat: float = 0.0) -> CameraFailures:
+    """The camera that fails in one way only, by the name of that."""
+    return CameraFailures(level, (PRESETS[name]._replace(rate=rate),), repeat)

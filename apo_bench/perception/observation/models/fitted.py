@@ -1,0 +1,237 @@
+"""Noise with the tails, outliers and misses that were measured of a pose estimator; `noise fit` writes its numbers.
+
+It is drawn, or stated of an observation that a camera of this noise has made.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, NamedTuple, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError, Tails, measured_rates
+from apo_bench.errors import InputError
+from apo_bench.geometry import Array, pose
+from apo_bench.perception.observation.models.camera import Camera
+from apo_bench.perception.observation.models.displaced import displaced, floored, observe_displaced, with_shared
+from apo_bench.perception.observation.models.facts import Facts, Level
+from apo_bench.perception.observation.models.outliers import UNSEEN_DEVIATION, last_seen
+from apo_bench.perception.observation.models.tails import Split
+
+SMALLEST_SCALE = 1e-4
+LEAST_FREEDOM = 0.5
+"""Least scale, as a part of the limit, and least degrees of freedom, of a tail that is fitted or read."""
+LEVEL_UNITS = np.repeat([1e-3, np.radians(1.0)], 3)
+"""[m] per mm and [rad] per degree."""
+_GAUSSIAN = 1e9
+"""Degrees of freedom of a Gaussian, as good as infinitely many."""
+_AS_MEASURED = Level(1.0, 1.0)
+LARGEST_M = 0.4
+LARGEST_RAD = 2.0
+"""A standard deviation per axis beyond which a level makes no sense."""
+
+
+class ViewNoise(NamedTuple):
+    """Standard deviations per axis of an error of the whole view, one for each demonstration."""
+
+    shift_mm: float
+    turn_deg: float
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class ConstantError:
+    """A displacement of everything that a camera sees, T_seen = P exp(c) P^-1 T, always the same."""
+
+    twist: Array
+    """(6,), c, [m, rad]."""
+    frame: Array
+    """(4, 4), P, world, [m]."""
+
+
+@final
+@dataclass(frozen=True)
+class MeasuredNoise:
+    """The noise of a pose estimator, as a file states it."""
+
+    source: str
+    """Which estimator on which data, and where the numbers are from."""
+    shift_mm: Split
+    """Where parts are taken to be, those that are found."""
+    turn_deg: Split
+    """How parts are taken to be turned, those that are found and not turned by more than its limit."""
+    missed: float
+    """Part of all that nothing was found for."""
+    outliers: float
+    """Part of those that were found, that are off by more than the limit of the shift."""
+    farthest_mm: float
+    """Outliers are off by the limit to this, alike in each octave."""
+    view: ViewNoise | None = None
+    """What all operations of a demonstration share."""
+    constant: ConstantError | None = None
+    """What stays from demonstration to demonstration; it is not drawn, since it can be taken out."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """Every goal is seen at `T exp(xi)`, xi of the error (x, y, along; rx, ry, about) that is drawn in its ray's frame.
+
+    Level 1 is as measured: its mm multiply every shift and its degrees every turn, also those of outliers. Neither
+    changes which operations are outliers or missed, but at level 0 all is seen as shown. The covariance is that of
+    inliers; an observation does not know which of its goals are outliers, only how often there are any.
+    """
+
+    measured: MeasuredNoise
+    level: Level
+    camera: Camera = field(default_factory=Camera)
+
+    FACTS: ClassVar[Facts] = Facts(
+        title="the tails, outliers and misses that were fitted to a pose estimator",
+        formula=(
+            "T_seen = T exp(xi), xi = (R_seen^t F d, R^t F w)",
+            "d = L (s1 t1 / sqrt(c1 / n1), s2 e3 / sqrt(c2 / n2)), t1 = (e1, e2), w alike; no |d|, |w| above its limit",
+            "of an outlier: |d| log-uniform from the limit to the farthest, any direction, any turn; times L",
+        ),
+        frame="F of the ray from the camera to the origin of the part, as of the model `camera`",
+        parameters=("all in the file: scales s, degrees of freedom n, limits, shares of outliers and misses, source",),
+        states="that of what is no outlier, within the limits, turned into the part that is seen, and its tails",
+        notes=("Level 1 is as measured", "At level 0 nothing is missed"),
+        measured=True,
+    )
+
+    def __post_init__(self) -> None:
+        check_measured_level(self.level, self.covariance)
+
+    @property
+    def covariance(self) -> Array:
+        """(6, 6), of inliers at level 1 in the frame of the ray, [m, rad]."""
+        across, along = self.measured.shift_mm.variances
+        out, about = self.measured.turn_deg.variances
+        return np.diag(np.array([across, across, along, out, out, about]) * LEVEL_UNITS**2)
+
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
+        n = len(assembly)
+        measured = self.measured
+        errors = np.concatenate([measured.shift_mm.draw(n, rng), measured.turn_deg.draw(n, rng)], axis=1)
+        gross = _gross(measured, n, rng)
+        chance = rng.random((n, 2))
+        errors = np.where(chance[:, :1] < measured.outliers, gross, errors)
+        missed = chance[:, 1] < measured.missed
+        seen = observe_in_ray_frames(
+            self.camera, self.level, demonstration, assembly, errors * LEVEL_UNITS, self.covariance, missed
+        )
+        tails = stated_tails(measured, self.level, self.camera, seen.goals) if min(self.level) > 0.0 else None
+        seen = replace(seen, outliers=measured_rates(measured.outliers), tails=tails)
+        return seen if measured.view is None else self._displaced(seen, rng.standard_normal(6))
+
+    def _displaced(self, seen: Observation, unit: Array) -> Observation:
+        """What is seen if the whole view is off as well."""
+        sigma = np.repeat(self.measured.view or (0.0, 0.0), 3) * LEVEL_UNITS * np.repeat(self.level, 3)
+        if not sigma.any() or not len(seen.goals):
+            return seen
+        # E = P exp(e) P^-1 displaces all that is seen alike, about the middle of it.
+        P = view_frame(self.camera, [seen.goals])
+        goals = P @ pose.exp(sigma * unit) @ pose.inverse(P) @ seen.goals
+        return with_shared(replace(seen, goals=goals), view_error(self.camera, goals, sigma))
+
+
+def restated(observation: Observation, measured: MeasuredNoise, camera: Camera) -> Observation:
+    """What was seen, a constant error of the camera taken out, with the covariances of measured noise.
+
+    Covariances that it stated itself are not looked at, but for those of operations that were not seen.
+    """
+    goals = np.array(observation.goals)
+    if measured.constant is not None:
+        # T_seen = P exp(c) P^-1 T, so T = P exp(-c) P^-1 T_seen.
+        P = measured.constant.frame
+        goals = P @ pose.exp(-measured.constant.twist) @ pose.inverse(P) @ goals
+    stated = floored(camera.covariance(goals, Fitted(measured, _AS_MEASURED, camera).covariance))
+    stated = np.where(observation.seen[:, None, None], stated, observation.covariance)
+    tails = stated_tails(measured, _AS_MEASURED, camera, goals)
+    seen = replace(observation, goals=goals, covariance=stated, shared=(), tails=tails)
+    if measured.view is None or not any(measured.view) or not len(goals):
+        return seen
+    return with_shared(seen, view_error(camera, goals, np.repeat(measured.view, 3) * LEVEL_UNITS))
+
+
+def stated_tails(measured: MeasuredNoise, level: Level, camera: Camera, goals: Array) -> Tails:
+    """The tails of inliers, in the frames of the rays on which parts are seen."""
+    shift = measured.shift_mm
+    turn = measured.turn_deg
+    units = np.repeat(LEVEL_UNITS[[0, 3]] * level, 2)
+    each = (shift.across, shift.along, turn.across, turn.along)
+    return Tails(
+        frames=np.swapaxes(goals[:, :3, :3], 1, 2) @ camera.frames(goals),
+        scales=np.array([tail.scale for tail in each]) * units,
+        freedom=np.minimum([tail.freedom for tail in each], _GAUSSIAN),
+        variances=np.array([*shift.variances, *turn.variances]) * units**2,
+        limits=np.array([shift.limit, turn.limit]) * units[[0, 2]],
+    )
+
+
+def view_error(camera: Camera, goals: Array, sigma: Array) -> SharedError:
+    """An error of the whole view with standard deviations (6,), about the middle of what is seen, [m, rad]."""
+    return SharedError("camera", tuple(range(len(goals))), np.diag(sigma**2), view_frame(camera, [goals]))
+
+
+def view_frame(camera: Camera, goals: Sequence[Array]) -> Array:
+    """The axes of a camera in the middle of all goals, (4, 4), world, [m]."""
+    P = camera.T_world_camera.copy()
+    P[:3, 3] = np.concatenate([T[:, :3, 3] for T in goals]).mean(axis=0)
+    return P
+
+
+def check_measured_level(level: Level, covariance: Array) -> None:
+    """Refuse a level at which what is measured would be worse than `LARGEST_M`, `LARGEST_RAD`.
+
+    Args:
+        covariance: (6, 6), at level 1, [m, rad].
+    """
+    worst = np.sqrt(np.diagonal(covariance).reshape(2, 3).max(axis=1))
+    for value, deviation, largest, unit in zip(level, worst, (LARGEST_M, LARGEST_RAD), ("mm", "degrees"), strict=True):
+        if value * deviation > largest:
+            raise InputError(
+                f"a level of {value:g} {unit} was given for noise that is measured, where 1 is as measured; at most "
+                f"{np.floor(10.0 * largest / deviation) / 10.0:g} is allowed, else parts are seen outside the room."
+            )
+
+
+def observe_in_ray_frames(
+    camera: Camera,
+    level: Level,
+    demonstration: Demonstration,
+    assembly: Assembly,
+    errors: Array,
+    covariance: Array,
+    missed: NDArray[np.bool_],
+) -> Observation:
+    """What a camera reports that makes these errors.
+
+    Args:
+        errors: (n, 6), at level 1, in the frames of the rays: (x, y, along; rx, ry, about), [m, rad].
+        covariance: (6, 6), of inliers, alike.
+        missed: (n,), what nothing is found for.
+    """
+    scale = np.repeat([level.mm, level.deg], 3)
+    xi = camera.twists(demonstration.goals, errors * scale)
+    stated = camera.covariance(displaced(demonstration.goals, xi), covariance * np.outer(scale, scale))
+    seen = observe_displaced(assembly, demonstration, xi, stated)
+    missed = missed & (max(level) > 0.0)
+    goals = seen.goals.copy()
+    stated = seen.covariance.copy()
+    goals[missed] = last_seen(assembly, demonstration.start, goals, ~missed)[missed]
+    stated[missed] = np.diag(UNSEEN_DEVIATION**2)
+    return replace(seen, goals=goals, covariance=stated, seen=~missed)
+
+
+def _gross(measured: MeasuredNoise, n: int, rng: np.random.Generator) -> Array:
+    """Errors (n, 6) of outliers, [mm, deg]: any direction, any rotation."""
+    # Gaussian vectors have any direction alike often, Gaussian quaternions any rotation; log-uniform sizes.
+    direction = rng.standard_normal((n, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    size = measured.shift_mm.limit * (measured.farthest_mm / measured.shift_mm.limit) ** rng.random((n, 1))
+    q = rng.standard_normal((n, 4))
+    turned = pose.log(pose.unpack(np.concatenate([np.zeros((n, 3)), q], axis=1)))[:, 3:]
+    return np.concatenate([direction * size, np.degrees(turned)], axis=1)

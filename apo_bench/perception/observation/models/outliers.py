@@ -1,0 +1,86 @@
+"""Gross outliers and misses: some operations are seen quite wrongly, some not at all."""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar, final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from apo_bench.assembly import Assembly, Demonstration, Observation, Poses, measured_rates
+from apo_bench.geometry import Array, frozen
+from apo_bench.perception.observation.models.displaced import observe_displaced
+from apo_bench.perception.observation.models.facts import Facts, Level
+
+OUTLIERS = 0.1
+MISSES = 0.02
+"""Share of operations that are seen quite wrongly, and that are not seen."""
+OUTLIER_TIMES = 10.0
+"""An outlier errs by so many times the level."""
+UNSEEN_DEVIATION = frozen(np.repeat([0.5, np.pi / 2.0], 3), 6)
+"""Standard deviation that is stated of what was not seen, [m, rad]."""
+
+
+@final
+@dataclass(frozen=True)
+class Outliers:
+    """Isotropic noise in which some errors are many times larger, unannounced, and some operations are missed.
+
+    What is stated is the covariance of an error that is no outlier, as an estimator states it that does not know that
+    it is wrong; `inflation` says how much larger the covariance of all errors is. Shares do not depend on the level:
+    the same operations are outliers and missed at every level, but for level 0, at which everything is seen as shown.
+    """
+
+    level: Level
+    outliers: float = OUTLIERS
+    misses: float = MISSES
+    times: float = OUTLIER_TIMES
+
+    FACTS: ClassVar[Facts] = Facts(
+        title="gross outliers that do not say so, and operations that are missed",
+        formula=("T_seen = T exp(L e), or, of an outlier, T exp(m L e)", "of a miss: seen = false"),
+        frame="of the part that is seen, the same in every direction",
+        parameters=(
+            f"p = {OUTLIERS:g}: share of outliers among what is seen",
+            f"q = {MISSES:g}: share of misses",
+            f"m = {OUTLIER_TIMES:g}: an outlier errs m times as much",
+        ),
+        states=(
+            f"L^2, the covariance of what is no outlier; that of all errors is 1 + p (m^2 - 1) = "
+            f"{1.0 + OUTLIERS * (OUTLIER_TIMES**2 - 1.0):g} times as large"
+        ),
+        notes=(
+            f"A missed operation has the pose at which its part was seen last, or started, with "
+            f"{UNSEEN_DEVIATION[0]:g} m and {np.degrees(UNSEEN_DEVIATION[3]):g} deg: most methods refuse it",
+            "At level 0 nothing is missed",
+        ),
+    )
+
+    @property
+    def inflation(self) -> float:
+        """Covariance of the errors of all that is seen, over the one that is stated."""
+        return 1.0 + self.outliers * (self.times**2 - 1.0)
+
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
+        sigma = self.level.sigma()
+        unit = rng.standard_normal((len(assembly), 6))
+        chance = rng.random((len(assembly), 2))
+        times = np.where(chance[:, :1] < self.outliers, self.times, 1.0)
+        seen = observe_displaced(assembly, demonstration, unit * times * sigma, np.diag(sigma**2))
+        missed = (chance[:, 1] < self.misses) & (max(self.level) > 0.0)
+        goals = seen.goals.copy()
+        covariance = seen.covariance.copy()
+        goals[missed] = last_seen(assembly, demonstration.start, goals, ~missed)[missed]
+        covariance[missed] = np.diag(UNSEEN_DEVIATION**2)
+        stated = measured_rates(0.0, self.outliers, self.times) if self.times > 1.0 else None
+        return replace(seen, goals=goals, covariance=covariance, seen=~missed, outliers=stated)
+
+
+def last_seen(assembly: Assembly, start: Poses, goals: Array, seen: NDArray[np.bool_]) -> Array:
+    """Where the part of each operation was last seen, (n, 4, 4): at an operation that was seen, or at its start."""
+    now = dict(start)
+    out = goals.copy()
+    for k, operation in enumerate(assembly.operations):
+        if seen[k]:
+            now[operation.main] = goals[k]
+        out[k] = now.get(operation.main, np.eye(4))
+    return out

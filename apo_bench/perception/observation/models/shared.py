@@ -1,0 +1,133 @@
+"""Errors that operations share: of the model of a part, of where the camera believes to be, and of what drifts."""
+
+from dataclasses import dataclass, field
+from typing import ClassVar, final
+
+import numpy as np
+
+from apo_bench.assembly import Assembly, Demonstration, Observation, SharedError, first_order
+from apo_bench.geometry import Array, pose
+from apo_bench.perception.observation.models.camera import Camera
+from apo_bench.perception.observation.models.displaced import observe_displaced, observe_shared
+from apo_bench.perception.observation.models.facts import Facts, Level
+from apo_bench.perception.observation.models.fitted import view_error, view_frame
+
+OWN = 1.0 / 20.0
+"""What operations that share an error err by themselves, as part of the level."""
+OWN_FACT = f"o = {OWN:g}: part of the level by which each operation errs alone"
+CORRELATION = 0.9
+"""Between the errors of an operation and the next."""
+
+
+@final
+@dataclass(frozen=True)
+class Bias:
+    """Every part has one body twist, drawn per trial, by which it is wrong in every operation that moves it.
+
+    Zero on average over seeds, not over the operations of a trial. Corrections that take the errors of a part in two
+    operations for independent ones are told too much.
+    """
+
+    level: Level
+
+    FACTS: ClassVar[Facts] = Facts(
+        title="one constant error per part, the same in every operation that moves it",
+        formula=("T_seen_k = T_k exp(L e_part + o L e_k)",),
+        frame="of the part: as if the origin of its model were in the wrong place",
+        parameters=(OWN_FACT,),
+        states="(1 + o^2) L^2 in every direction, over seeds, and that operations share L^2 of it, one error per part",
+    )
+
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
+        sigma = self.level.sigma()
+        parts = sorted(assembly.solids)
+        unit = dict(zip(parts, rng.standard_normal((len(parts), 6)), strict=True))
+        own = rng.standard_normal((len(assembly), 6)) * OWN * sigma
+        mains = [operation.main for operation in assembly.operations]
+        xi = np.array([unit[main] for main in mains]).reshape(-1, 6) * sigma
+
+        def shared(goals: Array) -> list[SharedError]:
+            rows = {main: tuple(k for k, other in enumerate(mains) if other == main) for main in mains}
+            return [SharedError(main, k, np.diag(sigma**2)) for main, k in rows.items()]
+
+        return observe_shared(assembly, demonstration, xi + own, OWN * sigma, shared)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class BiasView:
+    """One displacement E of the world, drawn per trial, takes every part to where it is seen, but for a small part.
+
+    What parts are to each other is seen almost without error, what they are to the fixed parts is not. E turns about
+    the middle of the operations' goals, where its size is the level; about the camera, a degree would be 16 mm.
+    The twist by which an operation is wrong, xi = Ad(T^-1 P) e with P the camera's axes in that middle, is the same
+    computed from shown poses and from seen ones. What is stated is about the middle of what was seen, so that nothing
+    of the truth is in it; seen from there, e has the same distribution.
+    """
+
+    level: Level
+    camera: Camera = field(default_factory=Camera)
+
+    FACTS: ClassVar[Facts] = Facts(
+        title="one constant error of the view, common to all parts and operations",
+        formula=("T_seen_k = T_k exp(Ad(T_k^-1 P) L e + o L e_k), the same e for all k",),
+        frame="P with the axes of the camera, in the middle of all goals",
+        parameters=(OWN_FACT,),
+        states="Ad(T_k^-1 P) L^2 Ad(T_k^-1 P)^t + o^2 L^2, over seeds, and that operations share the first: parts far "
+        "from the middle are less well placed",
+    )
+
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
+        sigma = self.level.sigma()
+        unit = rng.standard_normal(6)
+        own = rng.standard_normal((len(assembly), 6)) * OWN * sigma
+        if not len(assembly):
+            return observe_displaced(assembly, demonstration, np.zeros((0, 6)), np.diag(sigma**2))
+        view = pose.adjoint(pose.inverse(demonstration.goals) @ view_frame(self.camera, [demonstration.goals]))
+
+        def shared(goals: Array) -> list[SharedError]:
+            return [view_error(self.camera, goals, sigma)]
+
+        return observe_shared(assembly, demonstration, view @ (unit * sigma) + own, OWN * sigma, shared)
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Correlated:
+    """Isotropic Gaussian noise whose errors follow a first-order autoregression from operation to operation.
+
+    It drifts in the axes of the camera, whatever part is moved, as with a mount that warms up. After any number of
+    operations its standard deviation is the level.
+    """
+
+    level: Level
+    camera: Camera = field(default_factory=Camera)
+    correlation: float = CORRELATION
+
+    FACTS: ClassVar[Facts] = Facts(
+        title="errors that drift: correlated from operation to operation",
+        formula=("z_1 = e_1, z_k = rho z_(k-1) + sqrt(1 - rho^2) e_k", "T_seen_k = T_k exp(L A_k^t z_k + o L e_k)"),
+        frame="the axes of the camera, into which A_k turns those of the part",
+        parameters=(f"rho = {CORRELATION:g}: correlation of the errors of an operation and the next", OWN_FACT),
+        states="(1 + o^2) L^2 in every direction for each operation, and how operations are correlated; both are exact",
+    )
+
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
+        sigma = self.level.sigma()
+        unit, own = rng.standard_normal((2, len(assembly), 6))
+        for k in range(1, len(unit)):
+            unit[k] = self.correlation * unit[k - 1] + np.sqrt(1.0 - self.correlation**2) * unit[k]
+        # From the axes of the camera into those of the part: the turn by R^t as it is, the shift by R^t as it is seen.
+        in_world = ((unit + OWN * own) * sigma).reshape(-1, 2, 3) @ self.camera.T_world_camera[:3, :3].T
+        xi = np.zeros((len(assembly), 6))
+        xi[:, 3:] = np.einsum("nji,nj->ni", demonstration.goals[:, :3, :3], in_world[:, 1])
+        R_seen = (demonstration.goals @ pose.exp(xi))[:, :3, :3]
+        xi[:, :3] = np.einsum("nji,nj->ni", R_seen, in_world[:, 0])
+
+        def shared(goals: Array) -> list[SharedError]:
+            every = tuple(range(len(assembly)))
+            between = first_order(len(every), self.correlation)
+            T = self.camera.T_world_camera
+            return [SharedError("drift", every, np.diag(sigma**2), T, local=True, correlation=between)]
+
+        return observe_shared(assembly, demonstration, xi, OWN * sigma, shared)

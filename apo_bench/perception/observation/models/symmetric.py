@@ -1,0 +1,128 @@
+"""Noise for parts that look the same when turned: which of the equal poses is reported, and how well it is known."""
+
+from dataclasses import dataclass, replace
+from typing import ClassVar, final
+
+import numpy as np
+
+from apo_bench.assembly import Assembly, Demonstration, Observation
+from apo_bench.geometry import (
+    Array,
+    Solid,
+    across_axis,
+    folds,
+    nearest_symmetric_pose,
+    pose,
+    revolution,
+    symmetries,
+    turn_about,
+)
+from apo_bench.perception.observation.models.displaced import observe_displaced
+from apo_bench.perception.observation.models.facts import Facts, Level
+
+WORSE = 3.0
+_MANY = 3.0
+"""Factor on the level of a turn about an axis with so many equal places in a whole turn, or more."""
+
+
+@final
+@dataclass(frozen=True)
+class Symmetric:
+    """Isotropic noise about the centre of volume, larger for turns that hardly change how a part looks.
+
+    About an axis of fourfold symmetry the second moments of a part are those of a body of revolution, and only its
+    edges tell how far it is turned: there the standard deviation is `WORSE` times the level.
+
+    Of the poses at which a part looks the same, the one nearest to the truth is reported: contacts name faces, they are
+    taken as certain, and they say which of the equal sides is which. A turn is thus wrong by half the angle between
+    two equal poses at most, whatever the level.
+    """
+
+    level: Level
+
+    FACTS: ClassVar[Facts] = Facts(
+        title="turns about axes of symmetry are less certain; of equal poses the nearest is reported",
+        formula=(
+            "T_seen = T C exp(xi) C^-1 g, C the shift to the centre of volume",
+            f"xi = L (e1, e2, e3, s1 e4, s2 e5, s3 e6), s_i = {WORSE:g} about axes of fourfold symmetry, else 1",
+            "g the one of the part's symmetries with which T_seen is turned the least",
+        ),
+        frame="of the part that is seen, about its centre of volume",
+        parameters=(
+            f"s = {WORSE:g}: factor on turns about axes with {_MANY:g} or more equal places in a whole turn",
+            "symmetries: proper rotations, computed from the boxes of each part (stick 8, castle 2, block 24)",
+        ),
+        states="the covariance of xi about the part's origin, where the standard deviation of a turn about an axis "
+        "with m equal places counts as 180 / m / sqrt(3) deg at most; exact while errors are small against 180 / m deg "
+        "(up to level 4), above an upper bound",
+        notes=(
+            "a part of revolution is the same after any turn about its axis: that turn is reported, and stated, as if "
+            "its edges told it",
+            "`apo_bench.perception.observation.models.symmetric:AnyTurn` reports any of the equal poses instead, "
+            "each as likely, also at level 0: an estimator that knows nothing of faces. The same space is filled, but "
+            "a contact that names a face is then asked of another side",
+        ),
+    )
+
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
+        unit = rng.standard_normal((len(assembly), 6))
+        xi = np.zeros((len(assembly), 6))
+        covariance = np.zeros((len(assembly), 6, 6))
+        groups = {part: symmetries(assembly.solids[part]) for part in {o.main for o in assembly.operations}}
+        for k, operation in enumerate(assembly.operations):
+            solid = assembly.solids[operation.main]
+            group = groups[operation.main]
+            frame, fold = _principal(solid, group)
+            about = pose.adjoint(frame)
+            sigma, stated = self._deviations(fold)
+            if np.any(unit[k] * sigma):
+                # About the centre of volume: the body twist there is Ad(frame) xi at the part's origin.
+                xi[k] = pose.log(nearest_symmetric_pose(pose.exp(about @ (unit[k] * sigma)), group, np.eye(3)))
+            covariance[k] = about @ np.diag(stated**2) @ about.T
+        return observe_displaced(assembly, demonstration, xi, (covariance + np.swapaxes(covariance, 1, 2)) / 2)
+
+    def _deviations(self, fold: Array) -> tuple[Array, Array]:
+        """The standard deviations drawn and those stated, (6,) each, about the centre of volume, [m, rad]."""
+        turn = np.radians(self.level.deg) * np.where(fold >= _MANY, WORSE, 1.0)
+        place = np.full(3, self.level.mm * 1e-3)
+        apart = np.where(np.isinf(fold), np.inf, np.pi / fold / np.sqrt(3.0))
+        return np.append(place, turn), np.append(place, np.minimum(turn, apart))
+
+
+def _principal(solid: Solid, group: Array) -> tuple[Array, Array]:
+    """The centre of volume with the axes of a solid, or with an axis of revolution as z, (4, 4); and how often it looks
+    the same in a whole turn about each, (3,).
+    """
+    frame = pose.at(solid.centroid)
+    body = revolution(solid)
+    if body is None:
+        return frame, folds(group)
+    x = across_axis(body.axis)
+    frame = np.array(frame)
+    frame[:3, :3] = np.column_stack([x, np.cross(body.axis, x), body.axis])
+    return frame, np.array([len(group), len(group), np.inf])
+
+
+@final
+@dataclass(frozen=True)
+class AnyTurn:
+    """Noise of `symmetric` that reports any of the poses that look the same, each as likely, whatever the level.
+
+    The covariance is that about the pose of the same look which is nearest to what is reported.
+    """
+
+    level: Level
+
+    def __call__(self, assembly: Assembly, demonstration: Demonstration, rng: np.random.Generator) -> Observation:
+        seen = Symmetric(self.level)(assembly, demonstration, rng)
+        g = np.array([self._one(assembly.solids[o.main], rng) for o in assembly.operations]).reshape(-1, 4, 4)
+        Ad = pose.adjoint(pose.inverse(g))
+        C = Ad @ seen.covariance @ np.swapaxes(Ad, 1, 2)
+        return replace(seen, goals=seen.goals @ g, covariance=(C + np.swapaxes(C, 1, 2)) / 2)
+
+    @staticmethod
+    def _one(solid: Solid, rng: np.random.Generator) -> Array:
+        group = symmetries(solid)
+        body = revolution(solid)
+        turn = np.asarray(group[rng.integers(len(group))])
+        return turn if body is None else turn_about(body.point, body.axis, rng.uniform(-np.pi, np.pi)) @ turn

@@ -1,0 +1,128 @@
+"""What a noise model is, and the one that a name stands for."""
+
+import inspect
+import math
+from collections.abc import Callable, Iterable
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from apo_bench.assembly import Assembly, Demonstration, Observation
+from apo_bench.errors import RAISED, InputError, failed, require, unknown
+from apo_bench.names import resolve
+from apo_bench.perception.observation.models import Level
+from apo_bench.perception.observation.models.failures import make_failures
+from apo_bench.perception.observation.noise_file import noise_path, presets
+from apo_bench.perception.observation.plain import declared
+from apo_bench.records import FAILURES
+
+__all__ = ["FAILURES", "NOISES", "Level", "Noise", "make_noise"]
+Noise = Callable[[Assembly, Demonstration, np.random.Generator], Observation]
+"""Any function `(assembly, shown, rng) -> Observation` is a noise model."""
+NOISES = MappingProxyType(
+    {
+        "isotropic": "apo_bench.perception.observation.models.isotropic:Isotropic",
+        "anisotropic": "apo_bench.perception.observation.models.sighted:Anisotropic",
+        "per-part": "apo_bench.perception.observation.models.isotropic:PerPart",
+        "camera": "apo_bench.perception.observation.models.sighted:Sighted",
+        "heavy-tailed": "apo_bench.perception.observation.models.isotropic:HeavyTailed",
+        "outliers": "apo_bench.perception.observation.models.outliers:Outliers",
+        "bias": "apo_bench.perception.observation.models.shared:Bias",
+        "bias-view": "apo_bench.perception.observation.models.shared:BiasView",
+        "correlated": "apo_bench.perception.observation.models.shared:Correlated",
+        "symmetric": "apo_bench.perception.observation.models.symmetric:Symmetric",
+        **dict.fromkeys(FAILURES, "apo_bench.perception.observation.models.failures:make_failures"),
+    }
+)
+_RATES = MappingProxyType({"p": "rate", "r": "repeat"})
+"""What may be stated of a camera that fails now and then -> what it is called there."""
+
+
+def make_noise(given: Any, level: Level) -> Noise:
+    """The noise model that a name stands for.
+
+    Args:
+        given: A name out of `NOISES`, one out of `FAILURES` with its rates (`flips:p=0.1/r=0.5`),
+            `"package.module:name"`, a noise file (`.toml`, the name of one that comes with the package, or
+            `"empirical:"` and a file of residuals), or the object: a class is made with the level, a function
+            `(assembly, shown, rng) -> Observation` is used as it is, and so is a plain `(goals, rng) -> goals` that has
+            attributes `deviation_mm` and `deviation_deg`.
+        level: How much noise.
+
+    Raises:
+        InputError: There is no such noise model, it cannot be made or does not say how large its errors are, or the
+            level is negative or not finite.
+    """
+    for value, unit in zip(level, ("mm", "degrees"), strict=True):
+        require(
+            math.isfinite(value) and value >= 0.0,
+            f"the noise level {value} {unit} is not possible; give a finite number, 0 or more.",
+        )
+    if isinstance(given, str):
+        if noise_path(given) is not None:
+            from apo_bench.perception.observation.noise_file import noise_of_file
+
+            if (measured := noise_of_file(given, level)) is not None:
+                return measured
+        if ":" not in given and given not in NOISES:
+            raise InputError(_unknown(given, (*NOISES, *presets())))
+        if given.partition(":")[0] in FAILURES:
+            return _failing(given, level)
+    model = resolve(given, NOISES, "noise model")
+    name = given if isinstance(given, str) else getattr(model, "__name__", type(model).__name__)
+    try:
+        return _noise(model, name, level)
+    except InputError:
+        raise
+    except RAISED as error:
+        raise failed(f"the noise model '{name}'", error) from error
+
+
+def _failing(given: str, level: Level) -> Noise:
+    """A camera that fails now and then, as often as its name says: `flips:p=0.1/r=0.5`."""
+    name, colon, stated = given.partition(":")
+    entries = [entry.partition("=") for entry in stated.split("/")] if colon else []
+    try:
+        rates = {_RATES[key]: float(number) for key, _, number in entries}
+        require(len(rates) == len(entries), "twice")
+    except (KeyError, ValueError):
+        raise InputError(
+            f"the noise '{given}' was given; state how often the camera fails, '{name}:p=0.1', or also how often a "
+            f"later look repeats a failure, '{name}:p=0.1/r=0.5'."
+        ) from None
+    return make_failures(name, level, **rates)
+
+
+def _noise(model: Any, name: str, level: Level) -> Noise:
+    """What can be called, from what a name stands for."""
+    if isinstance(model, type):
+        model = model(level)
+    plain = _takes(model, 2) and (hasattr(model, "deviation_mm") or not _takes(model, 3))
+    require(
+        plain or _takes(model, 3),
+        f"the noise model '{name}' cannot be called with (assembly, shown, rng); give a function of these that returns "
+        "an Observation.",
+    )
+    noise: Noise = declared(model, name) if plain else model
+    return noise
+
+
+def _unknown(given: str, names: Iterable[str]) -> str:
+    """What to say to a name that is none."""
+    if given.lower().endswith(".csv"):
+        return (
+            f"unknown noise model '{given}'; did you mean 'empirical:{given}'? That takes residuals, which "
+            "`apo-bench noise fit --residuals` writes; its --out writes a noise file, whose name ends in .toml."
+        )
+    sentence = unknown("noise model", given, (*names, "empirical:FILE.csv", "FILE.toml"))
+    return sentence + " Or give your own as 'package.module:name'."
+
+
+def _takes(model: Any, arguments: int) -> bool:
+    """Whether it can be called with so many arguments."""
+    try:
+        inspect.signature(model).bind(*[None] * arguments)
+    except (TypeError, ValueError):
+        return False
+    return True

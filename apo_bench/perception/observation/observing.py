@@ -1,0 +1,80 @@
+"""Observe a demonstration through a noise model."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from apo_bench.arguments import check_arguments
+from apo_bench.assembly import Demonstration, Observation
+from apo_bench.errors import RAISED, ArgumentError, InputError, failed, require
+from apo_bench.geometry import Array, is_rigid
+from apo_bench.perception.observation.noise import Level, Noise, make_noise
+from apo_bench.records import level_pair
+
+
+@check_arguments
+def observe(
+    demonstration: Demonstration,
+    noise: Noise | type | str,
+    rng: np.random.Generator,
+    *,
+    level: float | tuple[float, float] | None = None,
+) -> Observation:
+    """What the noise model makes of a demonstration, checked.
+
+    Args:
+        noise: A name, `"package.module:name"`, a noise file or a class, which are made with the level; or a function
+            `(assembly, demonstration, rng) -> Observation`. See `make_noise`.
+        rng: The only source of chance.
+        level: Standard deviation in mm and degrees, one number for both or a pair; 1 if it is not given.
+
+    Raises:
+        InputError: There is no such noise model, it raised an error, it returned what is not an observation of this
+            demonstration, or a level was given for a noise model that is made already.
+    """
+    if isinstance(noise, str | type):
+        noise = make_noise(noise, Level(*level_pair(1.0 if level is None else level)))
+    elif level is not None:
+        raise InputError(
+            f"the level {level!r} was given together with a noise model that is made already; leave the level out, or "
+            "give the name or the class of the model."
+        )
+    name = getattr(noise, "__name__", type(noise).__name__)
+    try:
+        seen = noise(demonstration.assembly, demonstration, rng)
+        complaint = _complaint(demonstration, seen)
+    except RAISED as error:
+        if isinstance(error, InputError) and not isinstance(error, ArgumentError):
+            raise
+        raise failed(f"the noise model '{name}'", error) from error
+    require(not complaint, f"the noise model '{name}' {complaint}.")
+    return replace(seen, gap_m=demonstration.gap_m, play_m=demonstration.play_m)
+
+
+def _complaint(demonstration: Demonstration, seen: Any) -> str:
+    """What is wrong with what a noise model returned; empty if nothing is."""
+    if not isinstance(seen, Observation):
+        return f"returned {type(seen).__name__}; return an apo_bench.assembly.goals.Observation"
+    if seen.assembly is not demonstration.assembly:
+        return "changed the assembly, which is taken as certain; pass on the one it was given"
+    if set(seen.start) != set(demonstration.start):
+        return "changed which parts have a start pose; pass on `shown.start`"
+    for wrong in np.flatnonzero(~is_rigid(seen.goals)):
+        return (
+            f"returned a goal for operation {wrong + 1} that is not a rigid pose; return `shown.goals[k] @ exp(twist)`"
+        )
+    for k, C in enumerate(seen.covariance):
+        if not _positive_definite(C):
+            return (
+                f"returned a covariance for operation {k + 1} that is not symmetric and positive definite; "
+                "state a variance above zero in every direction"
+            )
+    return ""
+
+
+def _positive_definite(C: Array) -> bool:
+    """Judged on correlations, so that [m] and [rad] weigh the same."""
+    deviation = np.sqrt(np.maximum(np.diag(C), 1e-300))
+    correlation = C / np.outer(deviation, deviation)
+    return bool(np.abs(correlation - correlation.T).max() < 1e-9 and np.linalg.eigvalsh(correlation)[0] > 1e-12)

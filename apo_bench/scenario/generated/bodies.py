@@ -1,0 +1,145 @@
+"""The solids that generated parts are: blocks, boards, axles, rings, and prisms with slots and slopes; lengths in mm.
+
+Holes and slots are marked fit and get wider by the clearance. What goes into them stays as it is drawn.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from apo_bench.scenario.parts.making import (
+    Body,
+    Bore,
+    Edge,
+    Frustum,
+    bore,
+    extrude,
+    join,
+    polygon,
+    rectangle,
+    shaft,
+    turned,
+)
+
+_SIDES = ("ny", "px", "py", "nx")
+_CHAMFER = 1.0
+COLLAR = 5.0
+"""Thickness of the collar of an axle."""
+TOP = 20.0
+"""Thickness of a board."""
+
+
+class Pin(NamedTuple):
+    """A round pin on top of a block, or the hole for one."""
+
+    x: float
+    y: float
+    radius: float
+    name: str
+    length: float = 14.0
+
+
+PIN = Pin(0.0, 0.0, 4.5, "pin")
+"""On top of a block, for what is put on it."""
+
+
+def box(
+    at: tuple[float, float, float], size: tuple[float, float, float], fit: Sequence[str] = (), **names: str
+) -> Body:
+    """A box about the middle of its bottom; its sides may be named, as `nx="wall"`."""
+    outline = rectangle(*size[:2], at[:2], names=[names.get(side, "") for side in _SIDES], fit=fit)
+    return extrude(outline, at[2], at[2] + size[2])
+
+
+def hole(pin: Pin, high: float, low: float = 0.0) -> Bore:
+    """The hole for a pin, from one height to another one."""
+    return bore((pin.x, pin.y), pin.radius, low, high, pin.name, fit=True)
+
+
+def block(width: float, depth: float, height: float, pins: Sequence[Pin] = (), holes: Sequence[Pin] = ()) -> Body:
+    """A block about z on its bottom: faces `ny`, `px`, `py`, `nx`, `bottom`, `top`, and those of its pins and holes."""
+    bores = [hole(each, height) for each in holes]
+    base = extrude(rectangle(width, depth, names=_SIDES), 0, height, bores=bores, bottom="bottom", top="top")
+    return join(base, *(upright(pin, height) for pin in pins)) if pins else base
+
+
+def upright(pin: Pin, low: float) -> Body:
+    """A pin that stands on a height."""
+    return shaft(pin.radius, low, low + pin.length, pin.name, chamfer_high=1.5).moved((pin.x, pin.y, 0.0))
+
+
+def axle(radius: float, deep: float, collar: float, neck: float) -> Body:
+    """A shaft whose collar stops it: `side` below the `shoulder`, `neck` above the `ledge`.
+
+    Args:
+        deep: Length below the collar.
+        collar: Its radius.
+        neck: Length above the collar.
+    """
+    ledge = deep + COLLAR
+    end = ledge + neck
+    steps = [
+        Frustum(0, _CHAMFER, radius - _CHAMFER, radius, "side_chamfer"),
+        Frustum(_CHAMFER, deep, radius, name="side"),
+        Frustum(deep, ledge, collar, name="collar"),
+        Frustum(ledge, end - _CHAMFER, radius, name="neck"),
+        Frustum(end - _CHAMFER, end, radius, radius - _CHAMFER, "neck_chamfer"),
+    ]
+    return turned(steps, flats={0: "tip", deep: "shoulder", ledge: "ledge", end: "head"})
+
+
+def ring(outer: float, inner: float, height: float) -> Body:
+    """A disc with a bore: faces `bore`, `low`, `high`."""
+    return turned(
+        [Frustum(0, height, outer)],
+        [Frustum(0, height, inner, name="bore", fit=True)],
+        flats={0: "low", height: "high"},
+    )
+
+
+def slotted(length: float, depth: float, height: float, slot: float, floor: float) -> Body:
+    """A block with a slot along x, open above: faces `floor`, `slot_n`, `slot_p`."""
+    out = depth / 2
+    s = slot / 2
+    section = polygon(
+        (-out, 0), (out, 0), (out, height), (s, height), (s, floor), (-s, floor), (-s, height), (-out, height),
+        names={0: "bottom", 3: "slot_p", 4: "floor", 5: "slot_n"},
+        fit=("slot_p", "slot_n"),
+    )  # fmt: skip
+    return along_x(section, length)
+
+
+def saddle(length: float, depth: float, height: float, slot: float, roof: float) -> Body:
+    """A block with a slot along x, open below: faces `roof`, `slot_n`, `slot_p`, `top`."""
+    out = depth / 2
+    s = slot / 2
+    section = polygon(
+        (-out, 0), (-s, 0), (-s, roof), (s, roof), (s, 0), (out, 0), (out, height), (-out, height),
+        names={1: "slot_n", 2: "roof", 3: "slot_p", 6: "top"},
+        fit=("slot_p", "slot_n"),
+    )  # fmt: skip
+    return along_x(section, length)
+
+
+def upright_wall(thick: float, depth: float, low: float, high: float, hole: Pin) -> Body:
+    """A wall across x, about x = 0, between two heights, with a hole along x; `hole` has (height, y) as its place."""
+    # lying along z it is turned up: what was -x becomes z, what was z becomes x
+    bored = bore((-hole.x, hole.y), hole.radius, -thick / 2, thick / 2, hole.name, fit=True)
+    lying = extrude(rectangle(high - low, depth, (-(high + low) / 2, 0)), -thick / 2, thick / 2, bores=[bored])
+    return lying.moved(turn_deg=(0, 90, 0))
+
+
+def rod(radius: float, length: float, grip: float) -> Body:
+    """A shaft along x, from 0 on, its axis a radius high, with a square head before it that keeps it from rolling."""
+    square = extrude(rectangle(2 * radius, 2 * radius), -grip, 0, bottom="end")
+    # a groove behind the head, as a shaft as wide as the square would leave slivers of its face
+    steps = [
+        Frustum(0, 2, radius - _CHAMFER),
+        Frustum(2, length - _CHAMFER, radius, name="side"),
+        Frustum(length - _CHAMFER, length, radius, radius - _CHAMFER),
+    ]
+    return join(square, turned(steps, flats={length: "tip"})).moved((0, 0, radius), (0, 90, 0))
+
+
+def along_x(section: Sequence[Edge], length: float) -> Body:
+    """A prism over an outline (y, z), along x about its middle."""
+    return extrude(section, -length / 2, length / 2).moved(turn_deg=(90, 0, 90))

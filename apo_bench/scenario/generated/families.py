@@ -1,0 +1,113 @@
+"""Families of assemblies: which stations stand on a board, and how many parts each has."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from apo_bench.scenario.generated.assembled import BOARD, Assembled, Station, merged, shifted, split
+from apo_bench.scenario.generated.bodies import TOP
+from apo_bench.scenario.generated.linked import bridged, castled, grooved, keyed, pinned, threaded
+from apo_bench.scenario.generated.stations import carried, corner, covered, peg, post
+from apo_bench.scenario.parts.making import Body, extrude, join, rectangle
+
+_GAP = 10.0
+_EDGE = 6.0
+_LONGEST = 226.0
+"""Of a board, which the arm reaches all over."""
+
+
+class Kind(NamedTuple):
+    """One kind of station."""
+
+    make: Callable[[np.random.Generator, str, int], Station]
+    """The station of a number, with so many parts."""
+    least: int
+    """Parts of it."""
+    most: int
+
+
+class Family(NamedTuple):
+    """Assemblies of one kind."""
+
+    title: str
+    kinds: tuple[Kind, ...]
+    """What may stand on the board."""
+    sizes: tuple[int, int]
+    """Least and most parts, the board among them."""
+    weight: int
+    """How often a seed without a family draws it, of the sum of all; 0: it is held out for tests."""
+    needs_more: bool
+    """Whether laying each part onto its newest contacts is not enough."""
+
+    def draw(self, rng: np.random.Generator) -> Assembled:
+        """One assembly of the family."""
+        stations = list[Station]()
+        while not stations or _length(stations) > _LONGEST:
+            size = int(rng.integers(self.sizes[0], self.sizes[1] + 1)) - 1
+            count = int(rng.integers(1, _MOST + 1))
+            kinds = [self.kinds[int(k)] for k in rng.integers(len(self.kinds), size=count)]
+            least = [kind.least for kind in kinds]
+            most = [kind.most for kind in kinds]
+            if sum(least) <= size <= sum(most):
+                parts = split(rng, size, least, most)
+                stations = [kind.make(rng, str(i), n) for i, (kind, n) in enumerate(zip(kinds, parts, strict=True), 1)]
+        return assembled(self.title, stations, rng)
+
+
+def _length(stations: Sequence[Station]) -> float:
+    """Of the board that stations need."""
+    return sum(station.length for station in stations) + _GAP * (len(stations) - 1) + 2 * _EDGE
+
+
+def assembled(title: str, stations: Sequence[Station], rng: np.random.Generator) -> Assembled:
+    """Stations beside each other on one board."""
+    length = _length(stations)
+    placed = list[Station]()
+    x = _EDGE - length / 2
+    for station in stations:
+        placed.append(shifted(station, x + station.length / 2))
+        x += station.length + _GAP
+    bodies = [body for station in placed for body in station.bodies]
+    ys = [float(np.abs(piece.corners[:, 1]).max()) for body in bodies for piece in body.pieces]
+    deep = max(60.0, 2e3 * max(ys, default=0.0) + 2 * _EDGE)
+    bores = [bore for station in placed for bore in station.bores]
+    board = extrude(rectangle(length, deep), 0, TOP, bores=bores, bottom="bottom", top="top")
+    parts: dict[str, Body] = {BOARD: join(board, *bodies) if bodies else board}
+    fixed = {BOARD: (0.0, 0.0, 0.0)}
+    for station in placed:
+        parts |= station.parts
+        fixed |= station.fixed
+    return Assembled(title, parts, fixed, merged(rng, [station.acts for station in placed]))
+
+
+_MOST = 4
+"""Stations on a board."""
+_CORNER = Kind(corner, 1, 3)
+_PEG = Kind(peg, 1, 2)
+_POST = Kind(post, 1, 3)
+_COVERED = Kind(covered, 3, 9)
+_PINNED = Kind(pinned, 3, 5)
+_BRIDGED = Kind(bridged, 3, 9)
+_KEYED = Kind(keyed, 3, 6)
+_GROOVED = Kind(grooved, 3, 6)
+_CARRIED = Kind(carried, 3, 3)
+_CASTLED = Kind(castled, 3, 7)
+_THREADED = Kind(threaded, 2, 3)
+_EVERY = (_CORNER, _PEG, _POST, _COVERED, _PINNED, _BRIDGED, _KEYED, _GROOVED, _CARRIED)
+
+FAMILIES: Mapping[str, Family] = {
+    "corners": Family("Blocks in corners of walls, and piles of blocks", (_CORNER,), (3, 10), 2, False),
+    "pegs": Family("Axles with collars in bores, and rings over them", (_PEG,), (3, 9), 2, False),
+    "posts": Family("Plates over one post or two", (_POST,), (3, 10), 2, False),
+    "covers": Family("A cover over axles, and rings on it", (_COVERED,), (4, 10), 2, False),
+    "carried": Family("Axles that carry their rings from a stand", (_CARRIED,), (4, 10), 2, False),
+    "pinned": Family("Loose plates that axles join", (_PINNED,), (4, 12), 3, True),
+    "bridges": Family("Loose towers that plates join", (_BRIDGED,), (4, 10), 3, True),
+    "keys": Family("Keys in a slot that a bar joins", (_KEYED,), (4, 12), 3, True),
+    "grooves": Family("Keys with tilted faces that a bar joins", (_GROOVED,), (4, 12), 3, True),
+    "mixed": Family("Stations of all kinds", _EVERY, (5, 12), 6, True),
+    "castles": Family("Loose blocks that a stick in their slots joins", (_CASTLED,), (4, 8), 0, True),
+    "rods": Family("Loose brackets that a level rod joins", (_THREADED,), (3, 4), 0, True),
+}
+"""Those with weight 0 are held out: no `generated:SEED` is one of them, nor has a kind of station of theirs."""

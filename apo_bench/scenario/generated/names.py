@@ -1,0 +1,88 @@
+"""Names of generated assemblies: `generated:SEED` and `generated:FAMILY:SEED`."""
+
+import re
+import tempfile
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+from apo_bench.errors import InputError, require_known
+from apo_bench.scenario.generated.assembled import Assembled
+from apo_bench.scenario.generated.families import FAMILIES
+from apo_bench.scenario.generated.laying import lay
+from apo_bench.scenario.generated.writing import write
+
+_PREFIX = "generated:"
+_FAMILY_STREAM = 40
+_ASSEMBLY_STREAM = 41
+_NAME = re.compile(r"generated:(?:([a-z-]+):)?(\d{1,15})")
+
+
+def is_generated(name: object) -> bool:
+    """Whether a name is meant as that of a generated assembly."""
+    return isinstance(name, str) and name.startswith(_PREFIX)
+
+
+def whole_name(name: str) -> str:
+    """The name with its family: of `generated:SEED` that which the seed draws.
+
+    Raises:
+        InputError: No such family, or no such seed.
+    """
+    match = _NAME.fullmatch(name)
+    if match is None:
+        raise InputError(
+            f"the scenario '{name}' is not of the form generated:SEED or generated:FAMILY:SEED; give a whole number "
+            "from 0 as seed."
+        )
+    family, seed = match.groups()
+    if family is None:
+        weights = np.array([each.weight for each in FAMILIES.values()], dtype=np.float64)
+        rng = np.random.default_rng([int(seed), _FAMILY_STREAM])
+        family = str(rng.choice(list(FAMILIES), p=weights / weights.sum()))
+    require_known("family of generated assemblies", family, FAMILIES)
+    return f"{_PREFIX}{family}:{int(seed)}"
+
+
+def generated_file(name: str) -> Path:
+    """The scenario file of a generated assembly, in a folder that lasts as long as this process.
+
+    Raises:
+        InputError: No such family, or no such seed.
+    """
+    return _written(whole_name(name))
+
+
+@lru_cache(maxsize=1024)
+def _written(name: str) -> Path:
+    folder = Path(_folder().name) / name.replace(":", "_")
+    folder.mkdir()
+    return write_generated(name, folder)
+
+
+@lru_cache(maxsize=1)
+def _folder() -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="apo_bench_")
+
+
+def write_generated(name: str, folder: Path) -> Path:
+    """Write the files of a generated assembly; returns that of the scenario."""
+    _, family, seed = whole_name(name).split(":")
+    made, rng = _drawn(family, int(seed))
+    return write(made, lay(made, rng), folder, f"{family}_{seed}")
+
+
+def drawn(name: str) -> Assembled:
+    """A generated assembly without a table.
+
+    Raises:
+        InputError: No such family, or no such seed.
+    """
+    _, family, seed = whole_name(name).split(":")
+    return _drawn(family, int(seed))[0]
+
+
+def _drawn(family: str, seed: int) -> tuple[Assembled, np.random.Generator]:
+    rng = np.random.default_rng([seed, _ASSEMBLY_STREAM, *family.encode()])
+    return FAMILIES[family].draw(rng), rng

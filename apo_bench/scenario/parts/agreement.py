@@ -1,0 +1,235 @@
+"""Faces that are stated, held against the pieces: flat ones against their sides, round ones by rays from their axes."""
+
+from collections.abc import Iterable
+from dataclasses import replace
+from itertools import combinations
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.geometry import (
+    SAGITTA_M,
+    WHOLE_TURN,
+    Array,
+    Face,
+    Piece,
+    RoundFace,
+    Solid,
+    depth_inside,
+    flat_area,
+    passage,
+    physical_pieces,
+    plane_across,
+    rings_of,
+)
+from apo_bench.scenario.parts.stated import twice_area
+
+_IN_PLANE_M = 1e-6
+_PARALLEL = 1e-7
+_ROUNDED_M = 1e-6
+"""What coordinates in files are rounded by at most, and so walls."""
+_BESIDE_M = SAGITTA_M + _ROUNDED_M
+_WRITTEN_M = 1e-8
+"""Corners of faces that are made are on this grid: writing them does not make them cross."""
+_SNAP_M = 1e-9
+"""Areas are united on this grid: without one, some of them may be lost among corners that differ by rounding."""
+_ABOVE_M = 2e-5
+"""So far above a face nothing of the part is."""
+_COARSE = 0.09
+"""Sides of a wall that no contact uses may be this part of its radius away from it: eight of them are."""
+_TRIED_M = 5e-5
+"""A clearance that any part can have; receded pieces are remembered."""
+_RAYS = 73
+_SHARES = np.array([0.02, 0.25, 0.5, 0.75, 0.98])
+"""A prime number of rays: were it that of the sides of a wall, all could meet corners, which are nearest to it."""
+_LEAST_WALL = 0.5
+"""So much of a round face must be there; bores may cross it."""
+_NEAR = 0.05
+"""So many radii to the free side of a wall nothing of the part is."""
+
+
+def check_faces(solid: Solid, path: Path) -> float:
+    """Raise an `InputError` unless every stated face lies on the pieces, with nothing of them before it.
+
+    Returns:
+        By how much round walls that are cut into flat ones may change the volume, [m^3].
+    """
+    for name, flat in solid.faces.items():
+        _check_flat(flat, solid.pieces, f"{path}, faces, {name}")
+    _check_once(solid, path)
+    return sum(_check_round(wall, solid.pieces, f"{path}, faces, {name}") for name, wall in solid.rounds.items())
+
+
+def _near(pieces: tuple[Piece, ...], corners: Array, margin: float) -> list[Piece]:
+    """Those of the pieces that reach into the box around some points, (k, 3), or as near to it."""
+    low = corners.min(axis=0) - margin
+    high = corners.max(axis=0) + margin
+    return [p for p in pieces if (p.center - p.half <= high).all() and (p.center + p.half >= low).all()]
+
+
+def _check_flat(face: Face, pieces: tuple[Piece, ...], place: str) -> None:
+    """A face is made of sides of pieces that look its way, and lies bare."""
+    import shapely
+
+    n = face.normal
+    to_plane = plane_across(face.normal)
+    near = _near(pieces, face.outline, _ABOVE_M)
+    stated = flat_area(face.outline, face.holes, to_plane)
+    below = _below(face, near, to_plane)
+    bare = stated.difference(shapely.unary_union(below, grid_size=_SNAP_M).buffer(_BESIDE_M))
+    if not bare.is_empty:
+        at = bare.representative_point()
+        x, y, z = 1e3 * (to_plane @ np.array([at.x, at.y]) + (n @ face.outline[0]) * n)
+        _fail(place, f"no side of a piece lies below the face at ({x:.4g}, {y:.4g}, {z:.4g}) mm")
+    commons = [common for area in below if (common := stated.intersection(area)).area >= _BESIDE_M**2]
+    within = [[at.x, at.y] for at in (common.representative_point() for common in commons)]
+    points = np.array(within).reshape(-1, 2) @ to_plane.T + (n @ face.outline[0] + _ABOVE_M) * n
+    depths = np.array([depth_inside(piece, points) for piece in near])
+    for k in np.flatnonzero((depths > _ROUNDED_M).any(axis=0)):
+        x, y, z = 1e3 * points[k]
+        _fail(place, f"piece '{near[depths[:, k].argmax()].name}' covers the face at ({x:.4g}, {y:.4g}, {z:.4g}) mm")
+
+
+def _below(face: Face, pieces: Iterable[Piece], to_plane: Array) -> list[Any]:
+    """Sides of pieces in the plane of a face, as flat areas."""
+    height = face.normal @ face.outline[0]
+    return [
+        _shadow(piece, side, to_plane)
+        for piece in pieces
+        for side in piece.planes[np.abs(piece.planes[:, 3] - height) < 2.0 * _IN_PLANE_M]
+        if side[:3] @ face.normal > 1.0 - _PARALLEL
+    ]
+
+
+def supported(face: Face, pieces: tuple[Piece, ...]) -> tuple[Face, float] | None:
+    """What of a flat face lies on sides of pieces, and its share; None if that is not a single area."""
+    import shapely
+
+    to_plane = plane_across(face.normal)
+    stated = shapely.make_valid(flat_area(face.outline, face.holes, to_plane))
+    lying = stated.intersection(shapely.unary_union(_below(face, pieces, to_plane), grid_size=_SNAP_M))
+    for by in (-_BESIDE_M, 1.5 * _BESIDE_M, -0.5 * _BESIDE_M):
+        lying = lying.buffer(by, join_style="mitre")
+    lying = shapely.set_precision(shapely.make_valid(lying.simplify(_ROUNDED_M)), _WRITTEN_M)
+    if lying.geom_type != "Polygon" or lying.is_empty:
+        return None
+    off = (face.normal @ face.outline[0]) * face.normal
+    rings = [ring @ to_plane.T + off for ring in rings_of(lying)]
+    oriented = [
+        ring if (twice_area(ring) @ face.normal > 0.0) == (k == 0) else ring[::-1] for k, ring in enumerate(rings)
+    ]
+    return Face(face.name, oriented[0], tuple(oriented[1:])), float(lying.area / stated.area)
+
+
+def _shadow(piece: Piece, side: Array, to_plane: Array) -> Any:
+    """A side of a piece as a flat area."""
+    from shapely import MultiPoint
+
+    corners = piece.corners
+    return MultiPoint(corners[np.abs(corners @ side[:3] - side[3]) < _IN_PLANE_M] @ to_plane).convex_hull
+
+
+def _check_once(solid: Solid, path: Path) -> None:
+    """Refuse faces that lie on each other."""
+    by_plane: dict[tuple[float, ...], list[Face]] = {}
+    for face in solid.faces.values():
+        key = tuple(np.round([*face.normal, 1e-1 * face.plane[3] / _IN_PLANE_M], 4) + 0.0)
+        by_plane.setdefault(key, []).append(face)
+    for faces in by_plane.values():
+        for a, b in combinations(faces, 2):
+            to_plane = plane_across(a.normal)
+            areas = [flat_area(f.outline, f.holes, to_plane) for f in (a, b)]
+            if areas[0].intersection(areas[1]).buffer(-_BESIDE_M).area > 0.0:
+                _fail(f"{path}, faces, {b.name}", f"the face lies on '{a.name}', so state one of them")
+    for r, s in combinations(solid.rounds.values(), 2):
+        if _same_wall(r, s):
+            _fail(f"{path}, faces, {s.name}", f"the face lies on '{r.name}', so state one of them")
+
+
+def _same_wall(a: RoundFace, b: RoundFace) -> bool:
+    """Whether two whole turns of wall, or two rims, are in one place."""
+    if a.kind != b.kind or a.hole != b.hole or abs(a.axis @ b.axis) < 1.0 - _PARALLEL:
+        return False
+    if min(a.extent_rad, b.extent_rad) < WHOLE_TURN - 1e-9:
+        return False
+    off = b.middle - a.middle
+    along = float(off @ a.axis)
+    return bool(
+        np.linalg.norm(off - along * a.axis) < _IN_PLANE_M
+        and abs(a.radius + a.slope * along - b.radius) < _IN_PLANE_M
+        and abs(along) < (a.length + b.length) / 2 + _IN_PLANE_M * (1.0 if a.kind == "rim" else -1.0)
+    )
+
+
+def _check_round(wall: RoundFace, pieces: tuple[Piece, ...], place: str) -> float:
+    """A wall is as far from its axis as it says; returns what of the volume lies between it and the sides, [m^3]."""
+    heights, radii = _samples(wall)
+    angle = wall.extent_rad * ((np.arange(_RAYS) + 0.5) / _RAYS - (0.0 if wall.toward is None else 0.5))
+    near = _near(pieces, wall.ends, max(wall.radii) * (1.0 + _COARSE) + _ABOVE_M)
+    if not near:
+        _fail(place, "no piece is near the face")
+    near_wall = 0
+    off = 0.0
+    allowed = max(_COARSE * max(wall.radii), _BESIDE_M) if wall.name.startswith("auto_") else _BESIDE_M
+    for height, radius in zip(heights, radii, strict=True):
+        enter, leave = _crossed(near, wall.point + height * wall.axis, wall.around(angle))
+        sign = 1.0 if wall.hole else -1.0
+        free = sorted((radius - sign * _BESIDE_M, radius - sign * max(_NEAR * radius, 2.0 * _BESIDE_M)))
+        into = (np.minimum(leave, free[1]) - np.maximum(enter, free[0]) > _ROUNDED_M).any(axis=0)
+        at = (
+            np.where(leave > radius, enter, np.inf).min(axis=0)
+            if wall.hole
+            else (np.where(enter < radius, leave, -np.inf).max(axis=0))
+        )
+        if into.any():
+            true = np.abs(at[into][0])
+            where = f"{1e3 * true:.4f} mm from its axis" if np.isfinite(true) else "before it"
+            _fail(place, f"pieces have a side {where}, {1e3 * radius:.4f} mm is stated, which may differ by 0.005 mm")
+        gap = np.maximum(sign * (at - radius), 0.0)
+        near_wall += int((gap <= allowed).sum())
+        off = max(off, float(gap[gap <= allowed].max(initial=0.0)))
+    if near_wall < _LEAST_WALL * _RAYS * len(heights):
+        _fail(
+            place,
+            f"pieces lie along {near_wall / (_RAYS * len(heights)):.0%} of the wall, within {1e3 * allowed:.3g} mm; "
+            f"{_LEAST_WALL:.0%} is needed",
+        )
+    return off * wall.extent_rad * max(wall.radii) * max(wall.length, 0.0)
+
+
+def check_receding(solid: Solid, path: Path) -> None:
+    """Raise an `InputError` unless round holes that are fit get wider all around.
+
+    A piece that only touches such a wall in a corner has no side that recedes.
+    """
+    walls = [wall for wall in solid.rounds.values() if wall.fit and wall.hole and wall.kind == "cylinder"]
+    for wall in walls:
+        wider = replace(wall, radii=(wall.radius + _TRIED_M, wall.radius + _TRIED_M))
+        try:
+            _check_round(wider, physical_pieces(solid, _TRIED_M), "")
+        except InputError as error:
+            raise InputError(
+                f"{path}, faces, {wall.name}: the wall is fit, and pieces that touch it in a corner only keep it from "
+                "getting wider by the clearance; cut what is around it into pieces that have sides on it."
+            ) from error
+
+
+def _samples(wall: RoundFace) -> tuple[Array, Array]:
+    """Heights from the point of a wall and the radii there; of a rim, just inside of the part."""
+    if wall.kind == "rim":
+        return np.array([wall.span[0] - _ROUNDED_M]), np.array([wall.radius])
+    heights = wall.span[0] + wall.length * _SHARES
+    return heights, wall.radii[0] + wall.slope * (heights - wall.span[0])
+
+
+def _crossed(pieces: list[Piece], origin: Array, out: Array) -> tuple[Array, Array]:
+    """How far rays (r, 3) go until they enter and leave each piece, (pieces, r); inf and -inf if they do not."""
+    enter, leave = np.array([passage(piece.planes, origin, out) for piece in pieces]).swapaxes(0, 1)
+    behind = leave <= 0.0
+    return np.where(behind, np.inf, np.maximum(enter, 0.0)), np.where(behind, -np.inf, leave)
+
+
+def _fail(place: str, what: str) -> NoReturn:
+    raise InputError(f"{place}: {what}; state the face as the pieces are, or mend the pieces.")

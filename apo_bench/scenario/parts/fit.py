@@ -1,0 +1,54 @@
+"""A part some of whose faces recede although its file does not say so."""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from apo_bench.geometry import Face, RoundFace, Solid, receded_pieces
+from apo_bench.scenario.parts.agreement import check_receding
+
+
+def with_fit(solid: Solid, undersizes_mm: Mapping[str, float]) -> Solid:
+    """The solid with these faces marked as fit, each moved into it by its undersize first.
+
+    A wall between two that are 0.1 mm too near to each other gets room by an undersize of 0.05 mm per side, and play by
+    the clearance. Outlines of faces beside keep what was there.
+
+    A part that was drawn with play is made as thick as there is room by undersizes below 0: then its walls touch, and
+    the clearance makes it as thin as it was drawn.
+
+    Args:
+        undersizes_mm: Name of a face -> how far it lies inside of where the file has it, [mm].
+
+    Raises:
+        InputError: A face is the side of a box with another one, a hole cannot get wider, or nothing is left of a
+            piece.
+    """
+    pieces = solid.pieces
+    for depth_mm in sorted({*undersizes_mm.values()} - {0.0}):
+        names = {name for name, by_mm in undersizes_mm.items() if by_mm == depth_mm}
+        flats = {name: replace(face, fit=name in names) for name, face in solid.faces.items()}
+        walls = {name: replace(face, fit=name in names) for name, face in solid.rounds.items()}
+        pieces = receded_pieces(replace(solid, pieces=pieces, faces=flats, rounds=walls), 1e-3 * depth_mm)
+    fitted = replace(
+        solid,
+        pieces=pieces,
+        faces={name: _flat(face, undersizes_mm.get(name)) for name, face in solid.faces.items()},
+        rounds={name: _wall(face, undersizes_mm.get(name)) for name, face in solid.rounds.items()},
+    )
+    check_receding(fitted, Path(solid.name))
+    return fitted
+
+
+def _flat(face: Face, by_mm: float | None) -> Face:
+    if by_mm is None:
+        return face
+    off = -1e-3 * by_mm * face.normal
+    return replace(face, outline=face.outline + off, holes=tuple(hole + off for hole in face.holes), fit=True)
+
+
+def _wall(face: RoundFace, by_mm: float | None) -> RoundFace:
+    if by_mm is None:
+        return face
+    by_m = 1e-3 * by_mm * (1.0 if face.hole else -1.0)
+    return replace(face, radii=(face.radii[0] + by_m, face.radii[1] + by_m), fit=True)

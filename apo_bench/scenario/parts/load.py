@@ -1,0 +1,134 @@
+"""A part file becomes a solid with named faces."""
+
+from pathlib import Path
+
+import numpy as np
+
+from apo_bench.errors import InputError, require, require_known
+from apo_bench.geometry import Box, Face, Solid
+from apo_bench.resources import folder
+from apo_bench.scenario.parts.allowed import HEAVIEST_KG, LIGHTEST_KG, MOST_FACES
+from apo_bench.scenario.parts.checking import check_part
+from apo_bench.scenario.parts.faces import SIDES, Surface, unite
+from apo_bench.scenario.parts.part_file import Mark, PartFile, read_part
+from apo_bench.scenario.parts.stated import StatedPart
+
+_ON_FACE_M = 1e-6
+"""A site lies on a face if it is this near to its plane and this far from its edges."""
+
+
+def part_names() -> tuple[str, ...]:
+    """The short names of the parts that come with the package."""
+    return tuple(sorted(path.stem for path in (folder("assets") / "parts").glob("*.xml")))
+
+
+def part_path(given: str | Path) -> Path:
+    """The file a short name or a path stands for.
+
+    Raises:
+        InputError: No part has that short name.
+    """
+    if isinstance(given, Path) or given.endswith(".xml") or "/" in given or "\\" in given:
+        return Path(given)
+    require_known("part", given, part_names(), rest=" Or give the path of an MJCF file, ending in .xml.")
+    return folder("assets") / "parts" / f"{given}.xml"
+
+
+def load_part(given: str | Path, checked: bool = True) -> Solid:
+    """The solid of a part file, named after the file.
+
+    Of boxes alone it is their union, with faces named by the sites that lie on them; those without a site are called
+    `auto_px_1`, ...: outward direction, and their number along it. Of other pieces, faces, volume, centroid and inertia
+    are those that `NAME.toml` beside it states. What does not come with the package is held against a mesh of the same
+    pieces.
+
+    Args:
+        given: The short name of a part of the package, or the path of an MJCF file.
+        checked: Whether it is held against that mesh; not if the package has just written it.
+
+    Raises:
+        InputError: The file breaks a rule; the message names file, element and remedy.
+    """
+    file = read_part(part_path(given))
+    solid = _stated(file, file.stated) if file.stated else _united(file)
+    mass = file.density * solid.volume
+    require(
+        LIGHTEST_KG <= mass <= HEAVIEST_KG,
+        f"{file.path}: the part weighs {mass:.3g} kg; from {LIGHTEST_KG:g} to {HEAVIEST_KG:g} kg are allowed, "
+        "so change its size or its density.",
+    )
+    if checked and file.path.parent != folder("assets") / "parts":
+        check_part(file, solid)
+    return solid
+
+
+def _stated(file: PartFile, stated: StatedPart) -> Solid:
+    """The solid of any convex pieces, with the faces that are stated."""
+    return Solid(
+        file.path.stem,
+        stated.faces,
+        file.pieces,
+        stated.centroid,
+        stated.volume,
+        rounds=stated.rounds,
+        inertia=stated.inertia,
+    )
+
+
+def _united(file: PartFile) -> Solid:
+    """The union of boxes, with the faces that sites mark."""
+    boxes = tuple(piece for piece in file.pieces if isinstance(piece, Box))
+    union = unite(boxes, MOST_FACES + 1)
+    require(
+        union.pieces == 1, f"{file.path}: the boxes make {union.pieces} separate solids; a part is one rigid piece."
+    )
+    require(
+        len(union.surfaces) <= MOST_FACES,
+        f"{file.path}: the boxes make more than {MOST_FACES} faces, the most that a part may have.",
+    )
+    marks = _matched(file, union.surfaces)
+    faces = [_face(surface, marks.get(k), _number(union.surfaces, k)) for k, surface in enumerate(union.surfaces)]
+    faces.sort(key=lambda face: face.name.startswith("auto_"))
+    return Solid(file.path.stem, {face.name: face for face in faces}, boxes, union.centroid, union.volume)
+
+
+def _matched(file: PartFile, surfaces: tuple[Surface, ...]) -> dict[int, Mark]:
+    """Which mark lies on which surface."""
+    marks: dict[int, Mark] = {}
+    for mark in file.marks:
+        k = _under(file, mark, surfaces)
+        if k in marks:
+            raise InputError(
+                f"{file.path}: sites '{marks[k].name}' and '{mark.name}' lie on one face; keep one of them."
+            )
+        marks[k] = mark
+    return marks
+
+
+def _under(file: PartFile, mark: Mark, surfaces: tuple[Surface, ...]) -> int:
+    from shapely import Point
+
+    where = ", ".join(f"{1e3 * x:g}" for x in mark.point)
+    for k, surface in enumerate(surfaces):
+        if abs(mark.point[surface.axis] - surface.height) > _ON_FACE_M:
+            continue
+        point = Point(surface.flat(mark.point[None])[0])
+        if surface.shape.distance(point) > _ON_FACE_M:
+            continue
+        require(
+            surface.shape.boundary.distance(point) > _ON_FACE_M,
+            f"{file.path}: site '{mark.name}' at ({where}) mm lies on an edge between faces; move it into one face.",
+        )
+        return k
+    raise InputError(f"{file.path}: site '{mark.name}' at ({where}) mm lies on no face; move it onto the surface.")
+
+
+def _number(surfaces: tuple[Surface, ...], k: int) -> int:
+    """The place of a surface among those that look the same way, counted from 1, named or not."""
+    return 1 + sum(surface.side == surfaces[k].side for surface in surfaces[:k])
+
+
+def _face(surface: Surface, mark: Mark | None, number: int) -> Face:
+    outline, *holes = surface.rings()
+    name = mark.name if mark else f"auto_{SIDES[surface.side]}_{number}"
+    return Face(name, np.asarray(outline), tuple(holes), fit=bool(mark and mark.fit))

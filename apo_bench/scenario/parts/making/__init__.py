@@ -1,0 +1,29 @@
+"""Parts built from outlines, bores and shafts, and written as part files; lengths in mm."""
+
+from apo_bench.scenario.parts.making.body import Body, join
+from apo_bench.scenario.parts.making.extrude import Bore, bore, extrude
+from apo_bench.scenario.parts.making.frustums import Frustum
+from apo_bench.scenario.parts.making.outline import Edge, Outline, circle, polygon, rectangle, rounded, slot
+from apo_bench.scenario.parts.making.turned import shaft, turned
+from apo_bench.scenario.parts.making.writing import quoted, solid_of, write_part
+
+__all__ = [
+    "Body",
+    "Bore",
+    "Edge",
+    "Frustum",
+    "Outline",
+    "bore",
+    "circle",
+    "extrude",
+    "join",
+    "polygon",
+    "quoted",
+    "rectangle",
+    "rounded",
+    "shaft",
+    "slot",
+    "solid_of",
+    "turned",
+    "write_part",
+]

@@ -1,0 +1,190 @@
+"""Bodies as they are built: convex pieces, faces and exact moments, in [m]; and what becomes of them side by side."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, final
+
+import numpy as np
+import shapely
+
+from apo_bench.geometry import (
+    WHOLE_TURN,
+    Array,
+    Face,
+    Hull,
+    RoundFace,
+    flat_area,
+    polygons_of,
+    rings_of,
+    straightened,
+)
+from apo_bench.scenario.parts.making.moments import Moments, summed
+
+_SAME_M = 1e-9
+_PARALLEL = 1e-12
+_NARROW_M = 6e-6
+"""What is narrower is between two polygons of one circle."""
+
+
+@final
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A solid that is being built."""
+
+    pieces: tuple[Hull, ...]
+    flats: tuple[Face, ...]
+    """Those without a name are called ""."""
+    rounds: tuple[RoundFace, ...]
+    moments: Moments
+
+    def moved(self, at_mm: Sequence[float] = (0.0, 0.0, 0.0), turn_deg: Sequence[float] = (0.0, 0.0, 0.0)) -> "Body":
+        """Turned about x, then y, then z of the frame, in degrees, then shifted."""
+        from scipy.spatial.transform import Rotation
+
+        R = Rotation.from_euler("xyz", turn_deg, degrees=True).as_matrix()
+        t = 1e-3 * np.asarray(at_mm)
+        R = np.where(np.abs(R) < 1e-15, 0.0, R)
+        return Body(
+            tuple(_moved_piece(piece, R, t) for piece in self.pieces),
+            tuple(
+                replace(f, outline=f.outline @ R.T + t, holes=tuple(hole @ R.T + t for hole in f.holes))
+                for f in self.flats
+            ),
+            tuple(
+                replace(f, point=R @ f.point + t, axis=R @ f.axis, toward=None if f.toward is None else R @ f.toward)
+                for f in self.rounds
+            ),
+            self.moments.moved(R, t),
+        )
+
+    def with_rim(
+        self,
+        name: str,
+        at_mm: Sequence[float],
+        axis: Sequence[float],
+        radius_mm: float,
+        hole: bool = True,
+    ) -> "Body":
+        """With the circle at the end of a hole, or of a shaft, as a face of its own.
+
+        Args:
+            at_mm: Its middle.
+            axis: Out of the part.
+        """
+        n = np.asarray(axis, dtype=np.float64)
+        r = 1e-3 * radius_mm
+        rim = RoundFace(name, 1e-3 * np.asarray(at_mm), n / np.linalg.norm(n), (0.0, 0.0), (r, r), hole)
+        return replace(self, rounds=(*self.rounds, rim))
+
+    def prefixed(self, prefix: str) -> "Body":
+        """The same with names that begin so; faces without a name stay without."""
+        return replace(
+            self,
+            flats=tuple(replace(f, name=f.name and prefix + f.name) for f in self.flats),
+            rounds=tuple(replace(f, name=f.name and prefix + f.name) for f in self.rounds),
+        )
+
+
+def join(*bodies: Body) -> Body:
+    """Bodies that touch and do not overlap, as one: faces end where others lie on them, and go on beside them."""
+    flats = [face for body in bodies for face in body.flats]
+    rounds = [face for body in bodies for face in body.rounds]
+    return Body(
+        tuple(piece for body in bodies for piece in body.pieces),
+        tuple(_joined_flats(flats)),
+        tuple(_joined_rounds(rounds)),
+        summed(bodies[0].moments, (body.moments for body in bodies[1:])),
+    )
+
+
+def _moved_piece(piece: Hull, R: Array, t: Array) -> Hull:
+    cylinder = piece.cylinder
+    if cylinder is not None:
+        cylinder = cylinder._replace(center=R @ cylinder.center + t, axis=R @ cylinder.axis)
+    return Hull(piece.name, piece.corners @ R.T + t, cylinder)
+
+
+def _joined_flats(flats: Sequence[Face]) -> Iterable[Face]:
+    """Faces by plane: what looks one way less what looks the other way, and neighbours of one name as one."""
+    left = list(flats)
+    while left:
+        n = left[0].normal
+        d = float(n @ left[0].outline[0])
+        on = [f for f in left if abs(abs(n @ f.normal) - 1.0) < _PARALLEL and abs(n @ f.outline[0] - d) < _SAME_M]
+        left = [f for f in left if not any(f is each for each in on)]
+        to_plane = _plane(n)
+        same = [(f, flat_area(f.outline, f.holes, to_plane[:2].T)) for f in on if n @ f.normal > 0.0]
+        other = [(f, flat_area(f.outline, f.holes, to_plane[:2].T)) for f in on if n @ f.normal < 0.0]
+        if not other and len(same) == 1:
+            yield same[0][0]
+            continue
+        for ours, theirs, sign in ((same, other, 1.0), (other, same, -1.0)):
+            against = shapely.unary_union([area for _, area in theirs])
+            by_name: dict[tuple[str, bool], list[Any]] = {}
+            for face, area in ours:
+                by_name.setdefault((face.name, face.fit), []).append(area)
+            for (name, fit), areas in by_name.items():
+                rest = shapely.set_precision(shapely.unary_union(areas), 0.0).difference(against)
+                for polygon in _apart(rest):
+                    if not polygon.buffer(-_NARROW_M / 2).is_empty:
+                        yield _face(name, fit, polygon, to_plane, d, sign)
+
+
+def _apart(area: Any) -> Iterable[Any]:
+    """Polygons; what hangs together in a point alone is apart, since no file has the point twice."""
+    for polygon in polygons_of(area):
+        parts = [*polygons_of(shapely.set_precision(polygon, _SAME_M))]
+        yield from parts if len(parts) > 1 else [polygon]
+
+
+def _plane(n: Array) -> Array:
+    """Two directions across a normal, and it, as rows, (3, 3)."""
+    u = np.eye(3)[(int(np.abs(n).argmax()) + 1) % 3]
+    u = u - (u @ n) * n
+    u /= np.linalg.norm(u)
+    return np.array([u, np.cross(n, u), n])
+
+
+def _face(name: str, fit: bool, polygon: Any, to_plane: Array, d: float, sign: float) -> Face:
+    flat = [straightened(ring) for ring in rings_of(polygon, sign)]
+    outline, *holes = (np.asarray(ring @ to_plane[:2] + d * to_plane[2]) for ring in flat)
+    return Face(name, outline, tuple(holes), fit)
+
+
+def _joined_rounds(rounds: Sequence[RoundFace]) -> list[RoundFace]:
+    """Walls of one radius, one name and one axis that follow each other, as one."""
+    joined: list[RoundFace] = []
+    for face in rounds:
+        for i, other in enumerate(joined):
+            whole = _together(other, face)
+            if whole is not None:
+                joined[i] = whole
+                break
+        else:
+            joined.append(face)
+    return joined
+
+
+def _together(a: RoundFace, b: RoundFace) -> RoundFace | None:
+    if a.kind != "cylinder" or b.kind != "cylinder" or (a.hole, a.name, a.fit) != (b.hole, b.name, b.fit):
+        return None
+    off = b.point - a.point
+    along = off @ a.axis
+    turned = a.axis @ b.axis
+    same = (
+        abs(abs(turned) - 1.0) < _PARALLEL
+        and np.linalg.norm(off - along * a.axis) < _SAME_M
+        and abs(a.radius - b.radius) < _SAME_M
+        and abs(a.extent_rad - b.extent_rad) < 1e-9
+        and (a.extent_rad > WHOLE_TURN - 1e-9 or bool(np.linalg.norm(_toward(a) - _toward(b)) < 1e-9))
+    )
+    if not same:
+        return None
+    spans = sorted([a.span, tuple(sorted(along + np.sign(turned) * np.array(b.span)))])
+    if abs(spans[0][1] - spans[1][0]) > _SAME_M:
+        return None
+    return replace(a, span=(float(spans[0][0]), float(spans[1][1])))
+
+
+def _toward(face: RoundFace) -> Array:
+    return np.zeros(3) if face.toward is None else face.toward

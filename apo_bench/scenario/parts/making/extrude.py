@@ -1,0 +1,253 @@
+"""Prisms over flat outlines, with holes of any outline and with round bores along the way of the extrusion."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations, pairwise
+from typing import Any, final
+
+import numpy as np
+from shapely import Polygon, unary_union
+
+from apo_bench.arguments import check_arguments
+from apo_bench.geometry import WHOLE_TURN, Array, Face, Hull, RoundFace, straightened
+from apo_bench.scenario.parts.making.body import Body
+from apo_bench.scenario.parts.making.cells import bands, bore_cell, clipped, convex_cells, wedges
+from apo_bench.scenario.parts.making.frustums import (
+    Frustum,
+    at_height,
+    chamfered,
+    heights_of,
+    prism,
+    raised,
+    tangent,
+    without,
+)
+from apo_bench.scenario.parts.making.moments import extruded, summed
+from apo_bench.scenario.parts.making.outline import Outline, arc_of, circle, goes_on, outline_moments, receding, ring
+
+_NARROW_MM = 6e-3
+
+
+@final
+@dataclass(frozen=True)
+class Bore:
+    """A round hole along the way of the extrusion; its steps do not overlap, and may leave lengths without a hole."""
+
+    at: tuple[float, float]
+    """[mm]."""
+    steps: tuple[Frustum, ...]
+    flats: Mapping[float, str] | None = None
+    """Height -> name of the flat face there: the bottom of a blind bore, the ledge of a wider one."""
+
+    @property
+    def widest(self) -> float:
+        """How far the corners of its widest polygon are from its axis, [mm]."""
+        return max(max(step.radii) / np.cos(np.pi / step.count) for step in self.steps)
+
+
+@check_arguments
+def bore(
+    at: tuple[float, float],
+    radius: float,
+    low: float,
+    high: float,
+    name: str = "",
+    *,
+    fit: bool = False,
+    chamfer_low: float = 0.0,
+    chamfer_high: float = 0.0,
+    sides: int | None = None,
+) -> Bore:
+    """A cylindrical bore from one height to another one, with chamfers of 45 degrees, [mm].
+
+    The chamfers of `name` are called `name_chamfer_low` and `name_chamfer_high`.
+    """
+    wall = Frustum(low, high, radius, name=name, fit=fit, sides=sides)
+    return Bore(at, tuple(chamfered(wall, chamfer_low, chamfer_high, 1.0)))
+
+
+@check_arguments
+def extrude(
+    outline: Outline,
+    low: float,
+    high: float,
+    *,
+    holes: Sequence[Outline] = (),
+    bores: Sequence[Bore] = (),
+    bottom: str = "",
+    top: str = "",
+    fit: Sequence[str] = (),
+) -> Body:
+    """A prism along z, from one height to another one, [mm].
+
+    Args:
+        holes: Outlines, counter-clockwise too, that go all the way through.
+        bores: Round holes, cut into wedges that are tangent to them; what has no room for wedges of its own, and is a
+            cylinder all the way through, becomes a hole like others.
+        bottom: Name of the lower face; else one is found.
+        fit: Which of the two end faces, by name, recede by the clearance.
+
+    Raises:
+        ValueError: Holes meet each other or the outline, or another bore has no room for wedges.
+    """
+    area = Polygon(ring(outline), [ring(hole, hole=True) for hole in holes])
+    discs = [Polygon(tangent(b.at, b.widest * np.cos(np.pi / 64), 64)) for b in bores]
+    apart = all(not a.intersects(b) for a, b in combinations(discs, 2))
+    if not area.is_valid or area.area <= 0.0 or not apart or not all(area.contains(disc) for disc in discs):
+        raise ValueError("an outline with holes and bores inside of it, none of which meet, is needed")
+    beside = _bands(area, outline, holes)
+    rest = area.difference(unary_union([Polygon(band) for band in beside]))
+    cells = _cells(rest, bores)
+    if len(cells) < len(bores):
+        hole = _as_hole(bores[len(cells)], low, high)
+        others = [*bores[: len(cells)], *bores[len(cells) + 1 :]]
+        return extrude(outline, low, high, holes=[*holes, hole], bores=others, bottom=bottom, top=top, fit=fit)
+    for cell in cells:
+        rest = rest.difference(Polygon(cell))
+    prisms = [prism(cell, low, high) for cell in (*beside, *convex_cells(rest))]
+    moments = extruded(summed(outline_moments(outline), map(outline_moments, holes), -1.0), low, high)
+    for each in bores:
+        moments = without(moments, each.steps, each.at)
+    pieces = [*prisms, *(piece for b, cell in zip(bores, cells, strict=True) for piece in _bored(b, cell, low, high))]
+    sides = [_sides(outline, low, high, False), *(_sides(hole, low, high, True) for hole in holes)]
+    flats = [flat for own, _ in sides for flat in own]
+    rounds = [wall for _, own in sides for wall in own]
+    rounds += [step.wall(each.at, hole=True) for each in bores for step in each.steps]
+    flats += _ends(outline, holes, bores, low, high, bottom, top, fit)
+    flats += [face for each in bores for face in _ledges(each, low, high)]
+    return Body(
+        tuple(Hull("", 1e-3 * piece) for piece in pieces),
+        tuple(flats),
+        tuple(rounds),
+        moments.in_metres,
+    )
+
+
+def _bands(area: Any, outline: Outline, holes: Sequence[Outline]) -> list[Array]:
+    """Areas behind the sides that recede, of outlines and holes of which an arc does."""
+    rings = [] if not _round_fit(outline) else [(ring(outline), receding(outline))]
+    for hole in filter(_round_fit, holes):
+        fit = receding(hole, hole=True)
+        rings.append((ring(hole, hole=True)[::-1], np.roll(fit[::-1], -1)))
+    return bands(area, rings)
+
+
+def _round_fit(outline: Outline) -> bool:
+    return any(edge.fit and edge.center is not None for edge in outline)
+
+
+def _as_hole(each: Bore, low: float, high: float) -> Outline:
+    """A bore that is a cylinder all the way through as the outline of a hole."""
+    step = each.steps[0]
+    through = abs(step.low - low) < 1e-6 and abs(step.high - high) < 1e-6 and step.radii[0] == step.radii[1]
+    if len(each.steps) > 1 or not through:
+        raise ValueError(f"there is no convex area around the bore at {each.at} mm; cut the part in two beside it")
+    return circle(step.radius, each.at, step.name, step.fit, step.sides)
+
+
+def _cells(area: Any, bores: Sequence[Bore]) -> list[Array]:
+    """A convex area around each bore, none of which overlap, up to the first one that has no room for one."""
+    cells: list[Array] = []
+    for i, each in enumerate(bores):
+        others = [(np.array(b.at), b.widest) for k, b in enumerate(bores) if k != i]
+        cell = bore_cell(area, np.array(each.at), each.widest, others)
+        if cell is None:
+            break
+        area = area.difference(Polygon(cell))
+        cells.append(cell)
+    return cells
+
+
+def _bored(each: Bore, cell: Array, low: float, high: float) -> Iterator[Array]:
+    """The pieces of a cell around a bore, corners (k, 3) each."""
+    heights = heights_of(each.steps, low, high)
+    at = np.array(each.at)
+    for a, b in pairwise(heights):
+        step = next((s for s in each.steps if s.covers(a, b)), None)
+        if step is None:
+            yield prism(cell, a, b)
+            continue
+        r_a = step.at(a)
+        r_b = step.at(b)
+        for n, area in wedges(cell, at, step.count):
+            ends = [clipped(area, -n, -float(n @ at) - r) for r in (r_a, r_b)]
+            yield np.concatenate([raised(_each_once(end), z) for end, z in zip(ends, (a, b), strict=True)])
+
+
+def _each_once(flat: Array) -> Array:
+    """A ring without corners that are the same."""
+    return flat[np.linalg.norm(flat - np.roll(flat, 1, axis=0), axis=1) > 1e-6]
+
+
+def _sides(outline: Outline, low: float, high: float, hole: bool) -> tuple[list[Face], list[RoundFace]]:
+    """What becomes of the sides of an outline: flat faces of the straight ones, walls of the arcs."""
+    flats: list[Face] = []
+    rounds: list[RoundFace] = []
+    arcs = [arc_of(outline, i) for i in range(len(outline))]
+    for i, (edge, arc) in enumerate(zip(outline, arcs, strict=True)):
+        if arc is None:
+            b = outline[(i + 1) % len(outline)].start
+            corners = np.array([(*edge.start, low), (*b, low), (*b, high), (*edge.start, high)])
+            flats.append(Face(edge.name, 1e-3 * (corners[::-1] if hole else corners), fit=edge.fit))
+            continue
+        if goes_on(arcs[i - 1], arc) and outline[i - 1].name == edge.name and i > 0:
+            continue
+        extent = abs(arc.turn)
+        for k in range(i + 1, len(outline)):
+            after = arcs[k]
+            if after is None or not goes_on(arcs[k - 1], after) or outline[k].name != edge.name:
+                break
+            extent += abs(after.turn)
+        middle = arc.first + np.sign(arc.turn) * extent / 2.0
+        whole = extent > WHOLE_TURN - 1e-9
+        rounds.append(
+            RoundFace(
+                name=edge.name,
+                point=1e-3 * np.array([*arc.center, 0.0]),
+                axis=np.array([0.0, 0.0, 1.0]),
+                span=(1e-3 * low, 1e-3 * high),
+                radii=(1e-3 * arc.radius, 1e-3 * arc.radius),
+                hole=hole != edge.clockwise,
+                fit=edge.fit,
+                extent_rad=WHOLE_TURN if whole else extent,
+                toward=None if whole else np.array([np.cos(middle), np.sin(middle), 0.0]),
+            )
+        )
+    return flats, rounds
+
+
+def _ends(
+    outline: Outline,
+    holes: Sequence[Outline],
+    bores: Sequence[Bore],
+    low: float,
+    high: float,
+    bottom: str,
+    top: str,
+    fit: Sequence[str],
+) -> Iterator[Face]:
+    for z, name, above in ((low, bottom, True), (high, top, False)):
+        openings = [tangent(b.at, *opening) for b in bores if (opening := at_height(b.steps, z, above))[1]]
+        inner = [*(ring(hole, hole=True) for hole in holes), *openings]
+        yield flat_face(name, ring(outline), inner, z, up=not above, fit=name in fit and bool(name))
+
+
+def _ledges(each: Bore, low: float, high: float) -> Iterator[Face]:
+    """The flat faces across a bore, between its ends."""
+    for z in heights_of(each.steps):
+        if z - low < 1e-6 or high - z < 1e-6:
+            continue
+        below = at_height(each.steps, z, False)
+        above = at_height(each.steps, z, True)
+        name = (each.flats or {}).get(z, "")
+        wide, slim = (above, below) if above[0] > below[0] else (below, above)
+        if wide[0] - slim[0] > _NARROW_MM:
+            hole = [tangent(each.at, *slim)] if slim[1] else []
+            yield flat_face(name, tangent(each.at, *wide), hole, z, up=above[0] > below[0])
+
+
+def flat_face(name: str, outline: Array, holes: Sequence[Array], z: float, up: bool, fit: bool = False) -> Face:
+    """A level face from rings in mm, all counter-clockwise, that looks up or down."""
+    turned = [1e-3 * raised(straightened(each), z) for each in (outline, *holes)]
+    outside, *inside = turned if up else [each[::-1] for each in turned]
+    return Face(name, outside, tuple(hole[::-1] for hole in inside), fit)

@@ -1,0 +1,225 @@
+"""Bodies that were built become solids, and part files that are read as these solids again."""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+import numpy as np
+
+from apo_bench.errors import require
+from apo_bench.geometry import WHOLE_TURN, Array, Box, Face, Hull, Piece, RoundFace, Solid, all_boxes, flat_area
+from apo_bench.io import write_file
+from apo_bench.scenario.parts.allowed import THINNEST_M, is_name
+from apo_bench.scenario.parts.making.body import Body
+from apo_bench.scenario.parts.stated import PART_SCHEMA
+
+_ALIGNED = 1e-9
+_STEEL = (0.70, 0.72, 0.75)
+
+
+def solid_of(name: str, body: Body) -> Solid:
+    """The solid: pieces called `p1`, `p2`, ..., faces without a name `auto_px_1`, `auto_flat_1`, `auto_bore_1`, ...
+
+    Raises:
+        ValueError: Two faces have one name.
+    """
+    named = [face.name for faces in (body.flats, body.rounds) for face in faces if face.name]
+    if len(set(named)) < len(named):
+        raise ValueError(f"part '{name}' has faces with one name; each needs its own: {', '.join(sorted(named))}")
+    flats = _called(sorted(body.flats, key=_place))
+    rounds = _called(body.rounds)
+    return Solid(
+        name=name,
+        faces={face.name: face for face in flats},
+        pieces=tuple(_piece(f"p{i}", piece) for i, piece in enumerate(body.pieces, start=1)),
+        centroid=body.moments.centroid,
+        volume=body.moments.size,
+        rounds={face.name: face for face in rounds},
+        inertia=body.moments.inertia,
+    )
+
+
+_Some = TypeVar("_Some", Face, RoundFace)
+
+
+def _called(faces: Iterable[_Some]) -> list[_Some]:
+    """Faces, each with a name: those without get one, with a number that counts all of their kind, and come last."""
+    counts: dict[str, int] = {}
+    named = []
+    for face in faces:
+        stem = _stem(face)
+        counts[stem] = counts.get(stem, 0) + 1
+        named.append(face if face.name else replace(face, name=f"auto_{stem}_{counts[stem]}"))
+    return sorted(named, key=lambda face: face.name.startswith("auto_"))
+
+
+def _place(face: Face) -> tuple[float, ...]:
+    """Height of a face along the axis that it looks along, then its lowest corner: the order of faces of boxes."""
+    axis = int(np.abs(face.normal).argmax())
+    low = face.outline.min(axis=0)
+    return tuple(round(float(low[i % 3]), 9) for i in (axis, axis + 1, axis + 2))
+
+
+def _stem(face: Face | RoundFace) -> str:
+    if isinstance(face, RoundFace):
+        return {"cylinder": "bore" if face.hole else "shaft", "cone": "cone", "rim": "rim"}[face.kind]
+    axis = int(np.abs(face.normal).argmax())
+    if abs(face.normal[axis]) < 1.0 - _ALIGNED:
+        return "flat"
+    return ("p" if face.normal[axis] > 0.0 else "n") + "xyz"[axis]
+
+
+def _piece(name: str, hull: Hull) -> Piece:
+    """A piece; a box where it is one."""
+    if hull.cylinder is None and len(hull.corners) == 8 and hull.half.min() >= THINNEST_M:
+        box = Box(name, hull.center, hull.half)
+        if np.abs(hull.corners[:, None] - box.corners[None]).max(axis=2).min(axis=0).max() < _ALIGNED:
+            return box
+    return replace(hull, name=name)
+
+
+def write_part(
+    name: str,
+    body: Body,
+    folder: Path,
+    *,
+    density: float = 1000.0,
+    friction: Sequence[float] = (0.8, 0.005, 0.0001),
+    color: tuple[float, float, float] = _STEEL,
+    source: str,
+    licence: str,
+    title: str = "",
+) -> Path:
+    """Write `NAME.xml` and, unless all of its pieces are boxes, `NAME.toml`, so that `load_part` gives back the solid.
+
+    Args:
+        density: [kg/m^3].
+        friction: Sliding, turning, rolling.
+        color: Red, green, blue, 0 to 1.
+        source: Where the shape comes from.
+        title: What a person calls the part, in any letters.
+    """
+    require(is_name(name), f"the name '{name}' of a part must be a letter, then letters, digits and underscores.")
+    require(density > 0.0, f"a density of {density:g} kg/m^3 was given; a number above 0 is allowed.")
+    solid = solid_of(name, body)
+    path = folder / f"{name}.xml"
+    boxes = all_boxes(solid.pieces)
+    matter = {"density": f"{density:g}", "friction": _words(friction)} if boxes else {}
+    root = _tree(solid, {**matter, "rgba": _words((*color, 1.0))})
+    said = "; ".join(filter(None, (title, source, licence))).replace("--", "- -")  # which would end the comment
+    note = f"<!-- {said} -->\n" if boxes else ""
+    indent(root)
+    write_file(path, note + tostring(root, encoding="unicode") + "\n")
+    if not boxes:
+        write_file(path.with_suffix(".toml"), stated_text(solid, density, friction, source, licence, title))
+    return path
+
+
+def _tree(solid: Solid, attributes: dict[str, Any]) -> Element:
+    root = Element("mujoco", model=solid.name)
+    default = SubElement(root, "default")
+    SubElement(default, "geom", type="box" if all_boxes(solid.pieces) else "mesh", **attributes)
+    meshes = [p for p in solid.pieces if isinstance(p, Hull) and p.cylinder is None]
+    if all_boxes(solid.pieces):
+        SubElement(default, "site", size="0.0015", group="4")
+        SubElement(SubElement(default, "default", {"class": "fit"}), "site", size="0.002", group="4")
+    if meshes:
+        asset = SubElement(root, "asset")
+        for mesh in meshes:
+            SubElement(asset, "mesh", name=mesh.name, vertex=_words(mesh.corners.ravel()))
+    body = SubElement(SubElement(root, "worldbody"), "body", name=solid.name)
+    for piece in solid.pieces:
+        SubElement(body, "geom", name=piece.name, **_geom(piece))
+    if all_boxes(solid.pieces):
+        for face in solid.faces.values():
+            fit = {"class": "fit"} if face.fit else {}
+            if not face.name.startswith("auto_"):
+                SubElement(body, "site", {"name": face.name, **fit, "pos": _words(_inside(face))})
+    return root
+
+
+def _geom(piece: Piece) -> dict[str, Any]:
+    if isinstance(piece, Box):
+        return {"type": "box", "pos": _words(piece.center), "size": _words(piece.half)}
+    if piece.cylinder is None:
+        return {"type": "mesh", "mesh": piece.name}
+    center, axis, radius, half = piece.cylinder
+    return {"type": "cylinder", "pos": _words(center), "zaxis": _words(axis), "size": _words((radius, half))}
+
+
+def _inside(face: Face) -> Array:
+    """A point of a face, well inside of it."""
+    axis = int(np.abs(face.normal).argmax())
+    plane = [(axis + 1) % 3, (axis + 2) % 3]
+    point = flat_area(face.outline, face.holes, np.eye(3)[:, plane]).representative_point()
+    inside = np.array(face.outline[0])
+    inside[plane] = point.x, point.y
+    return inside
+
+
+def stated_text(
+    solid: Solid, density: float, friction: Sequence[float], source: str, licence: str, title: str = ""
+) -> str:
+    """The text of `NAME.toml`."""
+    assert solid.inertia is not None
+    six = 1e15 * solid.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+    lines = [
+        f'schema = "{PART_SCHEMA}"',
+        *([f"title = {quoted(title)}"] if title else []),
+        f"source = {quoted(source)}",
+        f"licence = {quoted(licence)}",
+        f"density = {float(density)!r}",
+        f"friction = {_list(friction)}",
+        f"volume_mm3 = {1e9 * solid.volume:.12g}",
+        f"centroid_mm = {_list(1e3 * solid.centroid)}",
+        "inertia_mm5 = [" + ", ".join(f"{x:.12g}" for x in six) + "]  # xx, yy, zz, xy, xz, yz",
+    ]
+    for flat in solid.faces.values():
+        lines += ["", f"[faces.{flat.name}]", 'kind = "plane"', f"outline_mm = {_rows(flat.outline)}"]
+        if flat.holes:
+            lines.append("holes_mm = [" + ", ".join(map(_rows, flat.holes)) + "]")
+        lines += ["fit = true"] * flat.fit
+    for wall in solid.rounds.values():
+        lines += ["", *_round_lines(wall)]
+    return "\n".join(lines) + "\n"
+
+
+def _round_lines(wall: RoundFace) -> list[str]:
+    part = wall.toward is not None and wall.extent_rad < WHOLE_TURN
+    radii = ("radii_mm", _list(1e3 * np.array(wall.radii)))
+    said = {
+        "kind": f'"{wall.kind}"',
+        "at_mm": _list(1e3 * wall.point),
+        "axis": _list(wall.axis, 12),
+        **dict([radii if wall.kind == "cone" else ("radius_mm", _number(1e3 * wall.radius, 9))]),
+        "span_mm": _list(1e3 * np.array(wall.span)) if wall.kind != "rim" else "",
+        "hole": str(wall.hole).lower(),
+        "fit": "true" if wall.fit else "",
+        "extent_deg": _number(np.degrees(wall.extent_rad), 9) if part else "",
+        "toward": _list(wall.toward, 12) if part and wall.toward is not None else "",
+    }
+    return [f"[faces.{wall.name}]", *(f"{key} = {value}" for key, value in said.items() if value)]
+
+
+def _rows(points: Array) -> str:
+    return "[" + ", ".join(_list(1e3 * point) for point in points) + "]"
+
+
+def _list(values: Iterable[float], digits: int = 9) -> str:
+    return "[" + ", ".join(_number(x, digits) for x in values) + "]"
+
+
+def _words(values: Iterable[float]) -> str:
+    return " ".join(_number(x, 12) for x in values)
+
+
+def _number(x: float, digits: int) -> str:
+    text = f"{x:.{digits}f}".rstrip("0").rstrip(".")
+    return "0" if text in ("-0", "") else text
+
+
+def quoted(text: str) -> str:
+    """A text as a TOML file has it."""
+    return '"' + text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", " ") + '"'

@@ -1,0 +1,161 @@
+"""A trial in a browser, by viser: stepped through with a slider and buttons; served on this machine only."""
+
+import io
+import time
+from collections import Counter, deque
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from importlib.util import find_spec
+from typing import Any
+
+import numpy as np
+
+from apo_bench.errors import InputError
+from apo_bench.simulation.film.film import FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG
+from apo_bench.simulation.film.framing import frame_parts
+from apo_bench.simulation.film.shapes import ShapeKind, shapes_of, surface
+from apo_bench.simulation.film.window import PICTURE_S
+from apo_bench.simulation.scene import initial_state
+from apo_bench.trial.story import Story
+from apo_bench.viz.stepping import Cursor
+
+HOST = "127.0.0.1"
+PORT = 8080
+_FOV_RAD = np.radians(45.0)  # as in films
+_BUTTONS = (
+    {"play / stop": "play", "moment back": "previous", "moment on": "next"},
+    {"operation back": "previous operation", "operation on": "next operation"},
+    {"demonstration": "previous chapter", "replay": "next chapter"},
+    {"names of faces": "faces", "goals": "goals"},
+)
+"""Label -> what `Cursor.press` is told."""
+
+
+def no_browser() -> str:
+    """Why nothing can be shown in a browser, empty where it can."""
+    if find_spec("viser") is None:
+        return 'viser is not installed; install it with: pip install "apo_bench[view]"'
+    return ""
+
+
+def serve_story(story: Story, port: int, say: Callable[[str], None], ends: Callable[[], bool] = lambda: False) -> None:
+    """Serve a story until `ends` says so, or Ctrl-C.
+
+    Args:
+        say: Told where it is to be seen.
+
+    Raises:
+        InputError: The port is taken or not allowed.
+    """
+    page = Page(story, port)
+    try:
+        say(f"Open {page.address} in a browser on this machine; Ctrl-C ends it.")
+        before = time.monotonic()
+        while not ends():
+            page.draw()
+            time.sleep(PICTURE_S)
+            now = time.monotonic()
+            page.cursor.pass_time(now - before)
+            before = now
+    finally:
+        page.close()
+
+
+class Page:
+    """What one browser, or several, see: they share one place in the story."""
+
+    def __init__(self, story: Story, port: int) -> None:
+        self.cursor = Cursor(story)
+        self._asked = deque[str | int]()
+        self._data = initial_state(story.scene.work, story.chapters[0].start)
+        self._server = _server(port)
+        self._drawn: object = None
+        self._shown: dict[tuple[ShapeKind, int], Any] = {}
+        self.address = f"http://{HOST}:{self._server.get_port()}"
+        self._aim_camera(story)
+        self._add_controls()
+
+    def close(self) -> None:
+        with redirect_stdout(io.StringIO()):
+            self._server.stop()
+
+    def draw(self) -> None:
+        """Do what was asked for, and bring the page up to date if anything has changed."""
+        while self._asked:
+            asked = self._asked.popleft()
+            if isinstance(asked, str):
+                self.cursor.press(asked)
+            elif not self.cursor.playing:
+                self.cursor.go(asked)
+        state = (self.cursor.place, self.cursor.faces, self.cursor.shows_goals)
+        if state == self._drawn:
+            return
+        snapshot = self.cursor.snapshot()
+        count = Counter[ShapeKind]()
+        with self._server.atomic():
+            for kind, at in shapes_of(self.cursor.story.scene, self._data, snapshot):
+                handle = self._handle(kind, count[kind])
+                count[kind] += 1
+                if not np.array_equal(at, (*handle.position, *handle.wxyz)):
+                    handle.position = at[:3]
+                    handle.wxyz = at[3:]
+            for (kind, number), handle in self._shown.items():
+                if handle.visible != (number < count[kind]):
+                    handle.visible = number < count[kind]
+            self._words.content = "\n\n".join((f"**{snapshot.chapter.title}**", *snapshot.words))
+            self._slider.value = state[0]
+        self._drawn = state
+
+    def _handle(self, kind: ShapeKind, number: int) -> Any:
+        """What viser draws of a shape, made when one of its kind is first seen."""
+        if (kind, number) not in self._shown:
+            name = f"/{len(self._shown)}"
+            if kind.label:
+                handle = self._server.scene.add_label(name, kind.label, anchor="center-center")
+            else:
+                mesh = surface(self.cursor.story.scene.work.model, kind)
+                handle = self._server.scene.add_mesh_simple(
+                    name,
+                    mesh.vertices.astype(np.float32),
+                    mesh.faces.astype(np.uint32),
+                    color=kind.rgba[:3],
+                    opacity=None if kind.rgba[3] == 1.0 else kind.rgba[3],
+                    flat_shading=True,
+                )
+            self._shown[kind, number] = handle
+        return self._shown[kind, number]
+
+    def _aim_camera(self, story: Story) -> None:
+        self._server.scene.set_up_direction("+z")
+        self._server.scene.configure_default_lights(cast_shadow=False)
+        at, far = frame_parts(story.scene.scenario.assembly, [story.assembled])
+        azimuth, elevation = np.radians([FILM_AZIMUTH_DEG, FILM_ELEVATION_DEG])
+        # where the camera looks, as a unit vector
+        ahead = [np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)]
+        view = self._server.initial_camera
+        view.look_at = at
+        view.position = at - far * np.array(ahead)
+        view.fov = _FOV_RAD
+
+    def _add_controls(self) -> None:
+        gui = self._server.gui
+        gui.configure_theme(show_share_button=False, show_logo=False, control_width="large")
+        gui.set_panel_label("apo-bench view")
+        self._words = gui.add_markdown("")
+        self._slider = gui.add_slider("moment", 0, len(self.cursor.places) - 1, 1, 0)
+        self._slider.on_update(lambda event: self._asked.append(int(event.target.value)))
+        for keys in _BUTTONS:
+            group = gui.add_button_group("", tuple(keys))
+            group.on_click(lambda event, keys=keys: self._asked.append(keys[event.target.value]))
+
+
+def _server(port: int) -> Any:
+    import viser
+
+    try:
+        with redirect_stdout(io.StringIO()):  # it says where it is in a box of its own
+            return viser.ViserServer(host=HOST, port=port, label="apo-bench view", verbose=False)
+    except OSError as error:
+        raise InputError(
+            f"--port {port} was given, which cannot be served ({error.strerror or error}); choose another one."
+        ) from error

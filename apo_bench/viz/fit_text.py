@@ -1,0 +1,117 @@
+"""What `apo-bench noise fit` found: as JSON, as lines, and as notes of a noise file."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from apo_bench.geometry import Array
+from apo_bench.io import columns
+from apo_bench.perception.observation.fitting.fit import PERCENTILES, Figures, outliers_by_score
+from apo_bench.perception.observation.models import TURNED_DEG, MeasuredNoise, Residuals, Split
+
+_SCHEMA = "apo-bench/noise-fit/2"
+_RARE = 0.01
+_NOTED = ("parts", "images", "distance_mm", "found", "left_over", "turned", "turned_and_off", "round_objects")
+"""What of a fit stands in the notes of a noise file."""
+
+
+def fit_form(residuals: Residuals, measured: MeasuredNoise, figures: Sequence[Figures]) -> dict[str, Any]:
+    """Everything that was counted and fitted: mm and degrees; degrees of freedom are null for a Gaussian."""
+    inlier = residuals.inlier
+    turned = inlier & ~residuals.upright
+    shift = residuals.shift_mm[residuals.upright]
+    across = max(float(np.median(residuals.across_mm[inlier])), 1e-9)
+    return {
+        "schema": _SCHEMA,
+        "source": measured.source,
+        "parts": len(residuals.where),
+        "images": len(np.unique(residuals.where[:, :2], axis=0)),
+        "distance_mm": residuals.distance_mm,
+        "found": int(residuals.found.sum()),
+        "missed_rate": measured.missed,
+        "left_over": residuals.surplus,
+        "of_absent_objects": residuals.absent,
+        "inliers": int(inlier.sum()),
+        "outlier_rate": measured.outliers,
+        "outlier_farthest_mm": measured.farthest_mm,
+        "outliers_by_score": [band._asdict() for band in outliers_by_score(residuals)],
+        "turned": int(turned.sum()),
+        "turned_and_off": int((measured.shift_mm.cdf_across(residuals.across_mm[turned]) > 1.0 - _RARE).sum()),
+        "round_objects": list(residuals.round_objects),
+        "bias_mm": shift.mean(axis=0).tolist(),
+        "bias_standard_error_mm": (shift.std(axis=0) / np.sqrt(len(shift))).tolist(),
+        "along_over_across": float(np.median(residuals.along_mm[inlier])) / across,
+        "percentiles": list(PERCENTILES),
+        "inlier_across_mm": _percentiles(residuals.across_mm[inlier]),
+        "inlier_along_mm": _percentiles(residuals.along_mm[inlier]),
+        "inlier_turn_deg": _percentiles(residuals.angle_deg[inlier]),
+        "inlier_turn_by_trace_deg": _percentiles(residuals.trace_deg[inlier]),
+        "fit": {
+            f.name: {
+                "unit": f.unit,
+                "observed": f.observed.tolist(),
+                "fitted": f.fitted.tolist(),
+                "kolmogorov_smirnov": f.distance,
+                "kolmogorov_smirnov_by_chance": f.by_chance,
+            }
+            for f in figures
+        },
+        "shift_mm": _split_form(measured.shift_mm),
+        "turn_deg": _split_form(measured.turn_deg),
+    }
+
+
+def fit_lines(form: Mapping[str, Any]) -> list[str]:
+    """A form of `fit_form` to be read, line by line."""
+    left_out = ("schema", "percentiles", "fit")
+    facts = [(_name(key), _say(value)) for key, value in form.items() if key not in left_out]
+    lines = [*columns([fact for fact in facts if not fact[0].startswith("inlier ")]), ""]
+    lines.append(" " * 33 + "".join(f"{f'p{p}':>8}" for p in form["percentiles"]))
+    for name, of in form["fit"].items():
+        for head, word in ((f"{name} [{of['unit']}]", "observed"), ("", "fitted")):
+            lines.append(f"{head:25}{word:8}" + "".join(f"{value:8.2f}" for value in of[word]))
+    return [*lines, "", *_goodness_lines(form)]
+
+
+def fit_notes(form: Mapping[str, Any]) -> tuple[str, ...]:
+    """What a reader of the noise file should know of the fit, one line each."""
+    return (
+        "Level 1 is as measured: mm and degrees, Student t, none beyond the limit.",
+        f"Inliers that are turned by more than {TURNED_DEG:g} deg are not fitted: symmetries are not known.",
+        *(f"{_name(key)}: {_say(form[key])}" for key in _NOTED),
+        *_goodness_lines(form),
+    )
+
+
+def _goodness_lines(form: Mapping[str, Any]) -> list[str]:
+    """How well each distribution fits."""
+    return [
+        f"{name}: Kolmogorov-Smirnov {of['kolmogorov_smirnov']:.3f}, by chance below "
+        f"{of['kolmogorov_smirnov_by_chance']:.3f}"
+        for name, of in form["fit"].items()
+    ]
+
+
+def _name(key: str) -> str:
+    return key.replace("_", " ")
+
+
+def _say(value: Any) -> str:
+    """Numbers with four digits, lists with commas, objects with their keys."""
+    if isinstance(value, Mapping):
+        return ", ".join(f"{_name(key)} {_say(of)}" for key, of in value.items())
+    if isinstance(value, list):
+        return ("; " if value and isinstance(value[0], Mapping) else ", ").join(map(_say, value)) or "none"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)
+
+
+def _percentiles(values: Array) -> list[float]:
+    return list(map(float, np.percentile(values, PERCENTILES)))
+
+
+def _split_form(split: Split) -> dict[str, Any]:
+    return {"limit": split.limit} | {
+        name: {"scale": t.scale, "degrees_of_freedom": t.freedom if np.isfinite(t.freedom) else None}
+        for name, t in {"across": split.across, "along": split.along}.items()
+    }

@@ -1,0 +1,60 @@
+"""Calibration: what rows say about coverage, alarms and culprits."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from apo_bench import InputError
+from apo_bench.benchmark.analysis import calibrations
+from apo_bench.benchmark.report.tables.methods import calibration_table
+from apo_bench.records import ROW_FIELDS
+from apo_bench.records.run.run_folder import read_rows
+from tests.benchmark.analysis.test_rates import row, write
+
+
+def corrected(seed: int, passes: bool, suspects: tuple[str, ...] = (), **more: Any) -> dict[str, Any]:
+    """What calibration looks at in the row of a corrector with a test."""
+    said = {"test_passes": passes, "p_value": 0.5 if passes else 1e-6, "suspects": list(suspects)}
+    errors = {"planned_error_fixed_mm": 0.3 + 0.1 * seed, "planned_error_free_mm": 2.0, "inside_95": seed > 0}
+    return row("contact", seed=seed) | said | errors | more
+
+
+def test_calibration_counts_coverage_alarms_and_culprits() -> None:
+    wrong = {"relations": "shifted:3", "wrong_relation": "R2"}
+    rows = [
+        *(row("oracle", seed=0), row("none", seed=0), row(seed=0, level=None, level_deg=None, careless=None)),
+        *(
+            corrected(0, True),
+            corrected(1, False, ("R1",)),
+            corrected(2, True, inside_95=None),
+            row("contact", 3, None),
+        ),
+        *(
+            corrected(0, True, **wrong),
+            corrected(1, False, ("R1", "R2"), **wrong),
+            corrected(2, False, ("R3",), **wrong),
+        ),
+        corrected(3, False, ("R3",), **wrong | {"relations": "missed", "wrong_relation": None}),
+    ]
+    raw, right, missed, shifted = calibrations(rows)
+    assert [raw[name] for name in ("method", "covered", "failed_tests", "fixed_mm")] == ["none", (0, 0), (0, 0), None]
+    assert [right[name] for name in ("covered", "failed_tests", "culprits")] == [(1, 2), (1, 3), (0, 0)]
+    assert right["fixed_mm"] == pytest.approx(math.sqrt((0.09 + 0.16 + 0.25) / 3))
+    assert right["fixed_over_clearance"] == pytest.approx(right["fixed_mm"] / 0.25)
+    assert right["free_mm"] == 2.0
+    assert (shifted["failed_tests"], shifted["culprits"]) == ((2, 3), (1, 2))
+    assert (missed["failed_tests"], missed["culprits"]) == ((1, 1), (0, 0))
+    lines = "\n".join(calibration_table((raw, right, missed, shifted)).markdown())
+    assert "| none | 0 | – | – | – | – | – | – |" in lines
+    assert "| shifted:3 | contact | 3 | 66.7 % of 3 | 0.408 | 1.63 | 2.000 | 66.7 % of 3 | 50.0 % of 2 |" in lines
+
+
+def test_rows_of_a_schema_before_are_refused(tmp_path: Path) -> None:
+    folder = write(tmp_path / "new", [row()])
+    assert read_rows(folder) == [dict.fromkeys(ROW_FIELDS) | row()]
+    with pytest.raises(InputError, match="a row of schema 'apo-bench/row/8' was given"):
+        read_rows(write(tmp_path / "older", [row() | {"schema": "apo-bench/row/8"}]))

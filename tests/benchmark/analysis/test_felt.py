@@ -1,0 +1,66 @@
+"""What robots felt about themselves: summaries beside what was drawn and told, and what cells and tables say of it."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import pytest
+
+from apo_bench.benchmark.analysis import felt, members, settings, tally
+from apo_bench.benchmark.analysis.paired import place_of_reference
+from apo_bench.benchmark.report.tables.cells import cell_table
+from apo_bench.benchmark.report.tables.methods import felt_table
+from tests.benchmark.analysis.test_rates import row
+
+
+def by_touch(seed: int, mm: float, method: str = "contact+feel", **more: Any) -> dict[str, Any]:
+    sizes = {"felt_mm": mm, "felt_deg": 0.1, "felt_sure_mm": 0.2, "felt_sure_deg": 0.05}
+    given = {"wrench": "external", "stated_error": "drawn", "robot_error": "hand_eye:0.5/0.1+tool:1"}
+    return {**row(method, seed), **given, **sizes, "touches": 6 + seed, "touches_refused": seed, **more}
+
+
+def test_sizes_are_root_mean_squares_of_vectors_as_standard_deviations_are() -> None:
+    (found,) = felt([by_touch(0, 0.3), by_touch(1, 0.4), row("contact")])
+    assert (found["trials"], found["touches"], found["refused"]) == (2, 6.5, 1)
+    assert found["felt_mm"] == pytest.approx(math.sqrt((0.09 + 0.16) / 2))
+    assert (found["sure_mm"], found["sure_deg"]) == pytest.approx((0.2, 0.05))
+    assert found["drawn_mm"] == found["stated_mm"] == pytest.approx(math.sqrt(3) * 0.5)
+    assert found["drawn_deg"] == found["stated_deg"] == pytest.approx(math.sqrt(3) * 0.1)
+
+
+@pytest.mark.parametrize(("stated", "told"), [("unstated", None), ("tool:1", (0.0, 0.0)), ("drawn", (0.866, 0.173))])
+def test_what_a_robot_was_told_stands_beside_what_was_drawn(stated: str, told: tuple[float, float] | None) -> None:
+    (found,) = felt([by_touch(0, 0.3, stated_error=stated)])
+    said = (found["stated_mm"], found["stated_deg"])
+    assert said == ((None, None) if told is None else pytest.approx(told, abs=1e-3))
+    (line,) = felt_table((found,)).lines
+    assert "0.87" in line
+    assert "0.30" in line
+    assert ("–" in line) == (told is None)
+
+
+def test_where_no_robot_felt_one_sentence_says_so() -> None:
+    assert felt_table(felt([row("contact")])).markdown() == ["No robot felt."]
+
+
+def test_sensors_and_stated_errors_are_cells_of_robots_that_feel_alone() -> None:
+    rows = [by_touch(0, 0.3, wrench=wrench) for wrench in ("cobot", "external")]
+    plain = {**row("contact"), "robot_error": rows[0]["robot_error"]}
+    cells = tally([*rows, plain])
+    assert [(cell.method, cell.wrench) for cell in cells] == [
+        ("contact", "external"),
+        ("contact+feel", "external"),
+        ("contact+feel", "cobot"),
+    ]
+    groups = members(settings(cells), cells)
+    assert sorted((s.wrench, tuple(cell.method for cell in own)) for s, own in groups.items()) == [
+        ("cobot", ("contact", "contact+feel")),
+        ("external", ("contact", "contact+feel")),
+    ]
+    assert ["wrench cobot" in s.title for s in groups] == [s.wrench == "cobot" for s in groups]
+    assert place_of_reference(cells[2], "none").wrench == "external"
+    table = cell_table(cells)
+    shown = [column.head for column in table.shown].index("wrench")
+    assert [line[shown] for line in table.lines] == ["any", "external", "cobot"]
+    assert "stated_error" not in [column.head for column in table.shown]

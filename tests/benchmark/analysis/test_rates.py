@@ -1,0 +1,310 @@
+"""Rates, intervals, the table and the figure."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from statsmodels.stats.proportion import proportion_confint
+
+from apo_bench import InputError
+from apo_bench.benchmark.analysis import Rate, confusions, efforts, members, summary, tally, wilson
+from apo_bench.benchmark.analysis import settings as settings_of_cells
+from apo_bench.benchmark.report.figures.style import OWN_STYLES, STYLES
+from apo_bench.benchmark.report.report import report
+from apo_bench.benchmark.report.tables.cells import cell_table
+from apo_bench.benchmark.report.tables.methods import prediction_summary
+from apo_bench.records import ROW
+from tests import pages
+
+UNKNOWN = dict.fromkeys(
+    (
+        *("chi_square", "chi_square_freedom", "p_value", "test_passes", "suspects", "dropped", "wrong_relation"),
+        *("inside_95", "planned_error_fixed_mm", "planned_error_free_mm"),
+    )
+)
+"""What a row says where nothing was corrected or planned."""
+UNCOUNTED = dict.fromkeys(("contacts_right", "contacts_missed", "contacts_false"))
+"""What a row says of a method that is told no contacts."""
+
+
+def row(method: str = "none", seed: int = 0, success: bool | None = True, **more: Any) -> dict[str, Any]:
+    """What statistics looks at in a row."""
+    failed = success is False
+    return {
+        "schema": ROW,
+        "env_id": "APOReplay-v0",
+        "spec_hash": "0123456789abcdef",
+        "scenario": "stick_in_tower",
+        "clearance_mm": 0.25,
+        "careless": 0.0 if method == "oracle" else 1.0,
+        "level": 0.0 if method == "oracle" else 1.0,
+        "level_deg": 0.0 if method == "oracle" else 1.0,
+        "noise": "isotropic",
+        "relations": "given",
+        "grasp": "friction",
+        "fidelity": "full",
+        "arm": "six_axis",
+        "eye": "noise",
+        "timestep_s": 0.001,
+        "method": method,
+        "looks": 0,
+        "robot_error": "none",
+        "wrench": "external",
+        "stated_error": "drawn",
+        "abstain": 0.0,
+        "seed": seed,
+        "salt": None,
+        **UNKNOWN,
+        "demonstration": "demonstration_failed" if success is None else "ok",
+        "success": success,
+        "as_demonstrated": success,
+        "loose_success": success,
+        "failure_stage": "attach" if failed else None,
+        "failure_code": "force_stop" if failed else None,
+        "failure_operation": 3 if failed else None,
+        "predicted": None if success is None else foretold(failed),
+        "extra_operations": None if success is None else 0,
+        "sim_seconds": None if success is None else 20.0,
+        "pushed_mm": None if success is None else 0.1,
+    } | more
+
+
+def foretold(fails: bool, operation: int = 3) -> dict[str, Any]:
+    """What a plan said about itself."""
+    code, size = ("residual", 2.0) if fails else ("ok", 0.1)
+    return {"fails": fails, "operation": operation if fails else None, "code": code, "size_mm": size}
+
+
+def write(folder: Path, rows: list[dict[str, Any]]) -> Path:
+    folder.mkdir(exist_ok=True)
+    (folder / "trials.jsonl").write_text("".join(json.dumps(r) + "\n" for r in rows))
+    return folder
+
+
+@pytest.mark.parametrize(
+    ("successes", "trials", "expected"),
+    [(81, 263, (0.2553, 0.3662)), (0, 20, (0.0, 0.1611)), (1, 29, (0.0061, 0.1718))],
+)
+def test_wilson_published_examples(successes: int, trials: int, expected: tuple[float, float]) -> None:
+    """Table I, method 3, of R. G. Newcombe, Two-sided confidence intervals for the single proportion, Statistics in
+    Medicine 17 (1998), 857-872."""
+    assert wilson(successes, trials) == pytest.approx(expected, abs=5e-5)
+    assert wilson(successes, trials) == pytest.approx(proportion_confint(successes, trials, method="wilson"), abs=1e-12)
+
+
+def test_what_was_not_executed_is_a_failure_and_stands_beside() -> None:
+    """Nothing corrected, nothing seen, a plan refused or a dead worker: failures; of those carried out, 3 of 4."""
+    stages = {1: "correct", 2: "observe", 3: "worker", 4: "judge", 5: "plan"}
+    rows = [row(seed=i, success=i not in stages, failure_stage=stages.get(i)) for i in range(8)]
+    (cell,) = tally([*rows, row(seed=9, success=None)])
+    assert (cell.trials, cell.successes, cell.not_executed, cell.excluded) == (8, 3, 4, 1)
+    assert (cell.rate, cell.executed, cell.wrong_when_executed) == (0.375, (3, 4), 0.25)
+    assert cell.executed.interval == wilson(3, 4)
+    assert Rate(0, 0).rate is None
+
+
+def test_a_trial_that_is_there_twice_is_refused() -> None:
+    with pytest.raises(InputError, match="seed 3"):
+        tally([row(seed=3), row(seed=4), row(seed=3, success=False)])
+
+
+def test_rows_are_counted_into_cells() -> None:
+    rows = [
+        row(seed=0),
+        row(seed=1, success=False, loose_success=True),
+        row(seed=2, success=False),
+        row(seed=3, success=None),
+        row(seed=4, success=False, failure_stage="judge", failure_code="gap"),
+        row("oracle", seed=0),
+        row(seed=0, level=None, level_deg=None, careless=None),
+    ]
+    ceiling, raw = tally(rows)
+    assert (ceiling.method, ceiling.trials, ceiling.rate) == ("oracle", 1, 1.0)
+    assert (raw.trials, raw.successes, raw.loose_successes, raw.excluded) == (4, 1, 2, 1)
+    assert list(raw.failures.items()) == [("attach: force_stop", 2), ("judge: gap", 1)]
+    assert raw.rate == 0.25
+    assert raw.interval == wilson(1, 4)
+
+
+def test_methods_are_sorted_as_a_reader_looks_for_them() -> None:
+    given = ("snap", "paper-track", "contact", "paper", "none", "oracle")
+    assert [c.method for c in tally([row(method) for method in given])] == [
+        *("oracle", "none", "contact", "paper", "paper-track", "snap")
+    ]
+
+
+def test_predictions_are_counted_against_physics() -> None:
+    rows = [
+        row(seed=0),
+        row(seed=1, predicted=foretold(True)),
+        row(seed=2, success=False),
+        row(seed=3, success=False, predicted=foretold(True, 2)),
+        row(seed=4, success=False, failure_stage="judge", failure_code="gap", failure_operation=None),
+        row(seed=5, success=False, predicted=foretold(False)),
+        row(seed=6, success=False, failure_stage="correct", failure_operation=None, predicted=None),
+        row(seed=7, success=None),
+        row(seed=8, success=False, failure_stage="promise", failure_code="abstained", predicted=foretold(False)),
+        row("oracle", seed=0),
+        row(seed=0, scenario="stick_on_castles", level=None, level_deg=None, careless=None),
+    ]
+    ceiling, raw, measured, everything = confusions(rows)
+    assert list(raw.values()) == ["stick_in_tower", "none", 6, 4, 1, 1, 1, 3, 4 / 6, 1, 2, 2, 1]
+    assert (ceiling["method"], ceiling["agreement"], measured["scenario"]) == ("oracle", 1.0, "stick_on_castles")
+    assert (everything["scenario"], everything["method"], everything["executed"]) == ("all", "all", 8)
+    assert everything["agreement"] == 6 / 8
+    assert prediction_summary(everything) == (
+        "Predicted: 6 of 8 executed trials ended as predicted (75.0 %, counted by as_demonstrated); failures that were "
+        "not predicted: 1, warnings that were wrong: 1."
+    )
+
+
+@settings(max_examples=30, deadline=None)
+@given(
+    results=st.lists(st.tuples(st.sampled_from([True, False, None]), st.booleans(), st.booleans()), max_size=20),
+)
+def test_every_row_is_in_one_field_of_the_confusion(results: list[tuple[bool | None, bool, bool]]) -> None:
+    rows = [
+        row("paper" if i % 2 else "none", seed=i, success=s, predicted=foretold(fails) if s or said else None)
+        for i, (s, fails, said) in enumerate(results)
+    ]
+    *parts, everything = confusions(rows)
+    assert everything["executed"] + everything["not_executed"] + everything["excluded"] == len(rows)
+    for name in ("executed", "right", "predicted_fit_failed", "predicted_fail_fitted", "not_executed", "excluded"):
+        assert sum(line[name] for line in parts) == everything[name]
+
+
+@settings(max_examples=30, deadline=None)
+@given(results=st.lists(st.sampled_from([True, False, None]), max_size=30), order=st.randoms())
+def test_every_row_is_counted_once_in_any_order(results: list[bool | None], order: Any) -> None:
+    rows = [row("paper" if i % 2 else "none", seed=i, success=s) for i, s in enumerate(results)]
+    shuffled = list(rows)
+    order.shuffle(shuffled)
+    cells = tally(rows)
+    assert sum(c.trials + c.excluded for c in cells) == len(rows)
+    assert [(c.method, c.trials, c.successes, c.excluded) for c in tally(shuffled)] == [
+        (c.method, c.trials, c.successes, c.excluded) for c in cells
+    ]
+
+
+def test_the_report_says_what_the_rows_say(tmp_path: Path) -> None:
+    rows = [row("oracle", seed=i) for i in range(4)]
+    for level in (0.0, 0.5, 1.0):
+        rows += [row(seed=i, success=i < 1, level=level, level_deg=level) for i in range(4)]
+        rows += [row("paper", seed=i, success=None if i == 3 else True, level=level, level_deg=level) for i in range(4)]
+    made = report(write(tmp_path / "run", rows))
+    table = list(csv.DictReader(made.tables["cells"].open()))
+    assert list(table[0])[:9] == [
+        *("scenario", "clearance_mm", "noise", "relations", "careless", "level_mm", "level_deg", "tightness", "method")
+    ]
+    assert [(line["method"], line["level_mm"], line["trials"], line["successes"]) for line in table] == [
+        ("oracle", "0.0", "4", "4"),
+        *(("none", level, "4", "1") for level in ("0.0", "0.5", "1.0")),
+        *(("paper", level, "3", "3") for level in ("0.0", "0.5", "1.0")),
+    ]
+    assert math.isclose(float(table[1]["low_95"]), wilson(1, 4).low)
+    (figure,) = [path for path in made.figures if path.name == "success_over_level.png"]
+    assert figure.read_bytes().startswith(b"\x89PNG")
+    page = pages.lines(made.page)
+    assert "| method, level: mm and degrees per axis | 0 | 0.5 | 1 |" in page
+    assert "| none | 25.0 % 4.6 to 69.9 % n 4 | 25.0 % 4.6 to 69.9 % n 4 |" in page
+    assert "| paper | 100.0 % 43.9 to 100.0 % n 3 excluded 1 | 100.0 % 43.9 to 100.0 % n 3 excluded 1 |" in page
+    assert "| stick_in_tower | none | 12 | 3 | 0 | 0 | 9 | 100.0 % | 9 of 9 | 0 | 0 |" in page
+    assert "| all | all | 25 | 16 | 0 | 0 | 9 | 100.0 % | 9 of 9 | 0 | 3 |" in page
+    confusion = list(csv.DictReader(made.tables["confusion"].open()))
+    assert [line["method"] for line in confusion] == ["oracle", "none", "paper", "all"]
+    assert (confusion[1]["predicted_fail_failed"], confusion[2]["excluded"]) == ("9", "3")
+
+
+def test_tightness_is_clearance_over_level(tmp_path: Path) -> None:
+    """Drawn where clearances vary; `none` and the ceiling show with whatever relations correctors are told."""
+    levels = ({"level": x, "level_deg": x} for x in (0.0, 0.5, 2.0))
+    rows = [row(m, clearance_mm=c, **x) for x in levels for c in (0.25, 1.0) for m in ("none", "paper")]
+    rows += [row("paper", clearance_mm=c, relations="missed") for c in (0.25, 1.0)]
+    cells = tally(rows)
+    assert {(c.clearance_mm, c.level, c.tightness) for c in cells if c.method == "none"} == {
+        *((0.25, 0.0, None), (1.0, 0.0, None), (0.25, 0.5, 0.5), (0.25, 2.0, 0.125), (1.0, 0.5, 2.0), (1.0, 2.0, 0.5))
+    }
+    made = report(write(tmp_path / "run", rows))
+    assert {"success_over_tightness.svg", "success_over_tightness.png"} <= {path.name for path in made.figures}
+    assert "figure: Success over tightness" in made.page.read_text(encoding="utf-8")
+    table = list(csv.DictReader(made.tables["cells"].open()))
+    assert {line["tightness"] for line in table} == {"", "0.5", "0.125", "2.0", "0.25", "1.0"}
+    one = report(write(tmp_path / "one", [row(), row("paper")]))
+    assert not any("tightness" in path.name for path in one.figures)
+
+
+def test_looks_are_cells_of_their_own_beside_methods_that_cannot_ask(tmp_path: Path) -> None:
+    """A reference that cannot look is that of every number of looks."""
+    rows = [row("contact", seed=i, success=i < 1) for i in range(4)]
+    rows += [row("contact-robust", seed=i, success=i < n, looks=n) for n in (0, 2, 4) for i in range(4)]
+    found = summary(rows, ("contact",))
+    assert [(c.method, c.looks, c.successes) for c in found.cells] == [
+        *(("contact", 0, 1), ("contact-robust", 0, 0), ("contact-robust", 2, 2), ("contact-robust", 4, 4))
+    ]
+    assert [(p.place.looks, p.only_method, p.only_reference) for p in found.pairs] == [(0, 0, 1), (2, 1, 0), (4, 3, 0)]
+    grouped = members(settings_of_cells(found.cells), found.cells)
+    assert [(s.looks, [c.method for c in own]) for s, own in grouped.items()] == [
+        (n, ["contact", "contact-robust"]) for n in (0, 2, 4)
+    ]
+    made = report(write(tmp_path / "run", rows))
+    assert {"success_over_looks.svg", "success_over_looks.png"} <= {path.name for path in made.figures}
+    assert "figure: Success over the number of looks" in made.page.read_text(encoding="utf-8")
+    assert made.answer.startswith("`contact-robust` with 4 more looks succeeds in 4 of 4 trials (100.0 %)")
+    assert "`contact` succeeds in 1 of the same 4." in made.answer
+    one = report(write(tmp_path / "one", [row("contact-robust", looks=2), row("contact")]))
+    assert not any("looks" in path.name for path in one.figures)
+
+
+def test_the_lines_of_the_figure_are_told_apart(tmp_path: Path) -> None:
+    every = [*STYLES.values(), *OWN_STYLES]
+    assert len({style.color for style in every}) == len({style.marker for style in every}) == len(every)
+    methods = ("oracle", *STYLES, "mine:correct", "theirs:correct")
+    report(write(tmp_path / "run", [row(method) for method in dict.fromkeys(methods)]))
+    drawn = (tmp_path / "run" / "figures" / "success_over_level.svg").read_text(encoding="utf-8")
+    assert all(f">{method}</text>" in drawn for method in methods)
+
+
+def test_a_report_of_nothing_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="holds no sweep"):
+        report(tmp_path / "nowhere")
+    with pytest.raises(InputError, match="no finished trial"):
+        report(write(tmp_path / "empty", []))
+    with pytest.raises(InputError, match=r"line 2, field schema: it is missing"):
+        report(write(tmp_path / "bad", [row(), {"seed": 1}]))
+    with pytest.raises(InputError, match="row of schema 'apo-bench/row/1'"):
+        report(write(tmp_path / "old", [row(schema="apo-bench/row/1")]))
+
+
+def test_effort_counts_what_was_right() -> None:
+    rows = [
+        row("paper", 0),
+        row("paper-track", 0, extra_operations=2, sim_seconds=26.0, pushed_mm=0.3),
+        row("paper-track", 1, extra_operations=4, sim_seconds=28.0, pushed_mm=0.2),
+        row("paper-track", 2, success=False, extra_operations=9, sim_seconds=99.0, pushed_mm=9.0),
+        row("none", 0, success=False),
+    ]
+    assert [list(line.values()) for line in efforts(rows)] == [
+        ["stick_in_tower", "paper", 1, 0.0, 20.0, 0.1],
+        ["stick_in_tower", "paper-track", 2, 3.0, 27.0, 0.3],
+    ]
+    assert efforts([]) == []
+
+
+def test_robot_errors_are_cells_of_their_own_and_a_column_where_there_are_any() -> None:
+    wrong = "hand_eye:0.5/0.1"
+    rows = [row("oracle"), row("oracle", 1), row("oracle", success=False, robot_error=wrong)]
+    right, other = tally(rows)
+    assert [(cell.robot_error, cell.trials, cell.successes) for cell in (right, other)] == [
+        ("none", 2, 2),
+        (wrong, 1, 0),
+    ]
+    both, alone = ("\n".join(cell_table(cells).markdown()) for cells in ((right, other), (right,)))
+    assert wrong in both
+    assert "robot" not in alone

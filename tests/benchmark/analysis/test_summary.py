@@ -1,0 +1,67 @@
+"""All numbers of a report in one call: the same in any order, and quick enough."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from apo_bench import InputError
+from apo_bench.benchmark.analysis import summary
+from tests.benchmark.analysis.test_rates import row
+
+METHODS = ("none", "paper", "contact")
+
+
+def rows(seeds: int = 12, scenarios: int = 1) -> list[dict[str, Any]]:
+    """Success that falls with the level, seeds with luck of their own."""
+    luck = np.random.default_rng(7).random(seeds)
+    return [
+        row(m, s, bool(luck[s] < 1 / (1 + (x / h) ** 3)), scenario=f"scenario{i}", level=x, level_deg=x)
+        for i in range(scenarios)
+        for m, h in zip(METHODS, (0.2, 1.5, 3.0), strict=True)
+        for x in (0.0, 0.25, 1.0, 4.0)
+        for s in range(seeds)
+    ]
+
+
+def test_it_holds_every_part() -> None:
+    found = summary(rows(40))
+    assert len(found.cells) == 12
+    assert {(p.place.method, p.reference) for p in found.pairs} == {
+        ("none", "paper"), ("paper", "none"), ("contact", "none"), ("contact", "paper")
+    }  # fmt: skip
+    assert [h.place.method for h in found.half_levels] == ["none", "contact", "paper"]
+    levels = [h.level or np.nan for h in found.half_levels]
+    assert levels == pytest.approx([0.2, 3.0, 1.5], rel=0.6) or found.half_levels[0].beyond == "below"
+
+
+@settings(max_examples=5, deadline=None)
+@given(order=st.randoms())
+def test_the_order_of_rows_does_not_matter(order: Any) -> None:
+    shuffled = rows()
+    order.shuffle(shuffled)
+    assert summary(shuffled) == summary(rows())
+
+
+def test_other_references() -> None:
+    found = summary(rows(), references=("contact",))
+    assert {p.reference for p in found.pairs} == {"contact"}
+    with pytest.raises(InputError, match="twice"):
+        summary([*rows(), rows()[0]])
+
+
+def test_without_rows_there_is_nothing() -> None:
+    assert summary([]).cells == summary([]).pairs == summary([]).half_levels == ()
+
+
+def test_ten_thousand_rows_take_a_second_or_two() -> None:
+    """A tenth of what a report must bear; the bound is wide, as machines are shared."""
+    many = rows(100, scenarios=9)
+    start = time.process_time()
+    summary(many)
+    assert time.process_time() - start < 5.0

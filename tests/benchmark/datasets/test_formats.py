@@ -1,0 +1,196 @@
+"""Data sets in the formats of others, laid out by their rules; `benchmarks/dataset_loaders.py` asks their loaders."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from gymnasium.envs.registration import EnvSpec
+from pyarrow import parquet
+
+from apo_bench import InputError, TrialSettings
+from apo_bench.benchmark.datasets.making import make_dataset
+from apo_bench.benchmark.datasets.minari import write_minari
+
+REPLAYED = [
+    TrialSettings(name, method="contact", seed=1000000, clearance_mm=0.5) for name in ("block_on_block", "dovetail")
+]
+INSERTED = [TrialSettings("block_on_block", method="contact", seed=1000000 + k) for k in range(2)]
+
+
+@pytest.fixture(scope="module")
+def lerobot(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Replays and insertions in LeRobot's format."""
+    made = {name: tmp_path_factory.mktemp("lerobot") / name for name in ("replays", "insertions")}
+    assert make_dataset(REPLAYED, made["replays"], "by hand", "lerobot") == (2, 2)
+    assert make_dataset(INSERTED, made["insertions"], "by hand", "lerobot", "straight")[0] == 2
+    return made
+
+
+@pytest.fixture(scope="module")
+def minari(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """The same in Minari's."""
+    pytest.importorskip("h5py")
+    made = {name: tmp_path_factory.mktemp("minari") / name for name in ("replays", "insertions")}
+    make_dataset(REPLAYED, made["replays"], "by hand", "minari")
+    make_dataset(INSERTED, made["insertions"], "by hand", "minari", "straight")
+    return made
+
+
+def columns(table: Any) -> dict[str, np.ndarray]:
+    return {name: np.array(table[name].to_pylist()) for name in table.column_names}
+
+
+@pytest.mark.parametrize("what", ["replays", "insertions"])
+def test_lerobot_finds_every_frame_where_its_table_of_episodes_says(lerobot: dict[str, Path], what: str) -> None:
+    root = lerobot[what]
+    info = json.loads((root / "meta" / "info.json").read_text())
+    frames = columns(parquet.read_table(root / info["data_path"].format(chunk_index=0, file_index=0)))
+    episodes = parquet.read_table(root / "meta" / "episodes" / "chunk-000" / "file-000.parquet").to_pylist()
+    assert (info["codebase_version"], info["fps"], info["splits"]) == ("v3.0", 20, {"train": "0:2"})
+    assert (info["total_episodes"], info["total_frames"]) == (2, len(frames["index"]))
+    assert frames.keys() == info["features"].keys()
+    for name, feature in info["features"].items():
+        assert frames[name].shape[1:] == (() if feature["shape"] == [1] else tuple(feature["shape"]))
+        assert feature["names"] is None or len(feature["names"]) == feature["shape"][0]
+    np.testing.assert_array_equal(frames["index"], np.arange(info["total_frames"]))
+    for e, episode in enumerate(episodes):
+        here = slice(episode["dataset_from_index"], episode["dataset_to_index"])
+        n = episode["length"]
+        assert set(frames["episode_index"][here]) == {episode["episode_index"]} == {e}
+        assert set(frames["seed"][here]) == {episode.get("seed", 1000000 + e)}
+        np.testing.assert_allclose(frames["timestamp"][here], np.arange(n) / 20, atol=1e-6)
+        np.testing.assert_array_equal(frames["next.done"][here], np.arange(n) == n - 1)
+        assert frames["next.success"][here].sum() == episode["success"] == frames["next.reward"][here].sum()
+        for name in ("action", "observation.wrench"):
+            x = frames[name][here]
+            np.testing.assert_allclose(episode[f"stats/{name}/mean"], x.mean(axis=0), rtol=1e-4, atol=1e-6)
+            np.testing.assert_allclose(episode[f"stats/{name}/q99"], np.quantile(x, 0.99, axis=0), rtol=1e-5, atol=1e-6)
+    assert parquet.ParquetFile(root / "data" / "chunk-000" / "file-000.parquet").num_row_groups == 2
+
+
+def test_policies_of_lerobot_see_what_is_felt(lerobot: dict[str, Path]) -> None:
+    """They look at `environment_state`, never at a wrench."""
+    frames = columns(parquet.read_table(lerobot["insertions"] / "data"))
+    both = np.hstack([frames["observation.plan"], frames["observation.wrench"]])
+    np.testing.assert_array_equal(frames["observation.environment_state"], both)
+    assert np.abs(frames["observation.wrench"]).max() > 0.1
+
+
+def test_lerobot_has_statistics_of_every_feature_and_tasks_by_their_words(lerobot: dict[str, Path]) -> None:
+    root = lerobot["replays"]
+    info = json.loads((root / "meta" / "info.json").read_text())
+    statistics = json.loads((root / "meta" / "stats.json").read_text())
+    assert statistics.keys() == info["features"].keys()
+    for name, each in statistics.items():
+        assert {len(each[key]) for key in each if key != "count"} == {info["features"][name]["shape"][0]}
+        assert each["count"] == [info["total_frames"]]
+        ordered = np.array([each[key] for key in ("min", "q01", "q10", "q50", "q90", "q99", "max")])
+        assert (np.diff(ordered, axis=0) >= 0).all()
+    schema = parquet.read_schema(root / "meta" / "tasks.parquet")
+    assert json.loads(schema.metadata[b"pandas"])["index_columns"] == ["task"]
+    tasks = parquet.read_table(root / "meta" / "tasks.parquet").to_pylist()
+    assert [task["task_index"] for task in tasks] == [0, 1]
+    assert tasks[0]["task"] == "A block on a block: repeat what was shown."
+
+
+def test_minari_finds_what_was_seen_around_every_action(minari: dict[str, Path], lerobot: dict[str, Path]) -> None:
+    h5py = pytest.importorskip("h5py")
+    for what, root in minari.items():
+        told = json.loads((root / "data" / "metadata.json").read_text())
+        space = json.loads(told["observation_space"])["subspaces"]
+        assert (told["data_format"], told["jpeg_encoding"]) == ("hdf5", False)
+        frames = columns(parquet.read_table(lerobot[what] / "data"))
+        with h5py.File(root / "data" / "main_data.hdf5") as file:
+            assert told["total_episodes"] == len(file) == 2
+            assert told["total_steps"] == sum(each.attrs["total_steps"] for each in file.values())
+            for e in range(2):
+                episode = file[f"episode_{e}"]
+                n = len(episode["actions"])
+                assert (episode.attrs["id"], episode.attrs["total_steps"]) == (e, n)
+                assert episode["observations"].keys() == space.keys()
+                here = frames["episode_index"] == e
+                assert set(frames["seed"][here]) == {episode.attrs["seed"]}
+                np.testing.assert_array_equal(episode["actions"][()], frames["action"][here])
+                for name, box in space.items():
+                    seen = episode["observations"][name][()]
+                    assert seen.shape == (n + 1, *box["shape"])
+                    assert str(seen.dtype) == box["dtype"]
+                    assert (np.abs(seen) <= box["high"]).all()
+                    called = f"observation.{name}".replace("agent_pos", "state")
+                    np.testing.assert_array_equal(seen[:-1].squeeze(), frames[called][here])
+                assert [len(episode[name]) for name in ("rewards", "terminations", "truncations")] == [n] * 3
+                assert episode["terminations"][()].sum() == episode["terminations"][-1] == 1
+                assert episode["infos/success"][-1] == episode.attrs["success"]
+    spec = EnvSpec.from_json(told["env_spec"])
+    assert (spec.id, spec.kwargs["scenario"]) == ("APOInsert-v0", "block_on_block")
+
+
+@pytest.mark.parametrize(("form", "policy"), [("lerobot", "expert"), ("minari", None)])
+def test_every_episode_is_the_same_bit_for_bit_when_it_is_made_again(
+    form: str, policy: str | None, tmp_path: Path
+) -> None:
+    if form == "minari":
+        pytest.importorskip("h5py")
+    for name in "ab":
+        make_dataset(INSERTED[:1], tmp_path / name, "by hand", form, policy)
+    files = sorted(path.relative_to(tmp_path / "a") for path in (tmp_path / "a").rglob("*.*") if path.is_file())
+    assert len(files) >= 4
+    for path in files:
+        assert (tmp_path / "a" / path).read_bytes() == (tmp_path / "b" / path).read_bytes(), path
+
+
+def test_the_card_names_every_field_and_croissant_every_file(lerobot: dict[str, Path]) -> None:
+    for root in lerobot.values():
+        card = (root / "README.md").read_text()
+        told = json.loads((root / "croissant.json").read_text())
+        info = json.loads((root / "meta" / "info.json").read_text())
+        columns_told = {field["name"] for record in told["recordSet"] for field in record["field"]}
+        assert info["features"].keys() <= columns_told
+        assert all(f"| `{name}` |" in card for name in columns_told)
+        assert card.startswith("---\nlicense: apache-2.0\n")
+        assert "Licence: Apache-2.0" in card
+        files = {each["@id"]: each for each in told["distribution"] if each["@type"] == "cr:FileObject"}
+        there = {path.relative_to(root).as_posix() for path in root.rglob("*.*") if path.is_file()}
+        assert files.keys() == there - {"README.md", "croissant.json"}
+        for name, each in files.items():
+            assert each["sha256"] == hashlib.sha256((root / name).read_bytes()).hexdigest()
+
+
+def test_trials_in_which_nothing_moves_are_left_out_and_said(tmp_path: Path) -> None:
+    trials = [TrialSettings("block_on_block", method="paper", level_mm=40, level_deg=40, seed=k) for k in range(3)]
+    said: list[str] = []
+    made, _ = make_dataset(trials, tmp_path / "data", "by hand", "lerobot", say=said.append)
+    assert made + len(said) == 3
+    assert all("is left out, as nothing moved: " in each for each in said)
+
+
+def test_without_h5py_one_sentence_says_what_to_install(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(InputError, match="needs the package h5py; install it with"):
+        write_minari([], None, tmp_path)  # type: ignore[arg-type]
+
+
+def test_without_pyarrow_one_sentence_says_what_to_install_before_any_trial(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    monkeypatch.setattr("apo_bench.benchmark.datasets.making.scene_of", lambda *_: pytest.fail("a scene was built"))
+    words = r"^the format lerobot needs the package pyarrow; install it with: pip install"
+    with pytest.raises(InputError, match=words):
+        make_dataset(REPLAYED[:1], tmp_path / "data", "by hand", "lerobot")
+    assert not (tmp_path / "data").exists()
+
+
+def test_without_pyarrow_a_minari_data_set_is_the_same(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    trials = [TrialSettings("block_on_block", fidelity="contact", seed=1)]
+    make_dataset(trials, tmp_path / "with", "by hand", "minari")
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    make_dataset(trials, tmp_path / "without", "by hand", "minari")
+    for name in ("croissant.json", "README.md", "data/metadata.json"):
+        assert (tmp_path / "with" / name).read_bytes() == (tmp_path / "without" / name).read_bytes()

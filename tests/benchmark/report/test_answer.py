@@ -1,0 +1,192 @@
+"""The sentences at the top of a report: they count first, and never say more than the counts."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from apo_bench.benchmark.analysis import FEWEST_SEEDS, Results, contrast, summary, tango, wilson
+from apo_bench.benchmark.report.answer import ALIKE_WITHIN, answer
+from tests.benchmark.analysis.test_rates import row
+
+METHODS = ("contact", "none", "paper", "snap")
+COUNT = re.compile(r"`([^`]+)`(?: with \d more looks?)? (?:succeeds )?in ([\d,]+) of (?:the same )?([\d,]+)")
+
+
+def said(rows: list[dict[str, Any]]) -> str:
+    return answer(rows, summary(rows).half_levels)
+
+
+def at_levels(method: str, seed: int, successes: tuple[bool, ...]) -> list[dict[str, Any]]:
+    return [row(method, seed, success, level=x, level_deg=x) for x, success in enumerate(successes, start=1)]
+
+
+def test_one_trial_a_seed_has_the_intervals_of_the_tables() -> None:
+    rows = [row("contact", i, i > 0) for i in range(20)] + [row("none", i, i > 11) for i in range(20)]
+    low, high = wilson(19, 20)
+    least, most = tango(11, 0, 20)
+    assert said(rows) == (
+        f"`contact` succeeds in 19 of 20 trials (95.0 %; 95 % interval {100 * low:.1f} to {100 * high:.1f} %). `none` "
+        "succeeds in 8 of the same 20: `contact` succeeds more often, by 55.0 points (95 % interval "
+        f"{100 * least:+.1f} to {100 * most:+.1f})."
+    )
+
+
+def test_all_against_nothing_with_few_seeds_is_counted_and_nothing_more() -> None:
+    """The first sweep of a new user: 24 of 24 against 0 of 24 is not `as often`, and 4 seeds have no interval."""
+    rows = [r for i in range(4) for r in at_levels("contact", i, (True,) * 6)]
+    rows += [r for i in range(4) for r in at_levels("none", i, (False,) * 6)]
+    assert said(rows) == (
+        "`contact` succeeds in 24 of 24 trials (100.0 %). `none` succeeds in 0 of the same 24. 4 seeds are too few for "
+        "an interval: from 6 on, a difference at every seed is beyond chance."
+    )
+
+
+def test_equal_counts_are_as_often_only_where_the_interval_is_narrow() -> None:
+    for seeds, words in ((30, "as many, but 30 seeds leave room for a difference"), (200, "as often, to within 1.9")):
+        rows = [row(m, i) for m in ("contact", "none") for i in range(seeds)]
+        assert f"`contact` succeeds in {seeds} of the same {seeds}: {words}" in said(rows)
+
+
+def test_a_difference_that_is_not_beyond_chance_is_told_so() -> None:
+    rows = [row("contact", i) for i in range(20)] + [row("none", i, i > 1) for i in range(20)]
+    assert "`contact` is 10.0 points ahead, which 20 seeds do not tell from chance (95 % interval -" in said(rows)
+
+
+def test_an_interval_off_zero_is_no_proof_where_few_seeds_differ() -> None:
+    """Tango's leaves out 0 at 4 of 10 against 0 of 10, McNemar's exact p is 0.125."""
+    rows = [row("contact", i, i < 4) for i in range(10)] + [row("none", i, False) for i in range(10)]
+    assert tango(4, 0, 10).low > 0
+    assert "is 40.0 points ahead, which 10 seeds do not tell from chance" in said(rows)
+
+
+def test_pairs_that_are_missing_are_not_counted() -> None:
+    rows = [row("contact", i) for i in range(20)] + [row("none", i, False) for i in range(8)]
+    assert "Of the 8 trials that both have, `none` succeeds in 0 and `contact` in 8: " in said(rows)
+
+
+def test_where_no_method_succeeds_it_says_so() -> None:
+    rows = [row(m, i, False) for m in ("contact", "none") for i in range(8)]
+    assert said(rows) == "No method succeeds in any trial: `none` in 0 of 8, `contact` in 0 of 8."
+
+
+def test_it_says_where_the_curve_falls_to_one_half() -> None:
+    rows = [
+        row(m, i, x < 2.0, level=x, level_deg=x)
+        for x in (0.5, 1.0, 2.0, 4.0)
+        for m in ("contact", "paper")
+        for i in range(30)
+    ]
+    half, _ = summary(rows).half_levels
+    words = f"Its curve over the level falls to one half at level {half.text} (surely: {half.sure_text})."
+    assert words in said(rows)
+
+
+@pytest.mark.parametrize(
+    ("h", "words"),
+    [
+        (9.0, "stays above one half up to level 4, the largest tried"),
+        (0.0, "is below one half from level 1, the smallest tried, on"),
+    ],
+)
+def test_levels_that_do_not_reach_one_half_say_so(h: float, words: str) -> None:
+    rows = [row("contact", i, x < h or i == 0, level=x, level_deg=x) for x in (1.0, 4.0) for i in range(9)]
+    assert words in said(rows)
+
+
+def test_of_several_settings_the_worst_curve_is_told() -> None:
+    def at(scenario: str, h: float) -> list[dict[str, Any]]:
+        return [row("contact", i, x < h, level=x, level_deg=x, scenario=scenario) for x in (1.0, 4.0) for i in range(9)]
+
+    assert "In each of 2 settings its curve over the level stays above one half up" in said(at("a", 9.0) + at("b", 9.0))
+    worst = "In the worst of 2 settings its curve over the level falls to one half at level 2 (surely: 1 to 4)."
+    assert worst in said(at("one", 9.0) + at("two", 2.0))
+
+
+def test_wrong_relations_do_not_count_where_right_ones_were_told() -> None:
+    rows = [row("contact", i) for i in range(5)] + [row("contact", i, False, relations="missed") for i in range(5)]
+    assert said(rows).startswith("`contact` succeeds in 5 of 5 trials")
+    assert "in 0 of 5" in said(rows[5:])
+    assert said(rows[5:]).endswith("Correctors were told relations `missed` here, not `given`.")
+
+
+@pytest.mark.parametrize("rows", [[row("oracle", i) for i in range(3)], [row("contact", i, None) for i in range(3)]])
+def test_where_nothing_counts_it_says_so(rows: list[dict[str, Any]]) -> None:
+    assert said(rows).startswith("No trial counts here")
+
+
+def columns(results: dict[tuple[Any, ...], bool]) -> Results:
+    """A number for each trial, from its level and its seed."""
+    keys = [1000 * level + seed for level, seed in results]
+    return Results(np.array(keys), np.array([seed for _, seed in results]), np.array([*results.values()], dtype=float))
+
+
+@st.composite
+def tables(draw: st.DrawFn) -> list[dict[str, Any]]:
+    """Some methods over some seeds and levels, at any rate; trials are missing, demonstrations excluded."""
+    methods = draw(st.lists(st.sampled_from(METHODS), min_size=1, max_size=4, unique=True))
+    seeds = draw(st.sampled_from((1, 2, 5, 6, 10, 40)))
+    levels = draw(st.integers(1, 3))
+    excluded = draw(st.sets(st.integers(0, seeds - 1), max_size=2))
+    made = []
+    for method in methods:
+        rate = draw(st.sampled_from((0.0, 0.1, 0.5, 0.95, 1.0)))
+        kept = draw(st.sampled_from((0.6, 1.0)))
+        luck = draw(st.randoms(use_true_random=False))
+        for seed in range(seeds):
+            for level in range(1, levels + 1):
+                success = None if seed in excluded else luck.random() < rate
+                if luck.random() < kept:
+                    made.append(row(method, seed, success, level=float(level), level_deg=float(level)))
+    return made
+
+
+@settings(max_examples=60, deadline=None)
+@given(rows=tables())
+def test_no_sentence_contradicts_the_counts(rows: list[dict[str, Any]]) -> None:
+    results: dict[str, dict[tuple[Any, ...], bool]] = {}
+    for r in rows:
+        if r["success"] is not None:
+            results.setdefault(r["method"], {})[r["level"], r["seed"]] = r["success"]
+    words = answer(rows, ())
+    if not any(any(own.values()) for own in results.values()):
+        assert words.startswith("No method succeeds in any trial" if results else "No trial counts")
+        return
+    sentences = re.split(r"(?<=\.) (?=[`A-Z0-9])", words)
+    best, right, trials = COUNT.search(sentences[0]).groups()  # type: ignore[union-attr]
+    assert (int(right), int(trials)) == (sum(results[best].values()), len(results[best]))
+    seeds = len({seed for _, seed in results[best]})
+    assert ("interval" in sentences[0]) == (seeds >= FEWEST_SEEDS)
+    for other, own in results.items():
+        about = [s for s in sentences[1:] if re.search(rf"`{other}` succeeds in", s)]
+        if other == best or not about:
+            continue
+        (sentence,) = about
+        shared = results[best].keys() & own.keys()
+        ours, theirs = (sum(results[m][key] for key in shared) for m in (best, other))
+        c = contrast(columns(results[best]), columns(own))
+        assert c is not None
+        assert re.search(rf"`{other}` succeeds in {theirs}\b", sentence)
+        assert f" {len(shared)}" in sentence
+        low, high = c.interval
+        assert low - 1e-9 <= (ours - theirs) / len(shared) <= high + 1e-9
+        if "more often" in sentence:
+            assert ours > theirs
+            assert low > 0
+        if "less often" in sentence:
+            assert ours < theirs
+            assert high < 0
+        if "as often" in sentence:
+            assert -ALIKE_WITHIN <= low <= 0 <= high <= ALIKE_WITHIN
+        if "ahead" in sentence or "behind" in sentence:
+            assert ("ahead" in sentence) == (ours > theirs)
+        if "as many, but" in sentence:
+            assert ours == theirs
+        if c.seeds < FEWEST_SEEDS:
+            assert "interval" not in sentence
+            assert "often" not in sentence

@@ -1,0 +1,308 @@
+"""The page of a sweep as a browser shows it."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+
+from apo_bench.benchmark.report.report import Report, report
+from apo_bench.cli.app import main
+from apo_bench.cli.terminal import print_report
+from apo_bench.errors import InputError
+from apo_bench.io import write_columns
+from tests import pages
+from tests.benchmark.analysis.test_rates import row, write
+from tests.browser import browser, opened, overflow
+
+EVIL = '<script>document.title="broken"</script>"><img src=x onerror="document.title=1">'
+METHODS = ("none", "contact", "paper", "mine:<b>correct</b>")
+SEEDS = 120
+
+
+def rows() -> list[dict[str, Any]]:
+    """Two levels, four methods, a name and a sentence that are markup, a demonstration that failed."""
+    made = [row("oracle", seed) for seed in range(SEEDS)]
+    for level in (1.0, 2.0):
+        for method in METHODS:
+            for seed in range(SEEDS):
+                success = None if seed == 7 else (seed * 31 + len(method) * int(level)) % 5 > METHODS.index(method) % 3
+                made.append(row(method, seed, success, level=level, level_deg=level, **numbers(seed, method)))
+    made += [row("contact", seed, False, scenario=f"evil {EVIL}", sentence=f"why {EVIL}") for seed in range(3)]
+    return made
+
+
+def numbers(seed: int, method: str) -> dict[str, Any]:
+    corrected = {} if method == "none" else {"gap_after_mm": 1e-9 * (seed + 1)}
+    return {"sentence": "said so", "gap_before_mm": 2.0 + seed / 100, "worst_gap_mm": 0.1 + seed * 1e-3, **corrected}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Report:
+    folder = write(tmp_path_factory.mktemp("page") / "run", rows())
+    keys = ("scenario", "method", "seed", "level")
+    lines = [{**{k: r[k] for k in keys}, "trial_s": 1.0 + r["seed"] / 100, "host": "here", "worker": 0} for r in rows()]
+    text = "".join(json.dumps(line) + "\n" for line in lines) + '{"torn'
+    (folder / "timing.jsonl").write_text(text, encoding="utf-8")
+    run = {"schema": "apo-bench/run/3", "command": "apo-bench sweep x", "versions": {"mujoco": "3.17.0"}, "grids": [{}]}
+    (folder / "run.json").write_text(json.dumps(run), encoding="utf-8")
+    return report(folder)
+
+
+@pytest.fixture(scope="module")
+def chromium() -> Iterator[Any]:
+    with browser() as started:
+        yield started
+
+
+def test_the_page_asks_for_nothing_and_says_every_number(made: Report, chromium: Any) -> None:
+    with opened(chromium, made.page) as (page, said, asked):
+        assert said == []
+        assert asked == [made.page.resolve().as_uri()]
+        assert page.title() == "Sweep run"
+        page.evaluate("document.querySelectorAll('details').forEach(folded => { folded.open = true; })")
+        text = page.inner_text("body")
+        for line in csv.DictReader(made.tables["cells"].open(encoding="utf-8")):
+            low, high = (f"{100 * float(line[name]):.1f}" for name in ("low_95", "high_95"))
+            assert f"{low} to {high} %" in text
+            assert f"n {line['trials']}" in text
+        for line in csv.DictReader(made.tables["pairs"].open(encoding="utf-8")):
+            d, low, high = (100 * float(line[name]) for name in ("difference", "low_95", "high_95"))
+            assert f"{d:+.1f} ({low:+.1f} to {high:+.1f})" in text
+        assert "3.17.0" in text
+        assert "apo-bench sweep x" in text
+        assert not re.search(r"https?://(?!www\.w3\.org)", made.page.read_text(encoding="utf-8"))
+
+
+def test_figures_use_the_width_of_the_page(made: Report, chromium: Any) -> None:
+    """Those of several panels scroll on a phone."""
+    for width, least in ((1280, 0.9), (390, 1.5)):
+        with opened(chromium, made.page, width) as (page, _, _):
+            box = page.locator("img.figure.wide").first.bounding_box()
+            inner = page.evaluate("document.querySelector('main').clientWidth")
+            assert box["width"] > least * inner
+            assert overflow(page) <= 0
+
+
+def test_markup_in_names_and_sentences_is_text(made: Report, chromium: Any) -> None:
+    with opened(chromium, made.page) as (page, said, _):
+        page.locator("h3", has_text="evil").wait_for()
+        page.locator("tr:has(th:text-is('contact')) button.cell[data-title^='evil']").click()
+        page.locator(".trials tbody tr").first.wait_for()
+        assert f"why {EVIL}" in page.locator(".trials tbody").inner_text()
+        assert page.title() == "Sweep run"
+        assert page.locator("img[src='x'], body b script").count() == 0
+        assert "mine:<b>correct</b>" in page.inner_text("body")
+        assert said == []
+
+
+def test_a_cell_opens_its_trials_with_their_commands(made: Report, chromium: Any) -> None:
+    with opened(chromium, made.page) as (page, said, asked):
+        button = page.locator("button.cell[data-title*='paper, level 2']")
+        button.focus()
+        page.keyboard.press("Enter")
+        lines = page.locator(".trials tbody tr")
+        lines.first.wait_for()
+        assert button.get_attribute("aria-expanded") == "true"
+        assert lines.count() == 100
+        page.locator(".trials .more").click()
+        assert lines.count() == SEEDS
+        first = lines.nth(3).inner_text()
+        assert first.startswith("3")
+        assert "2.03" in first
+        want = "apo-bench replay stick_in_tower --level 2 --clearance 0.25 --method paper --seed 3"
+        assert lines.nth(3).locator("code").inner_text() == want
+        page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+        lines.nth(3).locator("button.copy").click()
+        page.wait_for_function("[...document.querySelectorAll('button.copy')].some((b) => b.textContent === 'copied')")
+        assert page.evaluate("navigator.clipboard.readText()") == want
+        page.locator(".trials input").check()
+        failed = [r for r in rows() if (r["method"], r["level"], r["success"]) == ("paper", 2.0, False)]
+        assert lines.count() == len(failed)
+        page.keyboard.press("Escape")
+        assert button.get_attribute("aria-expanded") == "false"
+        assert page.locator(".trials").is_hidden()
+        assert (said, len(asked)) == ([], 1)
+
+
+@pytest.mark.parametrize(("width", "dark"), [(390, False), (390, True), (1280, True)])
+def test_nothing_is_wider_than_the_window(made: Report, chromium: Any, width: int, dark: bool) -> None:
+    with opened(chromium, made.page, width, dark, "#cell-1") as (page, said, _):
+        page.locator(".trials tbody tr").first.wait_for()
+        page.evaluate("document.querySelectorAll('details').forEach((box) => { box.open = true; })")
+        assert overflow(page) <= 0
+        paper, ink = page.evaluate(
+            "[getComputedStyle(document.body).backgroundColor, getComputedStyle(document.body).color]"
+        )
+        bright = [sum(map(int, re.findall(r"\d+", color)[:3])) for color in (paper, ink)]
+        assert (bright[0] < bright[1]) == dark
+        assert said == []
+
+
+def test_only_what_was_lost_is_replayed_in_a_process_of_its_own(tmp_path: Path) -> None:
+    lost = {"failure_stage": "worker", "failure_code": "worker_died", "success": False}
+    some = [row("paper", i, i not in (1, 2)) | (lost if i in (1, 2) else {}) for i in range(4)]
+    kept = pages.trials(report(write(tmp_path / "run", some)).page)
+    words = [kept["words"]["command"][i] for i in kept["columns"]["command"]]
+    alone = [seed for seed, said in zip(kept["columns"]["seed"], words, strict=True) if "--trial-limit 600" in said]
+    assert alone == [1, 2]
+
+
+def test_a_folder_whose_name_is_no_text_has_a_page(tmp_path: Path) -> None:
+    folder = Path(os.fsdecode(os.fsencode(tmp_path) + b"/n\xf6"))
+    try:
+        folder.mkdir()
+    except OSError:
+        pytest.skip("names of files are text here")
+    write(folder / "run", [row("contact", i) for i in range(3)])
+    write(folder / "b\udcf6", [row("contact", i) for i in range(3)])
+    for name in ("run", "b\udcf6"):
+        assert main(["report", str(folder / name), "--pictures", "0"]) == 0
+        assert (folder / name / "report.html").read_text(encoding="utf-8").startswith("<!doctype html>")
+    assert main(["compare", str(folder / "run"), str(folder / "b\udcf6"), "--out", str(folder / "both")]) == 0
+    assert (folder / "both" / "compare.html").exists()
+
+
+def test_what_is_packed_is_what_the_rows_say(made: Report) -> None:
+    kept = pages.trials(made.page)
+    assert kept["ends"][-1] == len(rows())
+    cells = list(csv.DictReader(made.tables["cells"].open(encoding="utf-8")))
+    first = 0
+    for cell, end in zip(cells, kept["ends"], strict=True):
+        verdicts = [kept["words"]["verdict"][v] for v in kept["columns"]["verdict"][first:end]]
+        assert verdicts.count("right") == int(cell["successes"])
+        assert verdicts.count("excluded") == int(cell["excluded"])
+        assert kept["columns"]["seed"][first:end] == sorted(kept["columns"]["seed"][first:end])
+        first = end
+
+
+def test_what_is_not_measured_is_said(tmp_path: Path) -> None:
+    page = pages.words(report(write(tmp_path / "one", [row("contact", i) for i in range(3)])).page)
+    for sentence in (
+        "No level varied, so nothing is known",
+        "No method shares a cell with none or paper",
+        "contact succeeds in 3 of 3 trials (100.0 %). 3 seeds are too few",
+        "No picture: None was asked for",
+        "No method that corrects had a plan",
+        "No method was told relations that were recognised.",
+        "There is no timing.jsonl",
+        "There is no run.json",
+    ):
+        assert sentence in page
+
+
+def test_figures_are_files_that_stand_alone(made: Report) -> None:
+    drawn = [path for path in made.figures if path.suffix == ".svg"]
+    names = {path.stem for path in drawn}
+    assert {"success_over_level", "difference_to_paper", "failure_stages", "gap_before_and_after", "timing"} <= names
+    for path in drawn:
+        root = ElementTree.parse(path).getroot()
+        assert root.tag == "{http://www.w3.org/2000/svg}svg"
+        assert not re.search(r">[^<]*mathdefault", path.read_text(encoding="utf-8"))
+        assert not re.search(r"https?://(?!www\.w3\.org)", path.read_text(encoding="utf-8"))
+
+
+def test_tables_are_the_same_as_parquet(made: Report) -> None:
+    from pyarrow import parquet
+
+    for path in made.tables.values():
+        lines = list(csv.DictReader(path.open(encoding="utf-8")))
+        table = parquet.read_table(path.with_suffix(".parquet"))
+        assert table.column_names == list(lines[0])
+        assert table.num_rows == len(lines)
+    cells = parquet.read_table(made.tables["cells"].with_suffix(".parquet")).to_pylist()
+    assert [cell["rate"] for cell in cells] == [
+        float(r["rate"]) for r in csv.DictReader(made.tables["cells"].open(encoding="utf-8"))
+    ]
+    kept = parquet.read_table(made.tables["cells"].with_name("rows.parquet"))
+    assert kept.num_rows == len(rows())
+    assert sum(x is True for x in kept["success"].to_pylist()) == sum(r["success"] is True for r in rows())
+
+
+def test_without_pyarrow_tables_are_csv_alone_and_it_is_said(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    both = report(write(tmp_path / "run", rows()))
+    kept = {path.name: path.read_bytes() for path in both.tables.values()}
+    monkeypatch.setitem(sys.modules, "pyarrow", None)
+    made = report(tmp_path / "run")
+    assert {path.suffix for path in (tmp_path / "run" / "tables").iterdir()} == {".csv"}
+    assert {path.name: path.read_bytes() for path in made.tables.values()} == kept
+    assert ".parquet" not in made.page.read_text(encoding="utf-8")
+    print_report(made)
+    assert "as .parquet too with the package pyarrow" in " ".join(capsys.readouterr().out.split())
+    with pytest.raises(InputError, match="a Parquet table needs the package pyarrow; install it with: pip install"):
+        write_columns(["a"], [[1]], tmp_path / "a.parquet")
+
+
+def test_the_same_rows_in_another_order_make_the_same_tables_and_commands(made: Report, tmp_path: Path) -> None:
+    other = report(write(tmp_path / "run", rows()[::-1]))
+    for name, path in made.tables.items():
+        if name not in ("times", "confusion"):
+            assert path.read_bytes() == other.tables[name].read_bytes()
+    assert pages.trials(made.page)["words"]["command"] == pages.trials(other.page)["words"]["command"]
+
+
+def test_many_rows_take_little_room(tmp_path: Path) -> None:
+    """A page grows by some 60 bytes a trial."""
+    many = [row(m, i, i % 3 > 0, worst_gap_mm=0.1 + i * 1.7e-5) for m in ("none", "contact") for i in range(4000)]
+    made = report(write(tmp_path / "many", many))
+    assert made.page.stat().st_size < 8000 * 60 + 200_000
+    assert len(pages.trials(made.page)["columns"]["seed"]) == 8000
+
+
+def test_a_report_that_cannot_be_made_ends_in_one_sentence(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    from apo_bench.cli import app as cli
+
+    folder = write(tmp_path / "run", [row("contact", 0), row("contact", 1, scenario="two | and bars")])
+    for number in ("-1", "101", "many"):
+        assert cli.main(["report", str(folder), "--pictures", number]) == 2
+        assert capsys.readouterr().err.count("\n") == 1
+    (folder / "tables").write_text("in the way", encoding="utf-8")
+    assert cli.main(["report", str(folder)]) == 2
+    assert "tables is a file, where a folder is needed" in capsys.readouterr().err
+    (folder / "tables").unlink()
+    assert cli.main(["report", str(folder), "--pictures", "0"]) == 0
+    assert "two | and bars" in pages.words(folder / "report.html")
+
+
+@pytest.mark.parametrize(
+    "trials",
+    [
+        [row("contact", i, None) for i in range(3)],
+        [row("oracle", i) for i in range(3)],
+        [row("none", 0), row("contact", 0, relations="missed"), row("contact", 0, grasp="weld", fidelity="contact")],
+        [row("contact", 0, level=x, level_deg=y) for x, y in ((1.0, 2.0), (1.0, 1.0), (0.5, 0.25))],
+        [row(f"mine:m{k}") for k in range(20)],
+        [row("contact", 2**53 - 1), row("contact", 0, level=None, level_deg=None, careless=None)],
+    ],
+    ids=["excluded", "oracle", "conditions", "pairs of levels", "methods", "measured beside"],
+)
+def test_odd_sweeps_have_a_page(trials: list[dict[str, Any]], tmp_path: Path) -> None:
+    made = report(write(tmp_path / "run", trials))
+    assert len(pages.trials(made.page)["columns"]["seed"]) == sum(r["level"] is not None for r in trials)
+
+
+def test_nothing_of_an_older_report_is_left(tmp_path: Path) -> None:
+    two = [row("none"), row("contact", gap_before_mm=1.0, gap_after_mm=0.0)]
+    folder = write(tmp_path / "run", two)
+    older = set(report(folder).figures)
+    newer = set(report(write(folder, two[:1])).figures)
+    assert {path.name for path in older - newer} == {"difference_to_none.svg", "gap_before_and_after.svg"}
+    assert not any(path.exists() for path in older - newer)
+
+
+def test_trials_whose_worker_died_are_failures_of_a_stage_of_their_own(tmp_path: Path) -> None:
+    lost = {"failure_stage": "worker", "failure_code": "time_limit", "failure_operation": None, "predicted": None}
+    made = report(write(tmp_path / "run", [row("contact", 0), row("contact", 1, False, **lost)]))
+    page = pages.lines(made.page)
+    assert "50.0 % 9.5 to 90.5 % n 2 executed: 100.0 %, n 1" in page
+    assert "worker: time_limit" in pages.trials(made.page)["words"]["why"]

@@ -1,0 +1,121 @@
+"""Commands in a report run the same trial again."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from apo_bench import TrialSettings, build_scene, load_scenario, run_trial
+from apo_bench.benchmark.report.pictures import sample
+from apo_bench.benchmark.report.report import report
+from apo_bench.cli import app as cli
+from apo_bench.records.run.replay_command import milli, number, replay_command
+from apo_bench.viz.failure_pictures import failure_pictures
+from tests import pages
+from tests.benchmark.analysis.test_rates import row, write
+
+SPEC = TrialSettings("block_on_block", level_mm=3.0, level_deg=2.0, careless=0.0, method="none", seed=5)
+SPECS = (SPEC, replace(SPEC, method="contact"), replace(SPEC, seed=1, level_mm=10.0, level_deg=1.0))
+
+
+@pytest.fixture(scope="module")
+def trials() -> list[dict[str, Any]]:
+    scene = build_scene(load_scenario("block_on_block"))
+    return [run_trial(spec, scene) for spec in SPECS]
+
+
+def test_commands_of_a_page_give_identical_rows(
+    trials: list[dict[str, Any]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    made = report(write(tmp_path / "run", trials))
+    kept = pages.trials(made.page)
+    words = kept["words"]
+    columns = kept["columns"]
+    for i, seed in enumerate(columns["seed"]):
+        command = shlex.split(f"{words['command'][columns['command'][i]]} --seed {seed}")
+        assert cli.main([*command[1:], "--json"]) == 0
+        again = json.loads(capsys.readouterr().out)
+        assert again in json.loads(json.dumps(trials))
+        assert words["verdict"][columns["verdict"][i]] in ("right", "loosely right", "failed")
+        assert columns["worst_gap_mm"][i] == pytest.approx(again["worst_gap_mm"], abs=5e-4)
+        assert words["sentence"][columns["sentence"][i]] == again["sentence"]
+
+
+def test_a_failure_is_drawn_as_it_ended(trials: list[dict[str, Any]], tmp_path: Path) -> None:
+    """Run again where it can be, else from the row; and in the page, linked from its cell."""
+    failed = [dict(r) for r in trials if r["success"] is False]
+    assert failed
+    folder = write(tmp_path / "run", trials)
+    made, missed = failure_pictures(failed[:1], folder)
+    if missed and "no picture can be drawn here" in missed[0]:
+        pytest.skip(missed[0])
+    assert made[0].jpeg.startswith(b"\xff\xd8")
+    assert "run again" in made[0].words
+    other = [{**r, "spec_hash": "0" * 16} for r in trials]
+    older, _ = failure_pictures(sample(other, 1), write(tmp_path / "older", other))
+    assert "as the row says" in older[0].words
+    assert older[0].jpeg != made[0].jpeg
+    page = report(write(tmp_path / "page", other), pictures=1, draw=failure_pictures)
+    assert page.pictures == 1
+    assert 'src="data:image/jpeg;base64,' in page.page.read_text(encoding="utf-8")
+    assert list(pages.trials(page.page)["pictures"].values()) == [0]
+
+
+def test_a_page_without_graphics_says_so(
+    trials: list[dict[str, Any]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from apo_bench import InputError
+    from apo_bench.simulation.scene import render
+
+    def refuse(*_: object, **__: object) -> None:
+        raise InputError("no picture can be drawn here (no EGL); install libegl1.")
+
+    monkeypatch.setattr(render, "picture", refuse)
+    made = report(write(tmp_path / "run", trials), pictures=2, draw=failure_pictures)
+    assert made.pictures == 0
+    assert "No picture: no picture can be drawn here" in pages.words(made.page)
+
+
+def test_only_the_method_and_what_is_not_a_default_is_said() -> None:
+    usual = {"eye": "noise", "arm": "six_axis", "timestep_s": 0.001, "fidelity": "full"}
+    said = "apo-bench replay stick_in_tower --clearance 0.25 --method none --seed 3"
+    assert replay_command(row("none", 3, **usual)) == replay_command(row("none", 3)) == said
+    other = row(
+        "my mod:it's", 9, level=0.1, level_deg=0.3, careless=0.5, noise="a b.toml", relations="shifted:3", grasp="weld",
+        clearance_mm=0.3, **(usual | {"timestep_s": 0.0005, "fidelity": "contact", "arm": "mine:arm"}),
+    )  # fmt: skip
+    assert shlex.split(replay_command(other, {"stick_in_tower": "my dir/tower.toml"})) == [
+        *("apo-bench", "replay", "my dir/tower.toml", "--level-mm", "0.1", "--level-deg", "0.3", "--careless", "0.5"),
+        *("--clearance", "0.3", "--noise", "a b.toml", "--grasp", "weld", "--arm", "mine:arm"),
+        *("--relations", "shifted:3", "--method", "my mod:it's", "--timestep-ms", "0.5", "--fidelity", "contact"),
+        *("--seed", "9"),
+    ]
+    seen = row("contact", 1, level=0.5, level_deg=0.0, noise="range", eye="range")
+    shown = "apo-bench replay stick_in_tower --level 0.5 --clearance 0.25 --eye range --method contact --seed 1"
+    assert replay_command(seen) == shown
+
+
+@pytest.mark.parametrize("x", [0.1, 0.25, 1.0, 3.0, 1e-7, 0.30000000000000004, 12345.678])
+def test_numbers_are_read_as_they_were(x: float) -> None:
+    assert float(number(x)) == x
+    assert milli(x * 1e-3) * 1e-3 == x * 1e-3
+
+
+def test_the_sample_does_not_depend_on_the_order() -> None:
+    failed = [
+        row(m, i, False, failure_code=code, sim_seconds=9.0)
+        for m in ("none", "paper", "contact")
+        for code in ("force_stop", "gap")
+        for i in range(2 if code == "gap" else 5)
+    ]
+    chosen = sample(failed, 4)
+    assert sample(failed[::-1], 4) == chosen
+    assert [r["failure_code"] for r in chosen] == ["force_stop", "gap"]  # one for each way of failing
+    assert len({r["method"] for r in chosen}) == 2
+    assert sample(failed, 1) == chosen[:1]
+    assert sample([row("none", 0, False, sim_seconds=None)], 4) == []

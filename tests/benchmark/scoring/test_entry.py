@@ -1,0 +1,144 @@
+"""Entries: what is counted, what is refused, and how a table is made of them."""
+
+from __future__ import annotations
+
+import json
+import tempfile
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from msgspec.structs import replace
+
+from apo_bench import InputError
+from apo_bench.benchmark.scoring.entry import SCHEMA, Entry, TrackScore, read_entry, score_of, write_entry
+from apo_bench.benchmark.scoring.leaderboard import leaderboard_table, ranked, read_entries, write_leaderboard
+
+
+def track(overall: bool = True, salt: str | None = None, file: str = "f" * 16, **cells: str) -> TrackScore:
+    counted = "".join(cells.values()).replace("x", "")
+    value, low, high = score_of(cells)
+    return TrackScore(
+        track=file,
+        overall=overall,
+        score=value,
+        low=low,
+        high=high,
+        trials=len(counted),
+        executed=len(counted),
+        promised=None,
+        brier=None,
+        rows="0" * 16,
+        code="1" * 16,
+        salt=salt,
+        cells=cells,
+    )
+
+
+def entry(name: str, **tracks: TrackScore) -> Entry:
+    return Entry(SCHEMA, name, name, f"apo-bench score {name}", False, {"mujoco": "3"}, "machine", tracks)
+
+
+def test_a_score_is_the_mean_over_cells_whatever_trials_count() -> None:
+    assert score_of({"a": "1111", "b": "10xx"})[0] == pytest.approx(75.0)
+    assert score_of({"a": "11", "b": "xx"})[0] == 100.0
+    assert score_of({}) == (0.0, 0.0, 100.0)
+
+
+def test_tracks_that_do_not_count_are_left_out_of_the_score_over_all() -> None:
+    both = entry("m", given=track(a="10"), easy=track(overall=False, a="11"))
+    overall = both.overall
+    assert overall is not None
+    assert overall == pytest.approx(score_of({"a": "10"}))
+    assert entry("m", easy=track(overall=False, a="11")).overall is None
+
+
+@settings(deadline=None)
+@given(st.dictionaries(st.text("ab|", min_size=1), st.text("10x", min_size=1), min_size=1))
+def test_what_is_written_is_read(cells: dict[str, str]) -> None:
+    first = entry("m", given=replace(track(c="1"), **_of(cells)))
+    with tempfile.TemporaryDirectory() as folder:
+        write_entry(first, Path(folder) / "e.json")
+        assert read_entry(Path(folder) / "e.json") == first
+
+
+def _of(cells: dict[str, str]) -> dict[str, object]:
+    made = track(**{f"c{i}": trials for i, trials in enumerate(cells.values())})
+    names = ("score", "low", "high", "trials", "executed")
+    return {**{name: getattr(made, name) for name in names}, "cells": cells}
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"score": 99.0}, "the score 99 "),
+        ({"trials": 3}, "3 trials, 2 of them executed, are stated, and its cells have 2"),
+        ({"executed": 0}, "0 of them executed, are stated, and its cells have 2 with 1 successes"),
+        ({"executed": 3}, "3 of them executed"),
+        ({"cells": {"a": "1?"}}, "matching regex"),
+        ({"cells": {"a": "10\n"}}, "matching regex"),
+        ({"low": 50.0}, "is stated, and its cells give"),
+        ({"high": 99.0}, "is stated, and its cells give"),
+        ({"low": -1.0}, ">= 0.0"),
+        ({"high": 1e999}, "must be finite"),
+        ({"brier": -3.0}, ">= 0.0"),
+        ({"brier": 0.1}, "no plan that promised anything"),
+        ({"rows": "x"}, "matching regex"),
+        ({"code": "0" * 16 + "\n"}, "matching regex"),
+        ({"salt": ""}, "matching regex"),
+        ({"overall": 1}, "Expected `bool`"),
+        ({"rank": 1}, "unknown field"),
+    ],
+)
+def test_a_score_by_hand_is_refused(tmp_path: Path, change: dict[str, object], said: str) -> None:
+    write_entry(entry("m", given=track(a="10")), tmp_path / "e.json")
+    form = json.loads((tmp_path / "e.json").read_text())
+    form["tracks"]["given"] |= change
+    (tmp_path / "e.json").write_text(json.dumps(form))
+    with pytest.raises(InputError, match=said):
+        read_entry(tmp_path / "e.json")
+
+
+@pytest.mark.parametrize(
+    "text", ["", "[]", "{", '{"schema": "apo-bench/entry/1"}', '{"schema": "apo-bench/entry/2"}', "[" * 99]
+)
+def test_what_is_no_entry_is_refused_in_one_sentence(tmp_path: Path, text: str) -> None:
+    (tmp_path / "e.json").write_text(text)
+    with pytest.raises(InputError, match=r"e\.json.*: (this is not|the document is nested)"):
+        read_entry(tmp_path / "e.json")
+
+
+def test_the_best_stands_first() -> None:
+    lines = ranked([entry("low", given=track(a="1000000000")), entry("high", given=track(a="1111111111", b="11"))])
+    assert [line.entry.name for line in lines] == ["high", "low"]
+    assert [line.place for line in lines] == [1, 2]
+
+
+def test_who_left_tracks_out_stands_below_who_did_not() -> None:
+    one = entry("one", given=track(a="11"))
+    two = entry("two", given=track(a="10"), tight=track(a="00"))
+    assert [line.entry.name for line in ranked([one, two])] == ["two", "one"]
+
+
+def test_verified_is_who_was_run_with_a_salt_of_the_organiser_in_every_track() -> None:
+    salt = "5" * 16
+    salted = entry("salted", given=track(a="1", salt=salt), tight=track(a="1", salt=salt))
+    half = entry("half", given=track(a="1", salt=salt), tight=track(a="1"))
+    told = {line.entry.name: line.status for line in ranked([salted, half], frozenset({salt}))}
+    assert told == {"salted": "verified", "half": "self-reported"}
+    assert {line.status for line in ranked([salted, half])} == {"self-reported"}
+
+
+def test_the_page_has_every_entry_and_its_figure(tmp_path: Path) -> None:
+    (tmp_path / "in").mkdir()
+    for name, cells in (("one", "10"), ("two", "11")):
+        write_entry(entry(name, given=track(a=cells)), tmp_path / "in" / f"{name}.json")
+    entries, left_out = read_entries(tmp_path / "in")
+    assert not left_out
+    write_leaderboard(entries, tmp_path / "page.md")
+    text = (tmp_path / "page.md").read_text()
+    assert text.index("| 1 | two |") < text.index("| 2 | one |")
+    assert (tmp_path / "page.png").stat().st_size > 1000
+    assert "self-reported" in text
+    assert len(leaderboard_table(ranked([entry("one", given=track(a="1"))])).markdown()) == 3

@@ -1,0 +1,152 @@
+"""A score counts the rows of a sweep; programs and files of answers enter as correctors in Python do."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+from apo_bench import InputError
+from apo_bench.benchmark.scoring.entry import read_entry
+from apo_bench.benchmark.scoring.track import read_track, read_tracks, seen_by, track_names
+from apo_bench.benchmark.sweeps.grid import check_grids, load_all, units
+from apo_bench.cli.app import main
+from apo_bench.resources import folder
+
+SMALL = """
+scenarios = ["block_on_block"]
+levels = [1]
+careless = [0]
+trials = 2
+grasps = ["weld"]
+
+[track]
+schema = "apo-bench/track/1"
+title = "A small one"
+"""
+MOST = 240
+FEWER = {"long": 80, "round": 80, "generated": 80}
+AS_SEEN = """
+import json, sys
+request = json.loads(sys.stdin.readline())
+print(json.dumps({"goals": [{k: o[k] for k in ("position_mm", "quaternion_wxyz")} for o in request["operations"]]}))
+"""
+
+
+@pytest.fixture
+def small(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "small.toml").write_text(SMALL)
+    (tmp_path / "seen.py").write_text(AS_SEEN)
+    return tmp_path
+
+
+def scored(small: Path, name: str, *entrant: str) -> dict[str, str]:
+    command = ["score", *entrant, "--track", "small.toml", "--out", f"{name}.json", "--workers", "1"]
+    assert main(command) == 0
+    return dict(read_entry(small / f"{name}.json").tracks["small"].cells)
+
+
+@pytest.mark.parametrize("name", track_names())
+def test_every_track_is_no_larger_than_was_promised(name: str) -> None:
+    track = read_track(name)
+    loaded = load_all(track.of("none", track.arms[0]))
+    for method in ("contact-robust", "contact+feel"):
+        grids = [grid for arm in track.arms for grid in track.of(method, arm)]
+        for grid in grids:
+            check_grids([grid])
+        trials = sum(len(unit) for grid in grids for unit in units([grid], loaded))
+        assert 0 < trials <= FEWER.get(name, MOST)
+        quick = [grid for arm in track.arms for grid in track.of(method, arm, quick=True)]
+        assert all(grid.trials == track.quick_trials for grid in quick)
+
+
+def test_a_program_and_a_file_of_answers_score_as_the_same_corrector_in_python(small: Path) -> None:
+    python = shutil.which("python3") or shutil.which("python")
+    as_seen = scored(small, "none", "none")
+    assert scored(small, "program", "--command", f"{python} seen.py") == as_seen
+    assert main(["score", "--export", "asked.jsonl", "--track", "small.toml", "--workers", "1"]) == 0
+    asked = [json.loads(line) for line in (small / "asked.jsonl").read_text().splitlines()]
+    assert len(asked) == 2
+    assert all(request["faces"] and "scenario" not in request for request in asked)
+    goals = [
+        {"id": r["id"], "goals": [{k: o[k] for k in ("position_mm", "quaternion_wxyz")} for o in r["operations"]]}
+        for r in asked
+    ]
+    (small / "goals.jsonl").write_text("".join(json.dumps(line) + "\n" for line in goals))
+    assert scored(small, "answers", "--answers", "goals.jsonl") == as_seen
+
+
+def test_an_entry_that_is_there_is_continued_and_made_the_same(small: Path) -> None:
+    scored(small, "once", "contact")
+    first = (small / "once.json").read_bytes()
+    rows = (small / "once" / "small" / "six_axis" / "trials.jsonl").read_bytes()
+    scored(small, "once", "contact")
+    assert (small / "once" / "small" / "six_axis" / "trials.jsonl").read_bytes() == rows
+    assert (small / "once.json").read_bytes() == first
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["score", "--out", "e.json"], "0 entrants"),
+        (["score", "contact", "--command", "x", "--out", "e.json"], "2 entrants"),
+        (["score", "contact", "--track", "givn", "--out", "e.json"], "given"),
+        (["score", "contact", "--track", "small.toml"], "--out"),
+        (["score", "contact", "--track", "small.toml", "--track", "small.toml", "--out", "e.json"], "twice"),
+        (["score", "--command", "no-such-program", "--track", "small.toml", "--out", "e.json"], "not found"),
+        (["score", "--command", "'", "--track", "small.toml", "--out", "e.json"], "no command line"),
+        (["score", "--answers", "none.jsonl", "--track", "small.toml", "--out", "e.json"], "none.jsonl"),
+        (["score", "contact", "--track", "seen.toml", "--out", "e.json"], "seen.toml"),
+        (
+            ["score", "contact", "--track", "small.toml", "--name", "x" * 201, "--out", "e.json"],
+            "the name of the entry",
+        ),
+        (
+            ["score", "--command", f"sh {'x' * 200}", "--track", "small.toml", "--out", "e.json"],
+            "the name of the entry",
+        ),
+        (["score", "contact", "--track", "small.toml", "--name", "\x1b", "--out", "e.json"], "the name of the entry"),
+        (["leaderboard", ".", "--out", "page.md"], "no entry"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_sentence(
+    small: Path, capsys: pytest.CaptureFixture[str], words: list[str], said: str
+) -> None:
+    assert main(words) == 2
+    message = capsys.readouterr().err
+    assert said in message
+    assert message.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("[track]", "[tracks]", "table \\[track\\]"),
+        ("careless", "methods = ['none']\ncareless", "no methods"),
+        ("track/1", "track/2", "schema"),
+        ("title = ", "titel = ", "unknown key 'titel'"),
+        ('title = "A small one"', 'title = "x"\nquick_trials = 0', "from 1"),
+        ('title = "A small one"', 'title = "x"\noverall = 1', "true or false"),
+        ('title = "A small one"', 'title = "x"\narms = []', "at least one"),
+        ("levels", "level", "unknown key 'level'"),
+        ("[track]", "[[also]]\nseed = 5\n\n[track]", "begin with the same seed"),
+    ],
+)
+def test_a_track_that_is_wrong_is_refused(small: Path, old: str, new: str, said: str) -> None:
+    (small / "wrong.toml").write_text(SMALL.replace(old, new, 1))
+    with pytest.raises(InputError, match=said):
+        read_tracks(["wrong.toml"])
+
+
+def test_a_track_seen_by_an_estimator_is_another_track(small: Path) -> None:
+    track = read_track("small.toml")
+    seen = seen_by(track, str(folder("assets") / "noise" / "megapose-lmo.toml"))
+    assert seen.name == "small-megapose-lmo"
+    assert seen.hash != track.hash
+    assert not seen.overall
+    assert all(noise.endswith("megapose-lmo.toml") for grid in seen.grids for noise in grid.noises)
+    with pytest.raises(InputError, match="noise file"):
+        seen_by(track, "nothing.toml")

@@ -1,0 +1,231 @@
+"""Estimates and truth of the BOP formats: what is understood, how they are matched, and what is refused."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial.transform import Rotation
+
+from apo_bench import InputError
+from apo_bench.cli.app import main
+from apo_bench.formats.bop import read_results
+from apo_bench.formats.bop_truth import read_truth
+from apo_bench.perception.observation.models import residuals
+from apo_bench.perception.observation.models.residuals import match_residuals
+from tests import bop_made as made_of
+from tests.bop_made import HEADER, Known, Made
+
+ONE = "1 0 0 0 1 0 0 0 1"
+ROW = f"1,7,3,0.5,{ONE},10 20 900,0.1"
+
+
+@pytest.fixture(scope="module")
+def made() -> Made:
+    return made_of.draw(300, Known(), np.random.default_rng(1))
+
+
+def written(folder: Path, *lines: str, name: str = "estimates.csv") -> Path:
+    path = folder / name
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    return path
+
+
+def test_rows_are_read_in_mm_model_to_camera(tmp_path: Path) -> None:
+    turned = "0 -1 0 1 0 0 0 0 1"
+    path = tmp_path / "a.csv"
+    path.write_bytes(
+        b"\xef\xbb\xbf" + f"{HEADER}\r\n\r\n{ROW}\r\n 2 , 8,4,1e-3,{turned}, -1.5  2e2 1000,-1\r\n".encode()
+    )
+    read = read_results(path)
+    assert_array_equal(read.where, [[1, 7, 3], [2, 8, 4]])
+    assert_array_equal(read.t_mm, [[10, 20, 900], [-1.5, 200, 1000]])
+    assert_array_equal(read.R[1], [[0, -1, 0], [1, 0, 0], [0, 0, 1]])
+    assert_array_equal(read.score, [0.5, 1e-3])
+    assert read.spot(1) == f"{path}, line 4"
+
+
+def test_planted_errors_come_back(tmp_path: Path, made: Made) -> None:
+    """In the frame of each ray, for every part that was found, whatever the order of rows; the rest is missed."""
+    estimates, truth = made_of.files(tmp_path, made)
+    lines = estimates.read_text(encoding="utf-8").splitlines()
+    order = np.random.default_rng(0).permutation(len(lines) - 1)
+    estimates.write_text("\n".join([lines[0], *(lines[1 + i] for i in order)]), encoding="utf-8")
+    seen = read_results(estimates)
+    found = match_residuals(seen, read_truth(truth, seen))
+    assert_array_equal(found.found, made.found)
+    assert_allclose(found.shift_mm[made.found], made.shift[made.found], atol=1e-4)
+    assert_allclose(found.turn_deg[made.found], made.turn[made.found], atol=1e-4)
+    assert_allclose(found.trace_deg[made.found], found.angle_deg[made.found], atol=0.02)
+    assert np.isnan(found.shift_mm[~made.found]).all()
+    assert found.surplus == 0
+
+
+def test_json_and_csv_say_the_same(tmp_path: Path, made: Made) -> None:
+    estimates, truth = made_of.files(tmp_path, made)
+    seen = read_results(estimates)
+    by_csv = read_truth(truth, seen)
+    by_json = read_truth(made_of.scene_gt(tmp_path / "scene_gt.json", made.where, made.R, made.t), seen)
+    assert_array_equal(by_json.where, by_csv.where)
+    assert_allclose(by_json.t_mm, by_csv.t_mm, rtol=1e-8)
+    assert_allclose(by_json.R, by_csv.R, atol=1e-8)
+
+
+def test_images_that_were_not_estimated_count_only_where_they_were_asked_for(tmp_path: Path, made: Made) -> None:
+    """A scene_gt.json holds the whole scene, a results file what was asked for."""
+    estimates, truth = made_of.files(tmp_path, made)
+    some = written(tmp_path, *estimates.read_text(encoding="utf-8").splitlines()[:101], name="some.csv")
+    seen = read_results(some)
+    images = len(np.unique(seen.where[:, 1]))
+    whole = made_of.scene_gt(tmp_path / "scene_gt.json", made.where, made.R, made.t)
+    assert len(read_truth(whole, seen).where) == 5 * images
+    assert len(read_truth(truth, seen).where) == len(made.where)
+
+
+def test_the_scene_of_a_json_file(tmp_path: Path, made: Made) -> None:
+    """Named, else that of the folder, else the only one that was estimated."""
+    where = made.where.copy()
+    where[150:, 0] = 12
+    estimates = read_results(made_of.results(tmp_path / "e.csv", where, made.R_seen, made.t_seen))
+    (tmp_path / "000012").mkdir()
+    part = made.where[150:], made.R[150:], made.t[150:]
+    loose = made_of.scene_gt(tmp_path / "scene_gt.json", *part)
+    with pytest.raises(InputError, match=r"does not say which scene .* of 1, 12; name it with --scene-id"):
+        read_truth(loose, estimates)
+    for path, scene in ((loose, 12), (made_of.scene_gt(tmp_path / "000012" / "scene_gt.json", *part), None)):
+        truth = read_truth(path, estimates, scene)
+        assert set(truth.where[:, 0].tolist()) == {12}
+        assert len(truth.where) == 150
+    with pytest.raises(InputError, match=r"no image of scene 3 has an estimate in .*e.csv"):
+        read_truth(loose, estimates, 3)
+
+
+def test_every_part_gets_an_estimate_of_its_own(tmp_path: Path) -> None:
+    """Two alike, three estimates: the pairs that add up to the least, not the nearest one twice."""
+    at = np.array([[0.0, 0, 900], [20, 0, 900]])
+    seen = np.array([[30.0, 0, 900], [-400.0, 0, 900], [15.0, 0, 900]])
+    R = np.tile(np.eye(3), (3, 1, 1))
+    where = np.ones((3, 3), dtype=int)
+    estimates = read_results(made_of.results(tmp_path / "e.csv", where, R, seen))
+    truth = read_results(made_of.results(tmp_path / "t.csv", where[:2], R[:2], at))
+    assert_array_equal(residuals.match_rows(estimates, truth), [2, 0])
+    assert match_residuals(estimates, truth).surplus == 1
+
+
+def test_false_detections_are_counted(tmp_path: Path, made: Made) -> None:
+    """Of what is there, and of what is not in its image; not those of images that nobody gave the truth of."""
+    where = made.where
+    R = made.R
+    t = made.t
+    more = np.concatenate([where, where[:2], np.add(where[:3], [0, 0, 50]), np.add(where[:4], [0, 1000, 0])])
+    rows = np.concatenate([np.arange(len(where)), np.arange(2), np.arange(3), np.arange(4)])
+    seen = read_results(
+        made_of.results(tmp_path / "e.csv", more, R[rows], t[rows] + 1e-3 * np.arange(len(rows))[:, None])
+    )
+    found = match_residuals(seen, read_results(made_of.results(tmp_path / "t.csv", where, R, t)))
+    assert (found.surplus, found.absent) == (5, 3)
+
+
+def test_matrices_that_are_nearly_rotations_are_turned_into_the_nearest(tmp_path: Path) -> None:
+    """Published truth is rounded and scaled; angles do not suffer from that, those of the trace do."""
+    R = Rotation.from_euler("xyz", [[30, 20, 10]], degrees=True).as_matrix()
+    seen = Rotation.from_euler("z", 3.0, degrees=True).as_matrix() @ R
+    where = np.ones((1, 3), dtype=int)
+    t = np.array([[0.0, 0.0, 900.0]])
+    estimates = read_results(made_of.results(tmp_path / "e.csv", where, seen, t))
+    found = match_residuals(estimates, read_results(made_of.results(tmp_path / "t.csv", where, 1.004 * R, t)))
+    assert found.angle_deg[0] == pytest.approx(3.0, abs=1e-5)
+    assert found.trace_deg[0] == 0.0
+
+
+BAD = {
+    "empty": ([], "the file is empty; its first line is scene_id,im_id"),
+    "missing column": ([HEADER.replace(",time", ""), ROW], "line 1: the columns are scene_id.*; needed are scene_id"),
+    "semicolons": ([HEADER.replace(",", ";")], "line 1: .* by commas; this file uses ';', so save"),
+    "text": ([HEADER, ROW.replace("900", "far")], "line 2: could not convert string to float: 'far'"),
+    "nan": ([HEADER, ROW, ROW.replace("900", "nan")], "line 3: scene, image .* at most 1e"),
+    "swapped": ([HEADER, f"1,7,3,0.5,10 20 900,{ONE},0.1"], "line 2: score, R, t and time are 1, 9, 3 and 1 numbers"),
+    "not a rotation": ([HEADER, ROW, f"1,8,3,0.5,{ONE[:-1]}2,1 2 900,1"], "line 3, R: a rotation .* identity by 3"),
+    "metres": ([HEADER, ROW.replace("10 20 900", "0.01 0.02 0.9")], "line 2, t: millimetres .* multiply by 1000"),
+    "twice": ([HEADER, ROW, ROW.replace("7", "8"), ROW], "line 4: an earlier row stands there once more"),
+    "not text": (["\udcff"], "line 1: this is not UTF-8 text"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_malformed_results_are_refused_with_the_line(case: str, tmp_path: Path) -> None:
+    lines, message = BAD[case]
+    path = tmp_path / "estimates.csv"
+    path.write_bytes("".join(f"{line}\n" for line in lines).encode("utf-8", "surrogateescape"))
+    with pytest.raises(InputError, match=message) as raised:
+        read_results(path)
+    assert str(path) in str(raised.value)
+    assert "\n" not in str(raised.value)
+
+
+ENTRY = {"obj_id": 3, "cam_R_m2c": [1, 0, 0, 0, 1, 0, 0, 0, 1], "cam_t_m2c": [10, 20, 900]}
+
+
+@pytest.mark.parametrize(
+    ("document", "message"),
+    [
+        ([], "a table of named keys is needed"),
+        ({}, "no pose stands in the file"),
+        ({"first": []}, "the keys are numbers of images, 'first' was given"),
+        ({"7": ENTRY}, "image 7: a list is needed"),
+        ({"7": [{"obj_id": 3}]}, "image 7, entry 1: the key 'cam_R_m2c' is missing"),
+        ({"7": [ENTRY, {**ENTRY, "obj_id": "ape"}]}, "image 7, entry 2, obj_id: a whole number is needed"),
+        ({"7": [{**ENTRY, "cam_R_m2c": [1, 0, 0]}]}, "image 7, entry 1, cam_R_m2c: a list of length 9"),
+        ({"7": [{**ENTRY, "cam_R_m2c": [2, 0, 0, 0, 1, 0, 0, 0, 1]}]}, "image 7, entry 1, R: a rotation matrix"),
+        ({"7": [{**ENTRY, "cam_t_m2c": [0, 0, -900]}]}, "image 7, entry 1, t: the third number is the depth"),
+        ({"8": [ENTRY]}, "no image of scene 1 has an estimate in .*; the first of the truth is image 8 of scene 1"),
+    ],
+)
+def test_malformed_truth_is_refused_with_the_entry(document: Any, message: str, tmp_path: Path) -> None:
+    path = tmp_path / "scene_gt.json"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    with pytest.raises(InputError, match=message):
+        read_truth(path, read_results(written(tmp_path, HEADER, ROW)), 1)
+
+
+@pytest.mark.parametrize("case", ["missing column", "empty"])
+def test_the_command_ends_with_2_and_one_sentence(
+    case: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    good = written(tmp_path, HEADER, ROW)
+    bad = written(tmp_path, *BAD[case][0], name="bad.csv")
+    if case == "empty":
+        bad.write_text("", encoding="utf-8")
+    for estimates, truth in ((bad, good), (good, bad), (tmp_path / "none.csv", good), (tmp_path, good)):
+        assert main(["noise", "fit", "--estimates", str(estimates), "--truth", str(truth)]) == 2
+        said = capsys.readouterr()
+        assert said.out == ""
+        assert said.err.count("\n") == 1
+        assert said.err.startswith("apo-bench: ")
+
+
+def test_estimates_of_scenes_without_truth_are_no_false_detections(tmp_path: Path) -> None:
+    made = made_of.draw(90, Known(missed=0.0), np.random.default_rng(3))
+    where = made.where + np.column_stack([np.arange(90) // 30, np.zeros((90, 2), dtype=int)])
+    seen = read_results(made_of.results(tmp_path / "seen.csv", where, made.R_seen, made.t_seen))
+    for scene in (1, 2, 3):
+        folder = tmp_path / "val" / f"{scene:06}"
+        folder.mkdir(parents=True)
+        each = where[:, 0] == scene
+        made_of.scene_gt(folder / "scene_gt.json", where[each], made.R[each], made.t[each])
+        (folder / "scene_gt_cam1.json").write_text("not read", encoding="utf-8")
+    one = match_residuals(seen, read_truth(tmp_path / "val" / "000002" / "scene_gt.json", seen))
+    assert (len(one.where), one.surplus, one.absent) == (30, 0, 0)
+    whole = read_truth(tmp_path / "val", seen)
+    assert match_residuals(seen, whole).surplus == 0
+    assert whole.where.tolist() == where.tolist()
+    assert whole.spot(31).endswith("val, 000002, image 6, entry 2")
+    assert read_truth(tmp_path / "val", seen, 3).where[:, 0].tolist() == [3] * 30
+    with pytest.raises(InputError, match=r"holds no scene_gt\.json in a folder that is numbered 7, such as 000001"):
+        read_truth(tmp_path / "val", seen, 7)
+    with pytest.raises(InputError, match=r"holds no scene_gt\.json in a folder that is numbered as its scene"):
+        read_truth(tmp_path / "val" / "000001", seen)

@@ -1,0 +1,87 @@
+"""Why parts do not go together: the pair that blocks, and its direction; and which side of them goes up."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from apo_bench.geometry import pose
+from apo_bench.importers.assembly.draft import NoOrder
+from apo_bench.importers.assembly.posed import PosedPart
+from apo_bench.importers.assembly.upright import drafted
+from apo_bench.importers.assembly.writing import scenario_text
+from apo_bench.scenario.parts import load_part
+from apo_bench.scenario.parts.making import Body, extrude, join, rectangle, write_part
+
+
+def made(folder: Path, **bodies: tuple[Body, tuple[float, float, float]]) -> tuple[PosedPart, ...]:
+    for name, (body, _) in bodies.items():
+        write_part(name, body, folder, density=700, source="a test", licence="CC0-1.0")
+    files = {name: folder / f"{name}.xml" for name in bodies}
+    return tuple(
+        PosedPart(name, files[name], load_part(files[name]), pose.at(1e-3 * np.array(at)))
+        for name, (_, at) in bodies.items()
+    )
+
+
+def turned(parts: tuple[PosedPart, ...], *turn: float) -> tuple[PosedPart, ...]:
+    T = pose.at(np.zeros(3), turn)
+    return tuple(PosedPart(part.name, part.file, part.solid, T @ part.T) for part in parts)
+
+
+def box(low: float, high: float) -> Body:
+    """Walls of 10 mm around a room of 30 x 30 mm."""
+    sides = [rectangle(50, 10, (0, 20 * s)) for s in (-1, 1)] + [rectangle(10, 30, (20 * s, 0)) for s in (-1, 1)]
+    return join(*(extrude(side, low, high) for side in sides))
+
+
+FLOOR = extrude(rectangle(50, 50), 0, 10, bottom="bottom", top="top")
+CORE = extrude(rectangle(20, 20), 0, 15, bottom="foot", top="head")
+
+
+def test_what_is_shut_in_is_said_with_what_is_in_its_way(tmp_path: Path) -> None:
+    shut = join(FLOOR, box(10, 40), extrude(rectangle(50, 50), 40, 48))
+    with pytest.raises(NoOrder, match=r"'core' cannot leave shut along \(0, 0, 1\): 'shut' is in its way"):
+        drafted(made(tmp_path, shut=(shut, (0, 0, 0)), core=(CORE, (0, 0, 10))), "z")
+
+
+def test_what_touches_nothing_has_no_order(tmp_path: Path) -> None:
+    parts = made(tmp_path, plate=(FLOOR, (0, 0, 0)), core=(CORE, (0, 0, 10.4)))
+    with pytest.raises(NoOrder, match=r"'core' touches nothing"):
+        drafted(parts, "z")
+
+
+def test_another_side_goes_up_where_there_is_no_order_with_z(tmp_path: Path) -> None:
+    cup = join(FLOOR, box(10, 14))
+    parts = made(tmp_path, cup=(cup, (0, 0, 0)), core=(CORE, (0, 0, 10)))
+    assert drafted(parts).up == "z"
+    over = turned(parts, 180, 0, 0)
+    with pytest.raises(NoOrder, match="'core' cannot leave cup"):
+        drafted(over, "z", ("cup",))
+    found = drafted(over, fixed=("cup",))
+    assert found.up.startswith("-z, as with z up there is no order")
+    assert drafted(over, "-z", ("cup",)).up == "-z, as asked"
+    assert "# Up: -z, as with z up" in scenario_text(found, "own", "a test", tmp_path / "own.toml")
+    assert [placing.moves for placing in found.order] == [("core",)]
+
+
+def test_a_smaller_part_that_lies_lowest_is_fixed_where_there_is_no_order_with_the_largest(tmp_path: Path) -> None:
+    cup = join(FLOOR, box(10, 25))
+    over = turned(made(tmp_path, cup=(cup, (0, 0, 0)), core=(CORE, (0, 0, 10))), 180, 0, 0)
+    with pytest.raises(NoOrder):
+        drafted(over, "z", ("cup",))
+    found = drafted(over, "z")
+    assert found.fixed == ("core",)
+    assert found.why_fixed.startswith("it lies lowest")
+    assert [placing.moves for placing in found.order] == [("cup",)]
+
+
+def test_what_only_touches_upright_walls_is_not_carried(tmp_path: Path) -> None:
+    # A plate on the side of a block, above the table by less than it may fall: nothing but screws would hold it.
+    block = box(0, 30)
+    plate = extrude(rectangle(10, 40), 0.4, 30)
+    parts = made(tmp_path, block=(block, (0, 0, 0)), plate=(plate, (30, 0, 0)))
+    with pytest.raises(NoOrder, match="'plate' would only touch upright walls of block, so nothing carries it"):
+        drafted(parts, "z", ("block",))

@@ -1,0 +1,154 @@
+"""What an import rests on: corners, outlines and walls to the last digit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from manifold3d import Manifold
+from scipy.spatial import ConvexHull
+
+from apo_bench import InputError
+from apo_bench.geometry import Face
+from apo_bench.importers.cad.faces.fitting import Round
+from apo_bench.importers.cad.importing import _why_not, import_part, raw_solids
+from apo_bench.importers.cad.part_report import file_lines, part_lines, report_part
+from apo_bench.importers.cad.pieces.corners import corners_of, without_near
+from apo_bench.importers.cad.step.from_brep import raw_of
+from apo_bench.importers.cad.step.surfaces import BrepFace, BrepSolid, Flat, Wall
+from apo_bench.scenario.parts import load_part
+from tests.importers.cad.made import block, disc, prism, rod, write_stl, write_triangles
+
+
+def triangles(mesh: Any) -> Any:
+    raw = mesh.to_mesh()
+    return np.asarray(raw.vert_properties)[:, :3][np.asarray(raw.tri_verts)]
+
+
+def test_the_earlier_one_of_two_near_corners_stays() -> None:
+    points = np.array([[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [0.0, 0.0, 1e-4], [5.0, 0.0, 1.0]])
+    np.testing.assert_array_equal(without_near(points), points[[0, 1, 3]])
+
+
+def test_corners_of_a_body_have_all_their_digits() -> None:
+    corners = corners_of(Manifold.cube((0.1, 0.2, 0.3)))
+    expected = np.array(np.meshgrid([0.0, 0.1], [0.0, 0.2], [0.0, 0.3])).reshape(3, -1).T
+    np.testing.assert_allclose(sorted(corners.tolist()), sorted(expected.tolist()), rtol=0.0, atol=1e-12)
+
+
+def test_a_face_whose_hole_crosses_its_border_is_no_face() -> None:
+    square = 1e-2 * np.array([[-1.0, -1.0, 0.0], [1.0, -1.0, 0.0], [1.0, 1.0, 0.0], [-1.0, 1.0, 0.0]])
+    hole = 0.2 * square[::-1]
+    solid = load_part("block")
+    beside = hole + np.array([0.01, 0.0, 0.0])
+    assert _why_not(solid, Face("top", square, (beside,))) == "its outline crosses itself"
+    assert _why_not(solid, Face("top", square, (hole,))) != "its outline crosses itself"
+
+
+def test_corners_that_nearly_meet_are_joined(tmp_path: Path) -> None:
+    near = triangles(block(20, 20, 20)).astype(np.float32)
+    near[0, 0, 0] = np.nextafter(near[0, 0, 0], np.float32(100.0))
+    _, (raw,) = raw_solids(write_triangles(near, tmp_path / "a.stl"), None)
+    assert raw.mesh.volume == pytest.approx(8000.0)
+
+
+@pytest.mark.parametrize("vertex", ["0 0 x", "0 0", "0 0 0"])
+def test_a_text_stl_without_its_corners_is_refused(vertex: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.stl"
+    path.write_text(f"solid a\nfacet normal 0 0 1\nouter loop\nvertex {vertex}\nendloop\nendfacet\nendsolid a\n")
+    with pytest.raises(InputError, match="no STL file that can be read"):
+        raw_solids(path, "mm")
+
+
+def as_brep(body: Any) -> BrepSolid:
+    """A body with one round wall of radius 5 about the z axis, as the reader of STEP files may give it.
+
+    Normals of flat faces look into the part, as the planes of a file may.
+    """
+    corners = triangles(body).astype(np.float64)
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = across / np.linalg.norm(across, axis=1)[:, None]
+    reach = np.hypot(*corners.mean(axis=1)[:, :2].T)
+    wall = (np.abs(reach - 5.0) < 0.01) & (np.abs(normals[:, 2]) < 0.1)
+    index = np.arange(3 * len(corners)).reshape(-1, 3)
+    z = np.array([0.0, 0.0, 1.0])
+    round_face = BrepFace(Wall(Round(np.zeros(3), z, 5.0, 0.0), 0.0), corners[wall].reshape(-1, 3), index[: wall.sum()])
+    flat = [BrepFace(Flat(p[0], -n, 0.0), p, index[:1]) for p, n in zip(corners[~wall], normals[~wall], strict=True)]
+    return BrepSolid("a", (round_face, *flat), ())
+
+
+@pytest.mark.parametrize("hole", [False, True])
+def test_a_wall_of_a_step_file_becomes_strips_that_look_out_of_the_part(hole: bool, tmp_path: Path) -> None:
+    """Its wall has corners at half height, which strips from end to end leave out."""
+    two = rod(5.0, 10.0) + rod(5.0, 10.0, (0, 0, 10))
+    body = block(30, 20, 20) - two if hole else two
+    raw = raw_of(tmp_path / "a.step", as_brep(body))
+    assert raw.mesh.volume == pytest.approx(body.volume(), rel=1e-7)
+    (wall,) = (region for region in raw.regions if region.is_round)
+    assert (wall.hole, wall.is_whole, wall.square) == (hole, True, True)
+    assert wall.radii == (5.0, 5.0)
+    heights = np.unique(np.round(raw.mesh.corners[np.unique(raw.mesh.triangles[wall.triangles])][:, 2], 6))
+    assert heights.tolist() == [0.0, 20.0]
+    outward = raw.mesh.across[wall.triangles] * raw.mesh.corners[raw.mesh.triangles[wall.triangles]].mean(axis=1)
+    assert (np.sign(outward[:, :2].sum(axis=1)) == (-1.0 if hole else 1.0)).all()
+    top = raw.named()["pz"]
+    assert top.direction.tolist() == [0.0, 0.0, 1.0]
+    assert top.point[2] == pytest.approx(20.0)
+
+
+def test_half_a_wall_of_a_step_file_stays_half(tmp_path: Path) -> None:
+    body = rod(5.0, 20.0) - block(20, 10, 30, (0, -5, -5))
+    raw = raw_of(tmp_path / "a.step", as_brep(body))
+    assert raw.mesh.volume == pytest.approx(body.volume(), rel=1e-7)
+    (wall,) = (region for region in raw.regions if region.is_round)
+    assert wall.turn == pytest.approx(np.pi, abs=1e-3)
+    assert not wall.is_whole
+    assert wall.name == ""
+
+
+def test_a_window_in_a_wall_of_a_step_file_stays_open(tmp_path: Path) -> None:
+    body = rod(5.0, 20.0) - block(6, 4, 4, (5, 0, 8))
+    raw = raw_of(tmp_path / "a.step", as_brep(body))
+    assert raw.mesh.volume == pytest.approx(body.volume(), rel=1e-7)
+    (wall,) = (region for region in raw.regions if region.is_round)
+    assert (wall.is_whole, wall.square) == (True, False)
+
+
+def test_a_cut_through_the_wide_end_of_a_countersink_leaves_nothing_in_it(tmp_path: Path) -> None:
+    outline = [(-20, -20), (6, -20), (6, -15), (20, -15), (20, 15), (6, 15), (6, 20), (-20, 20)]
+    mesh = prism([(float(x), float(y)) for x, y in outline], 20) - rod(4, 20, top=8)
+    _, (raw,) = raw_solids(write_stl(mesh, tmp_path / "a.stl"), None)
+    part = import_part(raw, "a", tmp_path, "a.stl")
+    assert dict(part.refused) == {}
+    volume = sum(ConvexHull(1e3 * piece.corners).volume for piece in part.solid.pieces)
+    assert volume == pytest.approx(1e9 * part.solid.volume, rel=2e-3)
+
+
+def test_free_radius_of_a_blind_hole_and_volume_of_its_part(tmp_path: Path) -> None:
+    mesh = block(40, 30, 20) - rod(4, 12, (5, 0, 8), n=48)
+    _, (raw,) = raw_solids(write_stl(mesh, tmp_path / "a.stl"), None)
+    part = import_part(raw, "a", tmp_path, "a.stl")
+    assert part.free_mm["hole1"] == pytest.approx(4.0, abs=0.01)
+    assert 1e9 * part.solid.volume == pytest.approx(24000.0 - disc(4, 12), rel=1e-5)
+
+
+def test_what_an_import_did_is_said_in_lines(tmp_path: Path) -> None:
+    path = write_stl(block(40.125, 30, 10) - rod(4, 10, n=32), tmp_path / "lid.stl")
+    file, (raw,) = raw_solids(path, None)
+    assert list(file_lines(file, path)) == [f"{path}: unit mm, taken from the size; the file states none"]
+    assert raw_solids(path, "mm")[0][:2] == ("mm", "as asked")
+    lines = list(part_lines(report_part(import_part(raw, "lid", tmp_path, "lid.stl"))))
+    assert lines[0].startswith("lid: 40.125 x 30 x 10 mm, ")
+    assert "    px: flat, looks along (1, 0, 0), 20.0625 mm from the origin" in lines
+    assert any(
+        line.startswith("    hole1: hole, cylinder of 32 sides, radius 4 mm, axis from (0, 0, 0) to (0, 0, 10) mm")
+        for line in lines
+    )
+
+
+def test_a_part_that_is_too_light_is_refused(tmp_path: Path) -> None:
+    _, (raw,) = raw_solids(write_stl(block(2, 2, 2), tmp_path / "a.stl"), "mm")
+    with pytest.raises(InputError, match="the part weighs 8e-06 g at 1 kg/m"):
+        import_part(raw, "a", tmp_path, "a.stl", 1.0)

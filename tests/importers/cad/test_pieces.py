@@ -1,0 +1,85 @@
+"""Pieces keep out of the space beside their solid: others that fit into it as it is drawn fit into them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from manifold3d import CrossSection, Manifold
+from scipy.spatial import ConvexHull
+
+from apo_bench.geometry import Hull
+from apo_bench.importers.cad.assembled import coming_near, surface_points
+from apo_bench.importers.cad.faces.regions import regions_of
+from apo_bench.importers.cad.pieces import refining
+from apo_bench.importers.cad.pieces.cut_part import CutPart
+from apo_bench.importers.cad.pieces.cutting import cut
+from apo_bench.importers.cad.pieces.refining import depths
+from apo_bench.importers.cad.solids.bodies import mesh_of
+from apo_bench.importers.cad.solids.naming import with_names
+from apo_bench.importers.cad.solids.raw_solid import RawSolid, SolidPlace
+from tests.importers.cad.made import block, rod
+
+
+def raw_of(name: str, body: Manifold) -> RawSolid:
+    mesh = mesh_of(body)
+    return RawSolid(name, mesh, (SolidPlace(name, np.eye(4)),), (), with_names(mesh, regions_of(mesh)))
+
+
+def rounded(x: float, y: float, r: float) -> CrossSection:
+    return CrossSection.square((2 * x, 2 * y), True).offset(r, circular_segments=40)
+
+
+def tapered(x: float, y: float, r: float, z: float, top: float, at: float) -> Manifold:
+    """Rounded, and wider at its top."""
+    return Manifold.extrude(rounded(x, y, r), z, scale_top=(top, top)).translate((0, 0, at))
+
+
+SOCKET = block(50, 40, 20) - tapered(11, 6, 4.2, 16, 1.05, 5)
+PLUG = tapered(11, 6, 4, 15, 1.05, 5.5) + block(50, 40, 8, (0, 0, 20.4))
+BOWL = block(40, 40, 12) - Manifold.sphere(20, 48).translate((0, 0, 26))
+
+
+def misfit(raw: RawSolid, pieces: tuple[Hull, ...]) -> tuple[float, float]:
+    """How deep the surface lies inside of a piece at most, and how far off every piece, [mm]."""
+    points = surface_points(raw.mesh, 0.5)
+    deepest = np.max([depths(points, piece.planes * [1.0, 1.0, 1.0, 1e3]) for piece in pieces], axis=0)
+    return float(deepest.max()), float(-deepest.min())
+
+
+@pytest.mark.parametrize("body", [SOCKET, BOWL], ids=["socket", "bowl"])
+def test_pieces_lie_inside_of_a_hollow_solid(body: Manifold) -> None:
+    raw = raw_of("part", body)
+    out, left = misfit(raw, cut(raw).pieces)
+    assert out < 0.025
+    assert left < 0.2
+
+
+def test_what_fits_as_drawn_fits_as_pieces() -> None:
+    raws = [raw_of("socket", SOCKET), raw_of("plug", PLUG)]
+    near = coming_near(raws)
+    bodies = [
+        sum((Manifold.hull_points(1e3 * piece.corners) for piece in cut(raw, others).pieces), Manifold())
+        for raw, others in zip(raws, near, strict=True)
+    ]
+    assert (SOCKET ^ PLUG).volume() == 0.0
+    assert (bodies[0] ^ bodies[1]).volume() < 0.01
+
+
+def test_others_are_followed_along_ways_that_are_free() -> None:
+    raws = [raw_of("plate", block(60, 40, 20) - rod(5.3, 20)), raw_of("pin", rod(5, 10))]
+    of_plate, of_pin = coming_near(raws)
+    # The pin leaves its hole upwards and downwards, so all of the wall is passed; sideways it would strike.
+    assert of_plate[:, 2].max() > 19.0
+    assert np.hypot(*of_plate[:, :2].T).max() < 5.6
+    assert len(of_pin)
+
+
+def test_hulls_are_not_trimmed_where_that_takes_them_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+    def shrunk(part: CutPart, _: object) -> CutPart:
+        middle = np.array(part.body.bounding_box()).reshape(2, 3).mean(axis=0)
+        return part._replace(body=part.body.translate(-middle).scale((0.9, 0.9, 0.9)).translate(middle))
+
+    monkeypatch.setattr(refining, "_within", shrunk)
+    body = block(40, 40, 4) + block(20, 20, 9)
+    pieces = cut(raw_of("a", body)).pieces
+    assert sum(ConvexHull(1e3 * piece.corners).volume for piece in pieces) == pytest.approx(body.volume(), rel=1e-4)

@@ -1,0 +1,317 @@
+"""A recording gives the goals that were reached, in their order, and what is wrong with it is named."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from apo_bench import InputError, load_scenario
+from apo_bench.geometry import pose
+from apo_bench.importers.recording.approaches import last_straight
+from apo_bench.importers.recording.averaging import average
+from apo_bench.importers.recording.camera_file import CameraFile, Conventions
+from apo_bench.importers.recording.columns import mirror
+from apo_bench.importers.recording.importing import ImportedRecording, import_recording
+from apo_bench.importers.recording.ordering import Stated
+from apo_bench.importers.recording.tracks import PoseTrack
+from apo_bench.importers.recording.unplanned import unplanned_recording
+from apo_bench.scenario.layout import layout_at
+from benchmarks.recording_demos import Errors, first_places, tracked, watched
+from tests.recorded import CAMERA, seen
+
+NOTHING = Stated()
+GIVEN = CameraFile(Conventions(), CAMERA, {}, None)
+NAME = "stick_in_tower"
+KNOWN = replace(GIVEN, T_world_camera=None, known=dict.fromkeys(("castle1", "castle2", "stick")))
+
+
+def imported(
+    tracks: dict[str, PoseTrack], camera: CameraFile = GIVEN, name: str = NAME, stated: Stated = NOTHING
+) -> ImportedRecording:
+    return import_recording(tracks, camera, load_scenario(name), stated, "log.csv")
+
+
+def goals(name: str) -> np.ndarray:
+    return layout_at(load_scenario(name), 0.1, 0.0, 0.3).goals
+
+
+@pytest.mark.parametrize("name", [NAME, "carried_bridge"])
+@pytest.mark.parametrize("camera", ["given", "solved"])
+def test_goals_are_found_within_the_noise_of_their_means(name: str, camera: str) -> None:
+    tracks = seen(name, 0.5)
+    stated = GIVEN if camera == "given" else replace(KNOWN, known=dict.fromkeys(tracks))
+    recording = imported(tracks, stated, name)
+    off = pose.log(pose.inverse(goals(name)) @ recording.observation.goals)
+    # 24 frames and more: 0.1 mm and 0.1 deg per axis; five times that, and as much again for a solved camera.
+    assert np.abs(off[:, :3]).max() < 1e-3
+    assert np.degrees(np.abs(off[:, 3:]).max()) < 1.0
+    assert recording.unclear == ()
+    assert bool(recording.observation.shared) == (camera == "solved")
+
+
+def test_frames_that_are_wrong_and_frames_that_are_missing_change_nothing() -> None:
+    tracks = seen(NAME, 0.3)
+    rng = np.random.default_rng(1)
+    for part, (t, T) in tracks.items():
+        wrong = T.copy()
+        wrong[::17] = wrong[::17] @ pose.at((0.05, 0.0, 0.0), (0.0, 120.0, 0.0))
+        kept = rng.random(len(t)) > 0.2
+        tracks[part] = PoseTrack(t[kept], wrong[kept])
+    recording = imported(tracks)
+    off = pose.log(pose.inverse(goals(NAME)) @ recording.observation.goals)
+    assert np.abs(off[:, :3]).max() < 1e-3
+    assert all(not operation.rest.mean.inlier.all() for operation in recording.operations if operation.rest is not None)
+
+
+def test_frames_that_a_tracker_repeats_make_nothing_surer() -> None:
+    tracks = seen(NAME, 0.5)
+    often = {
+        part: PoseTrack((t[:, None] + np.arange(3) / 90.0).ravel(), np.repeat(T, 3, axis=0))
+        for part, (t, T) in tracks.items()
+    }
+    repeated = imported(often)
+    plain = imported(tracks)
+    off = pose.log(pose.inverse(goals(NAME)) @ repeated.observation.goals)
+    assert np.abs(off[:, :3]).max() < 1e-3
+    means = (
+        [operation.rest.mean.covariance for operation in each.operations if operation.rest]
+        for each in (repeated, plain)
+    )
+    ratio = np.divide(*(np.trace(C, axis1=1, axis2=2) for C in map(np.array, means)))
+    assert ratio.min() > 0.5  # three times as many frames would make it 0.33
+
+
+def test_the_covariance_of_a_frame_is_that_of_its_noise() -> None:
+    scatter = [operation.rest.mean.scatter for operation in imported(seen(NAME, 1.0)).operations if operation.rest]
+    deviations = np.sqrt([np.diagonal(S) for S in scatter]) / np.repeat([1e-3, np.radians(1.0)], 3)
+    assert np.abs(deviations - 1.0).max() < 0.6  # 24 frames: 15 % each, eighteen of them
+    assert abs(deviations.mean() - 1.0) < 0.15
+
+
+def test_at_least_half_of_few_frames_count() -> None:
+    """A frame may be the farthest along one axis only: here each is, so that each would be an outlier."""
+    xi = np.zeros((5, 6))
+    xi[np.arange(5), np.arange(5)] = 0.01
+    mean = average(pose.exp(xi))
+    assert mean.inlier.sum() >= 3
+    assert np.isfinite(mean.T).all()
+
+
+def test_the_last_straight_piece_of_a_bent_path_is_found_with_its_length() -> None:
+    arc = np.linspace(-np.pi / 2, 0.0, 40)
+    bent = np.column_stack([0.1 * np.sin(arc), np.zeros(40), 0.06 + 0.1 * (1 - np.cos(arc))])
+    bent = bent[:, [2, 1, 0]] * [1.0, 1.0, -1.0] + [-0.06, 0.0, 0.06]
+    down = np.column_stack([np.zeros((20, 2)), np.linspace(0.06, 0.001, 20)])
+    noise = 3e-4 * np.random.default_rng(0).standard_normal((60, 3))
+    T = np.tile(np.eye(4), (60, 1, 1))
+    T[:, :3, 3] = np.concatenate([bent, down]) + noise
+    T[50, :3, 3] += [0.0, 0.08, 0.0]  # a frame that is wrong
+    end = last_straight(PoseTrack(np.arange(60.0), T), np.eye(4))
+    assert end is not None
+    assert end.direction @ [0.0, 0.0, -1.0] > np.cos(np.radians(5.0))
+    assert 0.05 < end.length_m < 0.09
+
+
+def test_without_a_scenario_the_order_is_found_all_the_same() -> None:
+    puts = unplanned_recording(seen("carried_bridge", 0.5), GIVEN, "log.csv").puts
+    operations = load_scenario("carried_bridge").assembly.operations
+    assert [(put.part, *put.carries) for put in puts[:4]] == [operation.moves for operation in operations[:4]]
+    assert {puts[4].part, *puts[4].carries} == set(operations[4].moves)
+
+
+def test_a_camera_is_solved_alike_with_and_without_a_scenario() -> None:
+    """Also by the error that stays while a part rests, which weighs parts that were seen for longer no more."""
+    tracks = seen(NAME, 0.5)
+    start = layout_at(load_scenario(NAME), 0.1, 0.0, 0.3).start
+    known = {part: start[part] for part in ("castle1", "stick")}
+    for stays in (None, np.array([3e-3, np.radians(2.0)])):
+        camera = replace(KNOWN, known=known, stays=stays)
+        planned = imported(tracks, camera).camera
+        unplanned = unplanned_recording(tracks, camera, "log.csv").camera
+        assert np.array_equal(planned.T_world_camera, unplanned.T_world_camera)
+        assert np.array_equal(planned.covariance, unplanned.covariance)  # type: ignore[arg-type]
+
+
+def test_times_may_be_stated_and_operations_left_out() -> None:
+    tracks = seen(NAME, 0.5)
+    by_time = imported(tracks, stated=Stated(ends=(2.2, 4.0, 5.8)))
+    assert np.array_equal(by_time.observation.goals, imported(tracks).observation.goals)
+    hidden = imported(tracks, stated=Stated(unseen=(1,)))
+    assert hidden.observation.seen.tolist() == [True, False, True]
+    with pytest.raises(InputError, match=r"'castle2' does not rest at 3\.3 s, where operation 2 is to have ended"):
+        imported(tracks, stated=Stated(ends=(2.2, 3.3, 5.8)))
+
+
+MODEL = pose.at((0.01, -0.02, 0.03), (20.0, -40.0, 60.0))
+"""Where the frame of each part lies in the model of the tracker, whose poses the mistake is made in."""
+MISTAKES = {
+    "quaternion": lambda T: pose.unpack(pose.pack(T)[:, [0, 1, 2, 6, 3, 4, 5]]),
+    "mirror": lambda T: T * mirror("y"),
+    "inverted": pose.inverse,
+}
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_another_convention_that_fits_better_is_named(mistake: str) -> None:
+    wrong = MISTAKES[mistake]
+    tracks = {part: PoseTrack(t, wrong(T @ pose.inverse(MODEL)) @ MODEL) for part, (t, T) in seen(NAME, 0.3).items()}
+    with pytest.raises(InputError, match=f"no contact fits .* another `{mistake}` in the camera file fits better"):
+        import_recording(tracks, KNOWN, load_scenario(NAME), NOTHING, "log.csv", dict.fromkeys(tracks, MODEL))
+
+
+def test_a_contact_that_is_open_by_more_than_noise_is_unclear() -> None:
+    tracks = seen(NAME, 0.3)
+    aside = PoseTrack(tracks["stick"].t, tracks["stick"].T @ pose.at((-0.155, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    assert imported(tracks).unclear == ()
+    assert "operation 3 (stick) leaves a contact open by 1" in imported({**tracks, "stick": aside}).unclear[0]
+
+
+def test_parts_that_were_taken_for_each_other_are_no_recording_of_the_scenario() -> None:
+    tracks = seen(NAME, 0.3)
+    tracks["castle1"], tracks["stick"] = tracks["stick"], tracks["castle1"]
+    with pytest.raises(InputError, match=r"'castle2', which operation 2 moves, rests from 0\.00 s, 3\.\d+ s"):
+        imported(tracks)
+
+
+def without(track: PoseTrack, first_s: float, last_s: float) -> PoseTrack:
+    """The frames outside of a time."""
+    kept = (track.t < first_s) | (track.t > last_s)
+    return PoseTrack(track.t[kept], track.T[kept])
+
+
+OVER = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, 180.0))
+"""By which a stick and a castle look the same."""
+
+
+def flipped(track: PoseTrack, frames: np.ndarray) -> PoseTrack:
+    """The track with some of its frames turned to where the part looks the same."""
+    return PoseTrack(track.t, np.where(frames[:, None, None], track.T @ OVER, track.T))
+
+
+def test_a_part_that_is_hidden_while_others_are_placed_is_where_it_is_seen_again() -> None:
+    tracks = seen(NAME, 0.5)
+    whole = imported(tracks)
+    # The stick waits hidden while both castles are placed, and is seen again shortly before it is taken.
+    recording = imported({**tracks, "stick": without(tracks["stick"], 0.6, 3.9)})
+    assert np.allclose(recording.observation.goals, whole.observation.goals, atol=1e-4)
+    # It is taken while it is hidden.
+    later = imported({**tracks, "stick": without(tracks["stick"], 0.6, 4.8)})
+    assert re.fullmatch(r"'stick' was hidden from 0\.[56]\d to 4\.8\d s", *later.unclear)
+    off = pose.log(pose.inverse(whole.observation.goals) @ later.observation.goals)
+    assert np.abs(off[:, :3]).max() < 1e-3
+    assert all(np.linalg.norm(twist[:3]) < 1e-3 for each in later.operations for twist in each.adjusted.values())
+
+
+def test_what_moved_before_the_operation_before_had_ended_is_no_error() -> None:
+    """Every other frame of the stick is flipped just before it is taken, so it seems to be taken too early."""
+    tracks = seen(NAME, 0.5)
+    t = tracks["stick"].t
+    tracks["stick"] = flipped(tracks["stick"], (t > 3.35) & (t < 4.5) & (np.arange(len(t)) % 2 == 0))
+    recording = imported(tracks)
+    assert recording.stays["stick"][0].ends < recording.stays["castle2"][1].begins
+    off = pose.log(pose.inverse(goals(NAME)) @ recording.observation.goals)
+    assert np.abs(off[:, :3]).max() < 1e-3
+    assert np.diagonal(recording.observation.covariance, axis1=1, axis2=2)[:, :3].max() < 1e-5
+
+
+def test_a_part_that_is_flipped_for_good_is_named_with_its_symmetry() -> None:
+    tracks = seen(NAME, 0.3)
+    t = tracks["stick"].t
+    with pytest.raises(InputError, match=r"'stick' seems to be flipped by 180 deg, by which it looks the same, from 5"):
+        imported({**tracks, "stick": flipped(tracks["stick"], t > 5.4)})
+    with pytest.raises(InputError, match=r"'stick' is turned at 2\.\d+ s to where it looks the same"):
+        imported({**tracks, "stick": flipped(tracks["stick"], t > 2.0)})
+
+
+def test_a_part_that_is_flipped_while_another_is_placed_is_named_with_the_operation() -> None:
+    tracks = seen("carried_bridge", 0.3)
+    t = tracks["castle2"].t
+    with pytest.raises(
+        InputError,
+        match=r"'castle2' moved by 0 mm and 180 deg during operation 3 \('cube'\), which does not move it, \d+ "
+        r"standard deviations of where it was seen; it looks the same turned so, and was probably flipped",
+    ):
+        imported({**tracks, "castle2": flipped(tracks["castle2"], (t > 4.6) & (t < 6.2))}, name="carried_bridge")
+
+
+def test_a_part_that_moves_during_the_operation_of_another_is_refused() -> None:
+    tracks = seen(NAME, 0.3)
+    pushed = pose.at((0.03, 0.0, 0.0))
+    t, T = tracks["castle1"]
+    aside = PoseTrack(t, np.where((t > 4.5)[:, None, None], T @ pushed, T))
+    with pytest.raises(
+        InputError,
+        match=r"log\.csv: 'castle1' moved by 30 mm and 0 deg during operation 3 \('stick'\), which does not move it, "
+        r"\d\d standard deviations .*; it may have been hidden, or operations ended at other times: state them by",
+    ):
+        imported({**tracks, "castle1": aside})
+    # An adjustment is counted into the error.
+    nudged = PoseTrack(t, np.where((t > 4.5)[:, None, None], T @ pose.at((0.004, 0.0, 0.0)), T))
+    assert imported({**tracks, "castle1": nudged}).observation.covariance[0, 0, 0] > 0.003**2
+
+
+def test_a_pause_with_carried_parts_in_the_air_is_not_where_the_operation_before_ended() -> None:
+    """The stick is put below two cubes, lifted with them, held still for longer than before, and put down."""
+    truth = watched("pocket_table", 1)
+    assert truth is not None
+    found = tracked(truth, Errors(frame=1.0), np.random.default_rng([1, 9]))[1]
+    tracks = {part: PoseTrack(each.t, each.T @ each.T_model_part) for part, each in found.items()}
+    camera = replace(KNOWN, known=first_places(truth, found))
+    recording = import_recording(tracks, camera, truth.scene.scenario, NOTHING, "log.csv")
+    below, lifted = (operation.stay for operation in recording.operations[4:])
+    assert below is not None
+    assert lifted is not None
+    assert (below.begins, lifted.begins) == (pytest.approx(110.9, abs=0.2), pytest.approx(113.3, abs=0.2))
+
+
+def test_a_round_part_that_spins_is_named_as_one() -> None:
+    tracks = seen("peg_in_hole", 0.3)
+    t, T = tracks["peg"]
+    spin = pose.exp(np.outer(t, np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.5])))
+    with pytest.raises(InputError, match="'peg' never rests but for a turn about its axis of revolution"):
+        imported({**tracks, "peg": PoseTrack(t, T @ spin)}, name="peg_in_hole")
+
+
+def test_a_part_that_is_not_tracked_or_not_there_is_named() -> None:
+    tracks = seen(NAME, 0.3)
+    with pytest.raises(InputError, match="'stick', which operation 3 moves, is not tracked"):
+        imported({part: track for part, track in tracks.items() if part != "stick"})
+    with pytest.raises(InputError, match="unknown part 'stik'; did you mean 'stick'"):
+        imported({**tracks, "stik": tracks["stick"]})
+
+
+@pytest.mark.parametrize("put_down", [True, False])
+def test_a_part_that_a_hand_held_from_the_first_frame_starts_where_it_is_put_down_if_it_is(put_down: bool) -> None:
+    t, T = seen(NAME, 0.3)["stick"]
+    at = (CAMERA @ T[0])[:3, 3]
+    lifted = pose.at(at) @ pose.at((0.0, 0.0, 0.11), (45.0, 0.0, 0.0)) @ pose.at(-at)
+    taken = t[np.argmax(np.linalg.norm(T[:, :3, 3] - T[0, :3, 3], axis=1) > 0.01)]
+    held = np.where((t < (0.6 if put_down else taken))[:, None, None], pose.inverse(CAMERA) @ lifted @ CAMERA @ T, T)
+    found = imported({**seen(NAME, 0.3), "stick": PoseTrack(t, held)})
+    start = found.observation.start["stick"]
+    assert found.stood["stick"] == ("seen" if put_down else "in the hand")
+    scenario = load_scenario(NAME)
+    planned = layout_at(scenario, 0, 0, 0, clearance_mm=scenario.clearance_mm).start["stick"]
+    assert np.allclose(start[2, 3], planned[2, 3], atol=1e-3)
+    assert put_down or np.allclose(start, planned)
+
+
+def test_a_fixed_part_is_where_it_was_seen_or_stated_though_the_assembly_stands_elsewhere() -> None:
+    name = "peg_in_hole"
+    scenario = load_scenario(name)
+    base = layout_at(scenario, 0.1, 0.0, 0.3, clearance_mm=scenario.clearance_mm).start["base"]
+    tracks = seen(name, 0.3)
+    with pytest.raises(InputError, match="no contact fits"):
+        imported(tracks, name=name)
+    stated = imported(tracks, replace(GIVEN, known={"base": base}), name)
+    assert stated.stood["base"] == "known"
+    assert np.allclose(stated.observation.start["base"], base)
+    still = PoseTrack(tracks["peg"].t, np.tile(pose.inverse(CAMERA) @ base, (len(tracks["peg"].t), 1, 1)))
+    tracked = imported({**tracks, "base": still}, name=name)
+    assert tracked.stood["base"] == "seen"
+    assert np.abs(tracked.observation.start["base"] - base).max() < 1e-6
+    with pytest.raises(InputError, match="tracked part"):
+        imported(tracks, replace(GIVEN, known={"plate2": base}), name)

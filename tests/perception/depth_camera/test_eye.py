@@ -1,0 +1,339 @@
+"""The range finder in the simulation: it changes nothing, sees no hands, waits for quiet, recognises, locates."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import gymnasium
+import numpy as np
+import pytest
+
+from apo_bench import (
+    InputError,
+    Observation,
+    Scene,
+    SweepSettings,
+    TrialSettings,
+    build_scene,
+    load_scenario,
+    run_sweep,
+    run_trial,
+)
+from apo_bench.benchmark.sweeps import sweep
+from apo_bench.cli.app import main
+from apo_bench.geometry import Array, pose, symmetries
+from apo_bench.perception.depth_camera.range_finder import RangeFinder
+from apo_bench.simulation.human.hands import Hands
+from apo_bench.simulation.sensor.rays import ModelRays, Sight
+from apo_bench.simulation.sensor.tv_camera import Change, TvCamera
+from apo_bench.trial.stages import (
+    OBSERVATION,
+    SimulatedDemonstration,
+    observe_demonstration,
+    range_sensor,
+    simulate_demonstration,
+    stream,
+)
+from tests import pages
+
+SVG_TEXT = "{http://www.w3.org/2000/svg}text"
+
+TWO = ("stick_in_tower", "carried_bridge")
+
+
+@cache
+def scene(name: str) -> Scene:
+    return build_scene(load_scenario(name))
+
+
+@cache
+def _watched(name: str, seed: int) -> SimulatedDemonstration:
+    return simulate_demonstration(scene(name), 1.0, seed, "range")
+
+
+def watched(name: str, seed: int = 3) -> SimulatedDemonstration:
+    return _watched(name, seed)
+
+
+def observed(name: str, level_mm: float, seed: int = 3) -> Observation:
+    simulated = watched(name, seed)
+    return observe_demonstration(simulated, range_sensor(scene(name), simulated, level_mm), seed)
+
+
+def errors(name: str, seen: Observation, seed: int = 3) -> Array:
+    """Body twists, (n, 6), by which seen goals are away from shown ones, [mm, deg]."""
+    xi = pose.log(pose.inverse(seen.goals) @ watched(name, seed).demonstration.goals)
+    return np.hstack([1e3 * xi[:, :3], np.degrees(xi[:, 3:])])
+
+
+@pytest.mark.parametrize("name", TWO)
+def test_being_watched_changes_nothing(name: str) -> None:
+    alone = simulate_demonstration(scene(name), 1.0, 3).demonstration
+    seen = watched(name).demonstration
+    assert alone.goals.tobytes() == seen.goals.tobytes()
+    assert {part: T.tobytes() for part, T in alone.final.items()} == {
+        part: T.tobytes() for part, T in seen.final.items()
+    }
+
+
+def test_a_scene_and_the_models_of_its_parts_look_the_same_and_no_hands_are_seen() -> None:
+    built = scene("stick_in_tower")
+    start = watched("stick_in_tower").layout.start
+    hands = Hands(built, start)
+    finder = RangeFinder()
+    hands.grab(0, "stick")  # the ball that holds it is thicker than the stick
+    sight = Sight(built.shown)
+    sight.look(hands.data.qpos)
+    image = sight.range_image(finder)
+    solids = built.scenario.assembly.solids
+    models = ModelRays(solids, 1e-3 * built.clearance_mm)
+    poses = {part: start[part] for part in solids}
+    for view, distance in zip(finder.views, image.distance, strict=True):
+        expected = models(poses, view.origin, view.rays)[0].reshape(distance.shape)
+        both = np.isfinite(expected)
+        assert (np.isfinite(distance) == both).mean() > 0.9999
+        both &= np.isfinite(distance)
+        assert (np.abs(distance[both] - expected[both]) < 1e-9).mean() > 0.999  # rays along an edge may go either way
+    assert (image.cosine >= 0.0).all()
+    assert image.cosine.max() <= 1.0 + 1e-12
+
+
+def test_it_is_quiet_only_when_nothing_changes_for_a_while() -> None:
+    camera = TvCamera()
+    change = Change(camera)
+    rng = np.random.default_rng(0)
+    plain = np.full(camera.view.width * camera.view.height, 0.5)
+    moved = np.array(plain)
+    moved[:40] += 0.2
+    nudged = np.array(plain)
+    nudged[:4] += 0.2
+
+    def quiet(picture: Array, k: int) -> bool:
+        return change.quiet(picture + camera.noise * rng.standard_normal(len(picture)), k * camera.period_s)
+
+    pictures = [plain] * 6 + [moved] * 6 + [moved + nudged - plain] * 3
+    assert [quiet(picture, k) for k, picture in enumerate(pictures)] == [False] * 3 + [True] * 3 + [False] * 3 + [
+        True
+    ] * 6
+
+
+@pytest.mark.parametrize("name", TWO)
+def test_images_are_of_parts_at_rest(name: str) -> None:
+    """Without noise every pose is that at which the hand had let go, so firings are neither early nor late."""
+    seen = observed(name, 0.0)
+    assert seen.seen.all()
+    off = errors(name, seen)
+    assert np.abs(off[:, :3]).max() < 0.1
+    assert np.abs(off[:, 3:]).max() < 0.1
+
+
+@pytest.mark.parametrize("name", TWO)
+def test_parts_are_located_within_half_a_millimetre_and_a_degree(name: str) -> None:
+    seen = observed(name, 1.0)
+    off = errors(name, seen)
+    assert seen.seen.all()
+    assert np.median(np.linalg.norm(off[:, :3], axis=1)) < 0.5
+    assert np.median(np.linalg.norm(off[:, 3:], axis=1)) < 1.0
+    eigenvalues = np.linalg.eigvalsh(seen.covariance)
+    assert (eigenvalues > 0.0).all()
+
+
+def test_levels_share_a_demonstration_and_seeds_give_the_same_bytes() -> None:
+    one, again, two = (observed("stick_in_tower", level) for level in (1.0, 1.0, 2.0))
+    assert one.goals.tobytes() == again.goals.tobytes()
+    assert one.covariance.tobytes() == again.covariance.tobytes()
+    assert (one.goals != two.goals).any()
+    assert (np.linalg.det(two.covariance) > np.linalg.det(one.covariance)).all()
+    fresh = simulate_demonstration(scene("stick_in_tower"), 1.0, 3, "range").images
+    known = watched("stick_in_tower").images
+    assert fresh is not None
+    assert known is not None
+    assert fresh.times_s == known.times_s
+    for a, b in zip(fresh.images, known.images, strict=True):
+        assert a.distance.tobytes() == b.distance.tobytes()
+
+
+@pytest.mark.parametrize("seed", [2, 3])
+def test_the_small_motion_of_castle_2_stays_unnoticed(seed: int) -> None:
+    simulated = watched("stick_in_tower", seed)
+    moved = (simulated.demonstration.final["castle2"] - simulated.demonstration.goals[1])[:3, 3]
+    assert 1.4 < 1e3 * np.linalg.norm(moved) < 4.1
+    eye = range_sensor(scene("stick_in_tower"), simulated, 1.0)
+    events = eye.events(simulated.demonstration, eye.sensed(stream(seed, OBSERVATION)))
+    assert [event.moved for event in events] == [{"castle1"}, {"castle2"}, {"stick"}]
+    seen = observed("stick_in_tower", 1.0, seed)
+    away = (seen.goals[1] - simulated.demonstration.goals[1])[:3, 3]
+    assert 1e3 * np.linalg.norm(away) < 0.5
+
+
+def test_a_part_that_is_not_the_expected_model_is_not_seen() -> None:
+    """The scene shows a stick where the topology expects a second cube-like block to arrive."""
+    simulated = watched("stick_in_tower")
+    assembly = simulated.demonstration.assembly
+    short = replace(assembly.solids["stick"], pieces=assembly.solids["castle1"].pieces)
+    wrong = replace(assembly, solids={**assembly.solids, "stick": short})
+    eye = range_sensor(scene("stick_in_tower"), simulated, 1.0)
+    seen = eye(wrong, replace(simulated.demonstration, assembly=wrong), stream(3, OBSERVATION))
+    assert seen.seen.tolist() == [True, True, False]
+    assert seen.covariance[2][0, 0] > 0.005
+    assert np.array_equal(seen.goals[2], simulated.layout.start["stick"])
+
+
+def test_an_operation_that_no_image_shows_is_not_seen() -> None:
+    simulated = watched("stick_in_tower")
+    eye = range_sensor(scene("stick_in_tower"), simulated, 1.0)
+    blind = replace(eye, images=eye.images[:2])
+    seen = observe_demonstration(simulated, blind, 3)
+    assert seen.seen.tolist() == [True, False, False]
+    none = replace(eye, images=eye.images[:1])
+    assert not observe_demonstration(simulated, none, 3).seen.any()
+
+
+def test_only_the_representative_of_a_symmetry_is_taken_from_the_plan() -> None:
+    shown = watched("stick_in_tower")
+    eye = range_sensor(scene("stick_in_tower"), shown, 1.0)
+    S = symmetries(shown.demonstration.assembly.solids["stick"])[3]
+    turned = np.array(eye.turns)
+    turned[2] = turned[2] @ S[:3, :3]
+    other = replace(eye, turns=turned)
+    a, b = (e(shown.demonstration.assembly, shown.demonstration, stream(3, OBSERVATION)) for e in (eye, other))
+    assert np.array_equal(a.goals[:2], b.goals[:2])
+    assert b.goals[2] == pytest.approx(a.goals[2] @ S, abs=1e-9)
+    assert sorted(np.linalg.eigvalsh(b.covariance[2])) == pytest.approx(
+        sorted(np.linalg.eigvalsh(a.covariance[2])), rel=1e-6
+    )
+
+
+def test_a_trial_through_the_range_finder() -> None:
+    spec = TrialSettings("stick_in_tower", level_mm=1.0, eye="range", method="contact", seed=3)
+    row = run_trial(spec, scene("stick_in_tower"), simulated=watched("stick_in_tower"))
+    assert row["eye"] == "range"
+    assert row["success"] is True
+
+
+def test_the_command_says_and_draws_what_it_saw(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "eye.png"
+    assert main(["eye", "block_on_block", "--seed", "1", "--json", "--out", str(out)]) == 0
+    form = json.loads(capsys.readouterr().out)
+    assert form["schema"] == "apo-bench/eye/1"
+    assert [operation["found"] for operation in form["operations"]] == [True, True]
+    assert all(operation["error_mm"] < 1.0 for operation in form["operations"])
+    assert out.read_bytes()[:8] == b"\x89PNG\r\n\x1a\n"
+
+
+def figure_texts(run: Path) -> dict[str, list[str]]:
+    """Name of a figure of a report -> its texts, each line for itself."""
+    found = {path.stem: ElementTree.parse(path).iter(SVG_TEXT) for path in (run / "figures").glob("*.svg")}
+    return {name: ["".join(text.itertext()) for text in texts] for name, texts in found.items()}
+
+
+@pytest.fixture
+def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Sweeps start no worker."""
+    monkeypatch.setattr(sweep, "run_sweep", lambda *a, **k: run_sweep(*a, **{**k, "workers": None}))
+
+
+@pytest.mark.usefixtures("in_this_process")
+def test_levels_of_the_range_finder_are_mm_per_ray_wherever_they_stand(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    asked = ["--eye", "range", "--levels", "0.5", "--careless", "0", "--methods", "none,contact", "--trials", "1"]
+    out = tmp_path / "run"
+    more = ["--relations", "recognised", "--clearance", "0.25,0.3", "--fidelity", "contact", "--out", str(out)]
+    assert main(["sweep", "block_on_block", *asked, *more]) == 0
+    assert main(["report", str(out)]) == 0
+    said = capsys.readouterr().out
+    page = pages.words(out / "report.html")
+    for text in (said, page):
+        assert "0.5 mm per ray" in text
+        assert "0 deg" not in text
+    assert "of the range finder it is one of L mm per ray" in page
+    drawn = figure_texts(out)
+    for name, texts in drawn.items():
+        assert not [text for text in texts if "deg" in text or "range noise" in text], name
+    for name in ("success_over_level", "gap_before_and_after"):
+        assert {"level: mm per ray", "0.5"} <= set(drawn[name])
+    assert "0.5 mm per ray" in drawn["recognised"]
+    assert "range finder, relations recognised" in " ".join(drawn["success_over_level"])
+
+
+def test_a_sweep_has_both_eyes(tmp_path: Path) -> None:
+    options = ["--eye", "noise,range", "--levels", "1", "--careless", "0", "--methods", "none", "--trials", "1"]
+    out = tmp_path / "run"
+    for _ in range(2):
+        assert main(["sweep", "block_on_block", *options, "--workers", "1", "--out", str(out)]) == 0
+        rows = [json.loads(line) for line in (out / "trials.jsonl").read_text(encoding="utf-8").splitlines()]
+        assert sorted((row["eye"], row["noise"], row["level_deg"]) for row in rows) == [
+            ("noise", "isotropic", 1.0),
+            ("range", "range", 0.0),
+        ]
+    assert main(["report", str(out)]) == 0
+    axis = "level: mm and degrees per axis; level: mm per ray"
+    assert axis in figure_texts(out)["success_over_level"]
+    page = pages.words(out / "report.html")
+    assert "of the range finder it is one of L mm per ray" in page
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        *(["--level", "-1"], ["--view", "3"], ["--out", "eye.txt"]),
+    ],
+)
+def test_wrong_requests_end_in_one_sentence_before_anything_is_shown(
+    wrong: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        "apo_bench.viz.sensor.simulate_demonstration", lambda *_: pytest.fail("the human demonstrated already")
+    )
+    assert main(["eye", "block_on_block", *wrong]) == 2
+    said = capsys.readouterr().err.strip()
+    assert said
+    assert "Traceback" not in said
+    assert "degree" not in said
+
+
+@pytest.mark.parametrize("noise", ["camera"])
+def test_noise_models_are_refused_where_only_the_range_finder_looks(
+    noise: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "run"
+    assert main(["sweep", "block_on_block", "--eye", "range", "--noise", noise, "--out", str(out)]) == 2
+    assert "was given together with the eye 'range', which draws no pose noise" in capsys.readouterr().err
+    assert not out.exists()
+    with pytest.raises(InputError, match="draws no pose noise"):
+        SweepSettings(("block_on_block",), eyes=("range",), noises=tuple(noise.split(",")))
+    with pytest.raises(InputError, match="draws no pose noise"):
+        gymnasium.make("APOReplay-v0", eye="range", noise=noise.split(",")[0])
+
+
+def test_what_draws_noise_depends_on_the_eyes() -> None:
+    assert SweepSettings(("block_on_block",), eyes=("range",)).noises == ()
+    assert SweepSettings(("block_on_block",)).noises == ("isotropic",)
+    assert SweepSettings(("block_on_block",), eyes=("range", "noise")).noises == ("isotropic",)
+    assert SweepSettings(("block_on_block",), eyes=("range", "noise"), noises=("camera",)).noises == ("camera",)
+    with pytest.raises(InputError, match="draws no pose noise"):
+        TrialSettings("block_on_block", eye="range", noise="camera")
+
+
+@pytest.mark.parametrize("eye", [3, "rang"])
+def test_what_is_no_eye_is_refused(eye: Any) -> None:
+    with pytest.raises(InputError, match=r"unknown eye .* Known: noise, range\.|eye of APOReplay must be a text"):
+        gymnasium.make("APOReplay-v0", eye=eye)
+
+
+@pytest.mark.parametrize("level", [(1.0, 1.0)])
+def test_the_level_of_the_range_finder_is_one_number(level: Any) -> None:
+    with pytest.raises(InputError, match=r"mm per ray|level of APOReplay must be a number or a list"):
+        gymnasium.make("APOReplay-v0", eye="range", level=level)
+
+
+@pytest.mark.parametrize("careless", [None, "much", float("nan")])
+def test_carelessness_is_a_number(careless: Any) -> None:
+    with pytest.raises(InputError, match=r"a number from 0 to 10 is allowed|careless of APOReplay must be a number"):
+        gymnasium.make("APOReplay-v0", careless=careless)

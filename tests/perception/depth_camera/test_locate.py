@@ -1,0 +1,251 @@
+"""The pure half of the range finder: rays, regions, fits and what they say of themselves."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import pytest
+
+from apo_bench import Assembly
+from apo_bench.assembly import Operation
+from apo_bench.geometry import Array, pose, quarter_turns, symmetries
+from apo_bench.perception.depth_camera.explained import measure_share
+from apo_bench.perception.depth_camera.fit import PRIOR, Points, covariance, refine
+from apo_bench.perception.depth_camera.follow import Expected, follow_demonstration
+from apo_bench.perception.depth_camera.range_finder import PinholeView, RangeFinder, RangeImage, look_at
+from apo_bench.perception.depth_camera.regions import drop_small, filter_median, find_regions
+from apo_bench.perception.depth_camera.starts import guess_poses, keep_distinct
+from apo_bench.perception.depth_camera.surface import join_surfaces, sample_surface
+from apo_bench.simulation.sensor.rays import ModelRays
+from tests.scenes import block, castle, cube, mm, stick, table
+
+SOLIDS = {"castle": castle(), "cube": cube(), "stick": stick(), "block": block()}
+TABLE = table()
+MODELS = ModelRays({**SOLIDS, "table": TABLE}, 0.0)
+SURFACES = {name: sample_surface(solid.pieces) for name, solid in SOLIDS.items()}
+STANDING = pose.at((0.05, 0.02, 0.0), (0.0, 0.0, 25.0))
+
+
+def range_of(poses: Mapping[str, Array], view: PinholeView) -> Array:
+    """True distances of parts, and of a table, (height, width)."""
+    distance, _ = MODELS({**poses, "table": np.eye(4)}, view.origin, view.rays)
+    return np.minimum(distance, 3.0).reshape(view.height, view.width)
+
+
+def points_on(name: str, T: Array) -> Points:
+    """What the views of the range finder see of a part at T, without any error."""
+    each = []
+    for v, view in enumerate(RangeFinder().views):
+        distance, _ = MODELS({name: T}, view.origin, view.rays)
+        hit = np.isfinite(distance)
+        at = view.origin + distance[hit, None] * view.rays[hit]
+        each.append((at, view.rays[hit], np.full(int(hit.sum()), v)))
+    return Points(*map(np.concatenate, zip(*each, strict=True)))
+
+
+def test_rays_end_where_boxes_begin() -> None:
+    """Slabs: a ray is in a box from its last entry to its first exit."""
+    rng = np.random.default_rng(0)
+    origin = np.array([0.3, -0.4, 0.35])
+    rays = rng.uniform(-0.08, 0.08, (2000, 3)) - origin
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    for name, solid in SOLIDS.items():
+        best = np.full(len(rays), np.inf)
+        for box in solid.pieces:
+            a, b = ((box.center + side * box.half - origin) / rays for side in (-1.0, 1.0))
+            enter, leave = np.minimum(a, b).max(axis=1), np.maximum(a, b).min(axis=1)
+            best = np.where((enter <= leave) & (enter < best), enter, best)
+        distance, number = MODELS({"table": mm(0, 0, -900), name: np.eye(4)}, origin, rays)
+        hit = np.isfinite(best)
+        assert hit.sum() > 100
+        assert distance[hit] == pytest.approx(best[hit], abs=1e-9)
+        assert (number[hit] == 1).all()
+        assert (number[~hit] <= 0).all()
+
+
+def test_points_of_a_surface_are_on_it_and_their_normals_across_it() -> None:
+    surface = SURFACES["stick"]
+    half = np.abs(surface.corners).max(axis=0)
+    beyond = np.abs(surface.points) - half
+    assert beyond.max(axis=1) == pytest.approx(0.0, abs=1e-9)
+    out = np.sign(surface.points) * (beyond == beyond.max(axis=1, keepdims=True))
+    assert surface.normals == pytest.approx(out, abs=1e-9)
+    assert sample_surface(SOLIDS["stick"].pieces) is surface
+    assert not surface.looks_like(SURFACES["block"])
+    T = pose.at((0.3, 0.1, 0.0), (0.0, 0.0, 90.0))
+    both = join_surfaces([(SURFACES["block"], np.eye(4)), (surface, T)])
+    number, distance = both.find_nearest(pose.apply(T, surface.points[:50]))
+    assert distance == pytest.approx(0.0, abs=1e-9)
+    assert (number >= len(SURFACES["block"].points)).all()
+
+
+@pytest.mark.parametrize(("name", "ways"), [("castle", 2), ("stick", 8), ("cube", 8), ("block", 24)])
+def test_of_quarter_turns_those_that_look_alike_are_tried_once(name: str, ways: int) -> None:
+    same = symmetries(SOLIDS[name])
+    assert len(same) == ways
+    assert len(keep_distinct(quarter_turns(), same)) == 24 // ways
+
+
+def test_noise_alone_is_no_change() -> None:
+    view = RangeFinder().views[0]
+    rng = np.random.default_rng(1)
+    before = range_of({"castle": STANDING}, view)
+    for level in (0.0, 1e-3, 4e-3):
+        noisy = [before + level * rng.standard_normal(before.shape) for _ in range(2)]
+        changed = find_regions(*noisy, level)
+        assert not changed.appeared.any()
+        assert not changed.vanished.any()
+
+
+@pytest.mark.parametrize("moved_twice", [False, True])
+def test_of_two_moves_of_a_part_in_a_row_only_the_end_is_known(moved_twice: bool) -> None:
+    """The first is not seen, instead of being where the second ended; a hand that pauses alone does no harm."""
+    turned = pose.at((0.0, 0.0, 0.0), (0.0, 0.0, 20.0))
+    start = {"castle": STANDING, "block": mm(0, -180, 25)}
+    halfway = mm(100, 100, 0) @ turned
+    goal = mm(-60, 120, 0) @ turned
+    last = mm(120, -90, 25)
+    operations = [Operation("castle")] * (1 + moved_twice) + [Operation("block")]
+    assembly = Assembly({name: SOLIDS[name] for name in start}, tuple(operations), frozenset())
+    after = [start, start | {"castle": halfway}, start | {"castle": goal}, {"castle": goal, "block": last}]
+    finder = RangeFinder()
+    rng = np.random.default_rng(0)
+    images = []
+    for poses in after:
+        true = np.stack([range_of(poses, view) for view in finder.views])
+        images.append(finder.sense(RangeImage(true, np.ones_like(true)), 0.5e-3, rng))
+    turns = np.array([T[:3, :3] for T in [halfway] * moved_twice + [goal, last]])
+    events = follow_demonstration(images, finder, 0.5e-3, Expected(assembly, start, turns), MODELS)
+    assert [event.operation for event in events] == [int(moved_twice), 1 + moved_twice]
+    for event, T in zip(events, (goal, last), strict=True):
+        assert event.found is not None
+        assert np.linalg.norm(event.found.T[:3, 3] - T[:3, 3]) < 0.5e-3
+
+
+@pytest.mark.parametrize("yaw", [0, 45, 105])
+def test_a_nudge_goes_unnoticed(yaw: int) -> None:
+    T = pose.at((0.1, 0.03, 0.0), (0.0, 0.0, yaw))
+    for view in RangeFinder().views:
+        before = range_of({"castle": T}, view)
+        nudged = range_of({"castle": T @ pose.at((0.0, 0.004, 0.0))}, view)
+        assert (np.abs(nudged - before) > 0.01).any()
+        changed = find_regions(before, nudged, 1e-3)
+        assert not changed.appeared.any()
+        assert not changed.vanished.any()
+
+
+def test_a_part_that_is_carried_away_appears_and_vanishes() -> None:
+    view = RangeFinder().views[0]
+    before = range_of({"castle": STANDING}, view)
+    after = range_of({"castle": pose.at((0.0, 0.2, 0.0)) @ STANDING}, view)
+    changed = find_regions(before, after, 0.0)
+    assert ((after < before - 0.02) & ~changed.appeared).sum() < 40
+    assert ((after > before + 0.02) & ~changed.vanished).sum() < 40
+    assert not (changed.appeared & changed.vanished).any()
+
+
+def test_small_regions_are_dropped_and_smoothing_keeps_edges() -> None:
+    mask = np.zeros((30, 30), dtype=np.bool_)
+    mask[2:4, 2:4] = mask[10:20, 10:20] = mask[24:28, 2:28] = True
+    assert drop_small(mask).sum() == 100
+    step = np.repeat([[0.0, 1.0]], 20, axis=0).repeat(10, axis=1)
+    assert np.array_equal(filter_median(step), step)
+    noise = np.random.default_rng(2).standard_normal((200, 200))
+    assert 0.40 < filter_median(noise).std() < 0.48
+
+
+@pytest.mark.parametrize("name", sorted(SOLIDS))
+def test_exact_points_are_fitted_to_a_tenth_of_a_millimetre_from_some_start(name: str) -> None:
+    T = pose.at((0.07, -0.04, 0.06), (0.0, 0.0, 33.0))
+    points = points_on(name, T)
+    same = symmetries(SOLIDS[name])
+    surface = SURFACES[name]
+    begun = guess_poses(surface.corners, points.at, same)
+    fits = refine(surface, points.thinned(600), begun, 0.012, 15)
+    fits = refine(surface, points.thinned(600), fits.T, 0.0015, 40)
+    best = fits.T[fits.cost.argmin()]
+    off = [np.abs(pose.log(pose.inverse(T) @ best @ S)) for S in same]
+    assert min(max(xi[:3].max() / 1e-4, xi[3:].max() / np.radians(0.1)) for xi in off) < 1.0
+
+
+def test_the_stated_covariance_is_that_of_the_fits() -> None:
+    rng = np.random.default_rng(3)
+    surface = SURFACES["castle"]
+    T = STANDING
+    exact = points_on("castle", T).thinned(900)
+    noise = 1e-3
+    bias = 1e-4
+    trials = 120
+    xi = np.zeros((trials, 6))
+    z = np.zeros(trials)
+    for i in range(trials):
+        common = bias * rng.standard_normal(2)[exact.view]
+        error = noise * rng.standard_normal(len(exact)) + common
+        seen = Points(exact.at + error[:, None] * exact.ray, exact.ray, exact.view)
+        fitted = refine(surface, seen, T[None], 3e-3, 15).T[0]
+        xi[i] = pose.log(pose.inverse(T) @ fitted)
+        z[i] = xi[i] @ np.linalg.solve(covariance(surface, seen, fitted, 3e-3, noise, bias), xi[i])
+    assert np.abs(xi[:, :3].mean(axis=0)).max() < 1e-4
+    assert 0.7 < z.mean() / 6.0 < 1.4
+
+
+def test_what_no_point_says_is_stated_to_be_unknown() -> None:
+    surface = SURFACES["stick"]
+    T = STANDING
+    points = points_on("stick", T)
+    along = (points.at - T[:3, 3]) @ T[:3, 0]
+    middle = points.only(np.abs(along) < 0.05)
+    C = covariance(surface, middle, T, 3e-3, 1e-3, 1e-4)
+    deviation = np.sqrt(np.diag(C))
+    assert deviation[0] > 0.9 * PRIOR[0]
+    assert deviation[1:3].max() < 1e-3
+    whole = np.sqrt(np.diag(covariance(surface, points, T, 3e-3, 1e-3, 1e-4)))
+    assert whole[0] < 1e-3
+    assert np.linalg.eigvalsh(C)[0] > 0.0
+
+
+def test_wrong_models_and_wrong_poses_explain_less() -> None:
+    finder = RangeFinder()
+    images = np.array([range_of({"castle": STANDING}, view) for view in finder.views])
+    masks = [
+        np.isfinite(MODELS({"castle": STANDING}, view.origin, view.rays)[0]).reshape(view.height, view.width)
+        for view in finder.views
+    ]
+
+    def share(name: str, T: Array) -> float:
+        return measure_share({name: T}, MODELS, finder.views, images, masks, 1e-3)
+
+    right = share("castle", STANDING)
+    assert right > 0.99
+    assert share("stick", STANDING) < 0.4
+    assert share("cube", STANDING @ pose.at((0, 0, 0.02))) < 0.8
+    assert share("castle", STANDING @ pose.at((0.01, 0, 0))) < 0.95
+    assert share("castle", STANDING @ pose.at((0, 0, 0), (0, 0, 90.0))) < right - 0.02
+
+
+def test_levels_scale_one_draw_and_level_zero_is_exact() -> None:
+    finder = RangeFinder()
+    rng = np.random.default_rng
+    distance = rng(0).uniform(0.7, 1.0, (2, 30, 40))
+    cosine = rng(1).uniform(0.3, 1.0, (2, 30, 40))
+    image = RangeImage(distance, cosine)
+    clean, one, two = (finder.sense(image, level, rng(5)) for level in (0.0, 1e-3, 2e-3))
+    seen = np.isfinite(clean)
+    assert (np.isfinite(one) == seen).all()
+    assert np.array_equal(clean[seen], distance[seen])
+    assert (two - clean)[seen] == pytest.approx(2.0 * (one - clean)[seen], abs=1e-12)
+    assert 0.97 < seen.mean() < 1.0
+    grazing = finder.sense(RangeImage(distance, np.full_like(cosine, 0.05)), 0.0, rng(5))
+    assert np.isnan(grazing).all()
+
+
+def test_views_look_where_they_say() -> None:
+    view = PinholeView(look_at((1.0, 0.5, 0.8), (0.1, 0.0, 0.0)), 41, 31, 40.0)
+    to = np.array([0.1, 0.0, 0.0]) - view.origin
+    assert view.rays[15 * 41 + 20] == pytest.approx(to / np.linalg.norm(to))
+    assert view.rays[0] @ view.T_world_view[:3, 0] < 0.0
+    assert view.rays[0][2] > view.rays[-1][2]
+    R = view.T_world_view[:3, :3]
+    assert pytest.approx(np.eye(3), abs=1e-12) == R.T @ R
+    assert np.linalg.det(R) == pytest.approx(1.0)

@@ -1,0 +1,325 @@
+"""Contacts recognised from seen poses: all of them, no other, and nothing but poses, solids and noise is used."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+
+from apo_bench import Assembly, InputError, Observation, correct, draw_layout, load_scenario, recognise
+from apo_bench.assembly import Contact, Facing, Gap, Operation, placements
+from apo_bench.assembly.touching import facing
+from apo_bench.geometry import Solid, pose
+from apo_bench.perception.detection.belief import Belief, initial_belief
+from apo_bench.perception.detection.thresholds import RULES_BY_NOISE, Rules, pair_thresholds, reality, slack
+from apo_bench.perception.observation.models.displaced import floored
+from apo_bench.scenario.file import scenario_names
+from apo_bench.trial.recognised_contacts import count_contacts, with_recognised_contacts
+from tests import scenes
+
+NAMES = sorted(scenes.ALL)
+WIDE = {"gap_m": 0.02, "angle_rad": 0.5, "share": 0.1}
+
+
+def contacts(assembly: Assembly) -> set[tuple[int, Contact]]:
+    return {(relation.made, relation.contact) for relation in assembly.relations()}
+
+
+def seen_at(scene: scenes.Scene, seed: int, level: float, play_m: float = 0.0) -> Observation:
+    """Goals with noise of so many mm and degrees, which are stated."""
+    goals = scenes.noisy(scene.goals, np.random.default_rng(seed), level, level)
+    return stated(scenes.seen(scene, goals), level, play_m)
+
+
+def stated(seen: Observation, level: float, play_m: float = 0.0) -> Observation:
+    covariance = np.tile(np.diag(np.repeat([level * 1e-3, np.radians(level)], 3) ** 2), (len(seen.goals), 1, 1))
+    return replace(seen, covariance=floored(covariance), play_m=play_m)
+
+
+def without_contacts(assembly: Assembly) -> Assembly:
+    bare = tuple(replace(operation, contacts=()) for operation in assembly.operations)
+    return replace(assembly, operations=bare)
+
+
+def blocks(apart_mm: float, level: float) -> Observation:
+    """Two blocks on the table, one this far beside the other."""
+    solids = [scenes.table(), scenes.block("A"), scenes.block("B")]
+    operations = [Operation("A"), Operation("B")]
+    scene = scenes.scene(solids, operations, [scenes.mm(0, 0, 25), scenes.mm(50 + apart_mm, 0, 25)])
+    return stated(scenes.seen(scene, scene.goals), level)
+
+
+def side_by_side(seen: Observation, rules: Rules = RULES_BY_NOISE) -> bool:
+    return any(str(e.contact) == "B.nx on A.px" for e in recognise(seen, rules).evidence)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("level", [pytest.param(0.0, marks=pytest.mark.numeric), 0.5, 1.0])
+def test_every_contact_is_recognised_and_no_other(name: str, level: float) -> None:
+    """Rounding can only decide where there is no noise."""
+    scene = scenes.ALL[name]()
+    for seed in range(3):
+        recognised = recognise(seen_at(scene, seed, level))
+        assert contacts(recognised.assembly) == contacts(scene.assembly)
+        assert tuple(e.contact for e in recognised.evidence) == tuple(
+            r.contact for r in recognised.assembly.relations()
+        )
+
+
+@pytest.mark.parametrize("name", scenario_names())
+def test_scenarios_of_the_package_are_recognised_with_their_own_play(name: str) -> None:
+    """Layouts as they are drawn; physics is left to the benchmark."""
+    scenario = load_scenario(name)
+    for seed in range(3):
+        layout = draw_layout(scenario, np.random.default_rng(seed))
+        scene = scenes.Scene(scenario.assembly, layout.start, layout.goals)
+        seen = seen_at(scene, seed, 0.5, play_m=scenario.clearance_mm * 1e-3)
+        assert contacts(recognise(seen).assembly) == contacts(scenario.assembly)
+
+
+@pytest.mark.parametrize("name", ["stick_in_tower", "subassembly_on_castles", "fixture", "pockets"])
+def test_a_part_that_was_put_aside_still_touches_what_it_touches(name: str) -> None:
+    """The carelessness is stated, so a gap of 3 mm is explained; where nothing states it, it is not."""
+    scene, goals = scenes.careless(name, 3.0)
+    exact = stated(scenes.seen(scene, goals), 0.1)
+    along = 0 if name == "pockets" else 1
+    wide = np.array(exact.covariance)
+    aside = [1, 2] if name == "fixture" else [1]
+    wide[aside, along, along] += 2.85e-3**2
+    assert contacts(recognise(replace(exact, covariance=wide)).assembly) == contacts(scene.assembly)
+    assert contacts(recognise(exact).assembly) < contacts(scene.assembly)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_contacts_that_came_with_it_are_not_looked_at(name: str) -> None:
+    seen = seen_at(scenes.ALL[name](), 5, 1.0)
+    bare = replace(seen, assembly=without_contacts(seen.assembly))
+    assert recognise(seen).evidence == recognise(bare).evidence
+
+
+@pytest.mark.numeric
+@pytest.mark.parametrize("name", NAMES)
+def test_the_world_frame_does_not_matter(name: str) -> None:
+    scene = scenes.ALL[name]()
+    T = pose.exp([0.3, -0.2, 0.1, 0.4, -0.9, 1.3])
+    for seed in (7, 8):
+        here = seen_at(scene, seed, 1.0)
+        there = seen_at(scenes.turned(scene, T), seed, 1.0)
+        found = recognise(here).evidence
+        again = recognise(there).evidence
+        assert [(e.made, e.contact) for e in found] == [(e.made, e.contact) for e in again]
+        assert_allclose([e.gap_m for e in found], [e.gap_m for e in again], rtol=0, atol=1e-7)
+        assert_allclose([e.most for e in found], [e.most for e in again], rtol=1e-4, atol=1e-7)
+
+
+def test_what_counts_as_near_follows_the_noise_up_to_a_bound() -> None:
+    assert side_by_side(blocks(0.2, 0.1))
+    assert not side_by_side(blocks(3.0, 0.1))
+    assert side_by_side(blocks(3.0, 1.0))
+    assert not side_by_side(blocks(9.0, 1.0))
+    assert side_by_side(blocks(9.0, 4.0))
+    assert not side_by_side(blocks(12.0, 10.0))
+    assert side_by_side(blocks(-3.0, 1.0))
+
+
+def test_faces_that_cover_little_of_each_other_do_not_touch() -> None:
+    for aside_mm, touches in ((40.0, True), (44.0, False)):
+        seen = blocks(0.0, 0.2)
+        goals = np.array(seen.goals)
+        goals[1, 1, 3] += aside_mm * 1e-3
+        assert side_by_side(replace(seen, goals=goals)) is touches
+
+
+def test_of_contacts_that_exclude_each_other_those_are_taken_that_fit_together() -> None:
+    """A cube that is seen 4.5 mm too low on a castle is nearly as near to the floor of the slot."""
+    scene = scenes.subassembly_on_castles()
+    goals = np.array(scene.goals)
+    goals[2, 2, 3] -= 4.5e-3
+    found = recognise(stated(scenes.seen(scene, goals), 2.0))
+    of_cube = {str(e.contact) for e in found.evidence if e.made == 2}
+    assert of_cube == {"cube.nz on castle1.topP", "cube.nz on castle1.topN"}
+
+
+def test_parts_that_are_carried_keep_the_contacts_among_themselves() -> None:
+    scene = scenes.pockets()
+    found = recognise(seen_at(scene, 1, 0.5))
+    assert not [e for e in found.evidence if e.made == 5 and "stick" in (e.contact.manipulated.part, e.contact[1].part)]
+
+
+def test_what_was_not_seen_touches_nothing() -> None:
+    scene = scenes.stick_in_tower()
+    seen = replace(seen_at(scene, 0, 0.5), seen=np.array([True, False, True]))
+    right = {(k, c) for k, c in contacts(scene.assembly) if "castle2" not in (c.manipulated.part, c.environment.part)}
+    assert contacts(recognise(seen).assembly) == right
+
+
+def test_parts_that_touch_nothing_have_no_contact_and_can_be_corrected() -> None:
+    scene = scenes.stick_on_castles()
+    goals = np.array(scene.goals)
+    goals[:, 2, 3] += [0.1, 0.2, 0.35]
+    seen = with_recognised_contacts(stated(scenes.seen(scene, goals), 0.5), "recognised")
+    assert not seen.assembly.relations()
+    assert correct(seen, "contact").ok
+    assert correct(seen, "paper").ok
+
+
+@pytest.mark.parametrize("wrong", [(None,), ("seen", "fixed")])
+def test_what_is_no_observation_and_no_rules_is_said(wrong: tuple[Any, ...]) -> None:
+    given = [seen_at(scenes.bridge(), 0, 0.5) if x == "seen" else x for x in wrong]
+    with pytest.raises(InputError, match=r"(observation|rules) of recognise must be an? (Observation|Rules), got"):
+        recognise(*given)
+
+
+def test_kinds_of_gaps_are_not_looked_at() -> None:
+    scenario = load_scenario("stick_in_tower")
+    contact = scenario.assembly.operations[0].contacts[0]
+    with_gap = replace(scenario.assembly, gaps={contact: Gap("contact")})
+    layout = draw_layout(scenario, np.random.default_rng(0))
+    seen = stated(scenes.seen(scenes.Scene(with_gap, layout.start, layout.goals), layout.goals), 0.5)
+    assert not recognise(seen).assembly.gaps
+
+
+def test_contacts_are_counted_against_the_right_ones() -> None:
+    scene = scenes.bridge()
+    right = scene.assembly
+    operations = list(right.operations)
+    first, second = operations[1].contacts
+    operations[1] = replace(operations[1], contacts=(first, Contact(second.environment, second.manipulated)))
+    wrong = replace(right, operations=tuple(operations))
+    assert count_contacts(right, wrong) == {"contacts_right": 4, "contacts_missed": 1, "contacts_false": 1}
+    assert count_contacts(right, right) == {"contacts_right": 5, "contacts_missed": 0, "contacts_false": 0}
+
+
+@pytest.mark.parametrize(
+    ("rule", "words"),
+    [
+        ({"miss": 0.0}, r"miss=0.0 was given .* above 0 and below 1"),
+        ({"share": "much"}, r"share='much' was given"),
+    ],
+)
+def test_rules_are_checked_at_the_door(rule: dict[str, float], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        Rules(**rule)
+
+
+def pairs(scene: scenes.Scene, seed: int) -> list[tuple[str, str, Facing]]:
+    """Faces that look at each other, between all parts at the end of a noisy demonstration."""
+    goals = scenes.noisy(scene.goals, np.random.default_rng(seed), 1.0, 1.0)
+    at = placements(scene.assembly, scene.start, goals)[-1]
+    solids = scene.assembly.solids
+    return [
+        (a, b, pair)
+        for a in solids
+        for b in solids
+        if a != b
+        for pair in facing(solids[a], at[a], solids[b], at[b], **WIDE)
+    ]
+
+
+@pytest.mark.numeric
+@pytest.mark.parametrize("name", ["stick_in_tower", "pockets"])
+def test_the_derivative_of_gap_and_tilts_is_right(name: str) -> None:
+    """Central differences. Where parts turn the overlap changes too, so the gap is taken where its middle was."""
+    scene = scenes.ALL[name]()
+    goals = scenes.noisy(scene.goals, np.random.default_rng(3), 1.0, 1.0)
+    at = placements(scene.assembly, scene.start, goals)[-1]
+    solids = scene.assembly.solids
+    h = 1e-6
+    found = pairs(scene, 3)
+    assert len(found) > 10
+    for a, b, pair in found:
+        corner = solids[a].faces[pair.a].outline[:1]
+        normal = solids[a].faces[pair.a].normal
+        middle = middle_of(pair, at[a], corner, normal)
+        for i in range(6):
+            posed = [pose.exp(sign * h * np.eye(6)[i]) @ at[a] for sign in (1.0, -1.0)]
+            ends = [same(pair, solids[a], T, solids[b], at[b]).residual[1:] for T in posed]
+            assert_allclose((ends[0] - ends[1]) / (2 * h), pair.slope[1:, i], rtol=0, atol=1e-6)
+            gaps = [(T[:3, :3] @ normal) @ (middle - pose.apply(T, corner)[0]) for T in posed]
+            assert (gaps[0] - gaps[1]) / (2 * h) == pytest.approx(pair.slope[0, i], abs=1e-6)
+
+
+def middle_of(pair: Facing, T_a: np.ndarray, corner: np.ndarray, normal: np.ndarray) -> np.ndarray:
+    """The point at which the gap is taken, from the derivative -(n, m x n) and the gap itself."""
+    n = T_a[:3, :3] @ normal
+    return np.cross(n, -pair.slope[0, 3:]) + (n @ pose.apply(T_a, corner)[0] + pair.gap_m) * n
+
+
+def same(pair: Facing, a: Solid, T_a: np.ndarray, b: Solid, T_b: np.ndarray) -> Facing:
+    return next(p for p in facing(a, T_a, b, T_b, **WIDE) if (p.a, p.b) == (pair.a, pair.b))
+
+
+@pytest.mark.numeric
+@pytest.mark.parametrize("name", NAMES)
+def test_what_errors_of_goals_do_to_parts_is_right(name: str) -> None:
+    scene = scenes.ALL[name]()
+    belief = initial_belief(seen_at(scene, 4, 1.0))
+    rng = np.random.default_rng(0)
+    h = 1e-6
+    for k in range(len(scene.assembly)):
+        now = belief.standing(k)
+        for part, T in placements(scene.assembly, scene.start, belief.goals)[k].items():
+            assert_allclose(now.poses[part], T, rtol=0, atol=1e-12)
+        xi = rng.standard_normal(6 * len(belief.goals))
+        ends = [
+            Belief(belief.assembly, belief.start, belief.goals @ pose.exp(s * h * xi.reshape(-1, 6)), belief.covariance)
+            for s in (1.0, -1.0)
+        ]
+        after = [end.standing(k).poses for end in ends]
+        for part, reach in now.reach.items():
+            moved = pose.log(after[0][part] @ pose.inverse(after[1][part])) / (2 * h)
+            assert_allclose(reach @ xi, moved, rtol=0, atol=1e-6)
+
+
+@pytest.mark.numeric
+@settings(deadline=None, max_examples=50)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_learning_of_contacts_is_conditioning_a_gaussian(seed: int) -> None:
+    """Two measurements one after the other leave the same covariance as both at once, and less than before."""
+    rng = np.random.default_rng(seed)
+    belief = initial_belief(seen_at(scenes.bridge(), 0, 1.0))
+    n = len(belief.covariance)
+    rows = [rng.standard_normal((3, n)) * np.tile(np.repeat([1.0, 0.05], 3), n // 6) for _ in range(2)]
+    noise = np.diag([1e-4, 2e-3, 2e-3]) ** 2
+    after = belief
+    for J in rows:
+        after = after.conditioned(np.zeros(3), J, noise)
+    J = np.concatenate(rows)
+    R = np.kron(np.eye(2), noise)
+    P = belief.covariance
+    expected = P - P @ J.T @ np.linalg.solve(J @ P @ J.T + R, J @ P)
+    scale = np.sqrt(np.outer(np.diag(P), np.diag(P)))
+    assert_allclose(after.covariance / scale, expected / scale, rtol=0, atol=1e-9)
+    assert np.all(np.diag(after.covariance) <= np.diag(P) * (1 + 1e-9))
+    assert_allclose(after.goals, belief.goals, rtol=0, atol=0)
+
+
+@settings(deadline=None, max_examples=50)
+@given(gap_mm=st.floats(0.0, 20.0), tilt_deg=st.floats(0.0, 20.0), play_mm=st.floats(0.0, 1.0))
+def test_thresholds_grow_with_noise_and_play_and_stay_within_the_bounds(
+    gap_mm: float, tilt_deg: float, play_mm: float
+) -> None:
+    pair = pairs(scenes.bridge(), 0)[0][2]
+    C = np.diag([gap_mm * 1e-3, np.radians(tilt_deg), np.radians(tilt_deg)]) ** 2
+    found = pair_thresholds(RULES_BY_NOISE, C, slack(pair, play_mm * 1e-3))
+    more = pair_thresholds(RULES_BY_NOISE, 1.5 * C, slack(pair, 1.5e-3 * play_mm))
+    assert 0.0 < found.gap_m <= more.gap_m <= RULES_BY_NOISE.gap_m
+    assert 0.0 < found.angle_rad <= more.angle_rad <= RULES_BY_NOISE.angle_rad
+    assert np.all(np.linalg.eigvalsh(reality(pair, play_mm * 1e-3)) > 0)
+
+
+def test_the_noise_hides_a_contact_as_rarely_as_it_is_said() -> None:
+    """Of 20000 gaps and tilts drawn from a covariance, as many are beyond the thresholds as `miss` says."""
+    pair = pairs(scenes.bridge(), 0)[0][2]
+    sigma = np.array([2e-3, np.radians(1.0), np.radians(1.0)])
+    rules = Rules(miss=0.01, gap_m=0.1, angle_rad=1.0)
+    most = pair_thresholds(rules, np.diag(sigma**2), slack(pair, 0.0))
+    draws = np.random.default_rng(0).standard_normal((20000, 3)) * sigma
+    assert np.mean(np.abs(draws[:, 0]) > most.gap_m) == pytest.approx(0.01, abs=0.003)
+    assert np.mean(np.hypot(draws[:, 1], draws[:, 2]) > most.angle_rad) == pytest.approx(0.01, abs=0.003)
+    assert np.mean(((draws / sigma) ** 2).sum(axis=1) > rules.most_of(3)) == pytest.approx(0.01, abs=0.003)

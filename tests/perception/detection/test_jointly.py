@@ -1,0 +1,183 @@
+"""Contacts and poses decided together: how sets are scored, what physics forbids, and what the whole finds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.stats import multivariate_normal
+
+from apo_bench import Assembly, ContactCorrector, InputError, Observation
+from apo_bench.assembly import Contact, Operation, PartFace
+from apo_bench.assembly.equations import equations
+from apo_bench.geometry import Hull, pose, ways_out
+from apo_bench.geometry.penetration import intrusion
+from apo_bench.perception.detection.estimate import estimate
+from apo_bench.perception.detection.jointly import recognise_jointly
+from tests import rounds, scenes
+from tests.perception.detection.test_contacts import NAMES, contacts, seen_at, stated, without_contacts
+
+
+def on(text: str) -> Contact:
+    """`A.nz on table.top`."""
+    m, e = (PartFace(*face.split(".")) for face in text.split(" on "))
+    return Contact(m, e)
+
+
+def with_contacts(seen: Observation, *each: str) -> Assembly:
+    """The assembly of an observation whose last operation makes these contacts."""
+    operations = list(seen.assembly.operations)
+    operations[-1] = replace(operations[-1], contacts=tuple(map(on, each)))
+    return replace(seen.assembly, operations=tuple(operations))
+
+
+def block_at(x: float, y: float, z: float, level: float = 1.0) -> Observation:
+    """One block seen here, in mm."""
+    scene = scenes.scene([scenes.table(), scenes.block("A")], [Operation("A")], [scenes.mm(x, y, z)])
+    return stated(scenes.seen(scene, scene.goals), level)
+
+
+def beside(apart_mm: float, level: float) -> Observation:
+    """Two blocks on the table, one this far beside the other."""
+    solids = [scenes.table(), scenes.block("A"), scenes.block("B")]
+    goals = [scenes.mm(0, 0, 25), scenes.mm(50 + apart_mm, 0, 25)]
+    scene = scenes.scene(solids, [Operation("A"), Operation("B")], goals)
+    return stated(scenes.seen(scene, goals), level)
+
+
+def names(assembly: Assembly) -> set[str]:
+    return {str(relation.contact) for relation in assembly.relations()}
+
+
+def test_without_contacts_nothing_is_gained_and_nothing_moved() -> None:
+    seen = block_at(3, 4, 27)
+    estimated = estimate(seen, seen.assembly, seen.goals)
+    assert estimated.badness == 0.0
+    assert_allclose(estimated.goals, seen.goals, atol=1e-12)
+    assert_allclose(estimated.covariance, np.diag(np.diag(seen.covariance[0])), atol=1e-12)
+
+
+def test_an_estimate_lies_where_contact_puts_it() -> None:
+    """`contact` solves exactly; here contacts give a little, 0.1 mm."""
+    for name in NAMES:
+        scene = scenes.ALL[name]()
+        seen = seen_at(scene, 1, 1.0)
+        estimated = estimate(seen, scene.assembly, seen.goals)
+        corrected = ContactCorrector(compiled=False)(seen)
+        assert np.abs(equations(scene.assembly, seen.start, estimated.goals).residual(estimated.goals)).max() < 5e-4
+        assert_allclose(estimated.goals, corrected.goals, atol=2e-2)
+
+
+def test_the_score_is_the_likelihood_of_the_gap_beside_a_wide_prior() -> None:
+    """A block 2 mm above the table: only the vertical and two tilts are asked for."""
+    level = 1.0
+    seen = block_at(0, 0, 27)
+    estimated = estimate(seen, with_contacts(seen, "A.nz on table.top"), seen.goals)
+    s = np.array([level * 1e-3, np.radians(level), np.radians(level)])
+    room = np.hypot(s, [40e-3, np.radians(23.0), np.radians(23.0)])
+    by_hand = 2.0 * (
+        multivariate_normal(cov=np.diag(s**2)).logpdf([2e-3, 0, 0])
+        - multivariate_normal(cov=np.diag(room**2)).logpdf([0, 0, 0])
+    )
+    assert estimated.badness == pytest.approx(-by_hand, rel=0.01)
+
+
+def test_a_contact_that_others_imply_gains_nothing() -> None:
+    """Here because it is one of the others."""
+    for name in NAMES:
+        scene = scenes.ALL[name]()
+        seen = seen_at(scene, 2, 1.0)
+        every = estimate(seen, scene.assembly, seen.goals)
+        last = scene.assembly.operations[-1]
+        doubled = replace(last, contacts=(*last.contacts, last.contacts[0]))
+        twice = replace(scene.assembly, operations=(*scene.assembly.operations[:-1], doubled))
+        assert estimate(seen, twice, seen.goals).badness == pytest.approx(every.badness, abs=0.05)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("level", [0.5, 2.0])
+def test_every_contact_is_recognised_and_no_other(name: str, level: float) -> None:
+    scene = scenes.ALL[name]()
+    recognised = recognise_jointly(seen_at(scene, 0, level))
+    assert contacts(recognised.assembly) == contacts(scene.assembly)
+    assert tuple(e.contact for e in recognised.evidence) == tuple(r.contact for r in recognised.assembly.relations())
+    assert recognised.probability is not None
+    assert recognised.probability > 0.5
+
+
+def test_contacts_that_come_with_the_observation_are_not_looked_at() -> None:
+    scene = scenes.ALL[NAMES[0]]()
+    seen = seen_at(scene, 0, 1.0)
+    blind = replace(seen, assembly=without_contacts(seen.assembly))
+    assert contacts(recognise_jointly(seen).assembly) == contacts(recognise_jointly(blind).assembly)
+
+
+def test_near_faces_touch_if_the_noise_explains_the_gap() -> None:
+    assert names(recognise_jointly(beside(1.0, 1.0)).assembly) >= {"B.nx on A.px"}
+    assert "B.nx on A.px" not in names(recognise_jointly(beside(8.0, 1.0)).assembly)
+    assert "B.nx on A.px" not in names(recognise_jointly(beside(1.0, 0.1)).assembly)
+
+
+def test_probabilities_say_what_is_not_certain() -> None:
+    sure = recognise_jointly(beside(30.0, 1.0))
+    unsure = recognise_jointly(beside(4.0, 1.5))
+    assert sure.probability is not None
+    assert sure.probability > 0.99
+    assert unsure.probability is not None
+    assert unsure.rival is not None
+    assert unsure.probability < 0.97
+    assert names(unsure.rival.assembly) ^ names(unsure.assembly) == {"B.nx on A.px"}
+    assert unsure.probability + unsure.rival.probability <= 1.0 + 1e-12
+
+
+def test_what_is_let_go_of_lies_on_something_however_far_it_was_seen_above() -> None:
+    """3.7 deviations above the table is little beside hanging in the air."""
+    assert names(recognise_jointly(block_at(0, 0, 25 + 15, level=4.0)).assembly) == {"A.nz on table.top"}
+
+
+def test_parts_that_are_seen_inside_each_other_touch() -> None:
+    """5.3 mm apart may be a gap, 5.3 mm inside each other cannot be: touching is likelier there."""
+    apart = recognise_jointly(beside(5.3, 1.0))
+    within = recognise_jointly(beside(-5.3, 1.0))
+    assert "B.nx on A.px" not in names(apart.assembly)
+    assert "B.nx on A.px" in names(within.assembly)
+
+
+def test_operations_that_were_not_seen_make_no_contact() -> None:
+    seen = beside(0.5, 1.0)
+    blind = replace(seen, seen=np.array([True, False]))
+    assert names(recognise_jointly(blind).assembly) == {"A.nz on table.top"}
+
+
+@pytest.mark.parametrize("hulls", [False, True])
+def test_ways_out_are_as_deep_as_the_intrusion_and_lead_out(hulls: bool) -> None:
+    a = scenes.block("A")
+    b = scenes.block("B")
+    if hulls:
+        a = replace(a, pieces=tuple(Hull(piece.name, piece.corners) for piece in a.pieces))
+    T_a = scenes.mm(45, 3, 26)
+    T_b = scenes.mm(0, 0, 25) @ pose.exp(np.array([0, 0, 0, 0.1, 0.2, 0.3]))
+    (way,) = ways_out(a, T_a, b, T_b, 1e-4)
+    best = int(way.lengths.argmin())
+    assert way.lengths[best] == pytest.approx(intrusion(a, T_a, b, T_b))
+    for direction, length in zip(way.directions, way.lengths, strict=True):
+        out = np.array(T_a)
+        out[:3, 3] += (length + 1e-5) * direction
+        assert intrusion(a, out, b, T_b) == 0.0
+
+
+def test_round_faces_are_recognised_with_flat_ones() -> None:
+    """A peg in the bore of a plate, both on the table."""
+    scene = rounds.peg_in_plate()
+    goals = scenes.noisy(scene.goals, np.random.default_rng(1), 0.5, 0.5)
+    recognised = recognise_jointly(stated(scenes.seen(scene, goals), 0.5))
+    assert contacts(recognised.assembly) == contacts(scene.assembly)
+
+
+@pytest.mark.parametrize("given", [None, {"rules": 3}])
+def test_anything_else_is_refused(given: Any) -> None:
+    with pytest.raises(InputError, match=r"(observation|rules) of recognise_jointly must be"):
+        recognise_jointly(*([None] if given is None else [beside(1.0, 1.0)]), **(given or {}))

@@ -1,0 +1,125 @@
+"""How cameras fail: each kind does what it says, as often as it says, and looks repeat as often as they should."""
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from apo_bench import Demonstration, InputError, draw_layout, load_scenario
+from apo_bench.geometry import approximate_symmetries, pose
+from apo_bench.perception.observation.looking import Looks
+from apo_bench.perception.observation.models.failures import PRESETS, CameraFailures, make_failures
+from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.observing import observe
+
+LEVEL = Level(1.0, 1.0)
+
+
+@cache
+def demonstration():
+    scenario = load_scenario("vanished_fixture")
+    layout = draw_layout(scenario, np.random.default_rng(0), 0.0)
+    return Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((5, 6, 6)))
+
+
+def failures(kind, seed, **settings):
+    shown = demonstration()
+    return make_failures(kind, LEVEL, **settings).draw_false(shown, np.random.default_rng(seed))
+
+
+@pytest.mark.parametrize(("kind", "low", "high"), [("flips", 0.25, 0.35), ("stale", 0.25, 0.35), ("rays", 0.25, 0.35)])
+def test_failures_are_as_often_as_stated(kind, low, high):
+    """0.3 of 1500 draws: 0.05 is four standard deviations."""
+    assert low < np.mean([failures(kind, seed).false for seed in range(300)]) < high
+    assert not any(failures(kind, seed, rate=0.0).false.any() for seed in range(20))
+
+
+def test_a_flip_is_by_an_approximate_symmetry():
+    shown = demonstration()
+    flipped = failures("flips", 1, rate=1.0)
+    assert flipped.false.all()
+    for operation, T, seen in zip(shown.assembly.operations, shown.goals, flipped.goals, strict=True):
+        turns = approximate_symmetries(shown.assembly.solids[operation.main]).turns
+        assert (np.abs(turns - pose.inverse(T) @ seen).max(axis=(1, 2)) < 1e-9).any()
+
+
+def test_a_stale_pose_is_where_the_part_was_before():
+    shown = demonstration()
+    stale = failures("stale", 1, rate=1.0)
+    mains = [operation.main for operation in shown.assembly.operations]
+    assert mains[1] == mains[3]
+    assert_array_equal(stale.goals[3], shown.goals[1])
+    assert_array_equal(stale.goals[1], shown.start[mains[1]])
+
+
+def test_swaps_exchange_two_views_of_like_parts():
+    shown = demonstration()
+    swapped = next(f for f in (failures("swaps", seed) for seed in range(99)) if f.false[0])
+    assert shown.assembly.operations[2].main == "castle2"
+    assert_array_equal(swapped.goals[0], shown.goals[2])
+    assert_array_equal(swapped.goals[2], shown.goals[0])
+
+
+def test_an_error_along_the_ray_is_on_it():
+    shown = demonstration()
+    model = make_failures("rays", LEVEL, rate=1.0)
+    off = failures("rays", 3, rate=1.0).goals[:, :3, 3] - shown.goals[:, :3, 3]
+    length = np.linalg.norm(off, axis=1)
+    assert ((length >= 0.02) & (length <= 0.06)).all()
+    assert_allclose(np.cross(off, model.camera.rays(shown.goals)), 0.0, atol=1e-12)
+
+
+def test_a_displaced_view_has_one_displacement():
+    shown = demonstration()
+    seen = failures("displaced-view", 5)
+    moved = (seen.goals @ pose.inverse(shown.goals))[seen.false]
+    assert len(moved) == 2
+    assert_allclose(moved[0], moved[1], atol=1e-12)
+
+
+def test_a_mixture_fails_in_several_ways():
+    shown = demonstration()
+    flips, rays = (PRESETS[name]._replace(rate=0.2) for name in ("flips", "rays"))
+    mixed = CameraFailures(LEVEL, (flips, rays))
+    seen = [mixed.draw_false(shown, np.random.default_rng(seed)) for seed in range(300)]
+    turned = [np.abs(views.goals - shown.goals)[:, :3, :3].max(axis=(1, 2)) > 1e-9 for views in seen]
+    shifted = [np.abs(views.goals - shown.goals)[:, :3, 3].max(axis=1) > 1e-9 for views in seen]
+    assert 0.15 < np.mean(turned) < 0.25
+    assert np.mean(shifted) > 0.15
+    assert observe(shown, mixed, np.random.default_rng(0)).outliers.gross == pytest.approx(0.4)
+
+
+@pytest.mark.parametrize("repeat", [0.0, 0.8])
+def test_a_later_look_repeats_what_was_false_as_often_as_stated(repeat):
+    """Of some 450 failures; 0.1 is more than four standard deviations of either share."""
+    shown = demonstration()
+    repeated = []
+    for seed in range(300):
+        model = make_failures("rays", LEVEL, repeat=repeat)
+        first = model.draw_false(shown, np.random.default_rng(seed))
+        look = Looks(shown, model, np.random.default_rng([seed, 1]), 1, first=np.random.default_rng(seed))
+        seen = look(range(5))
+        near = np.linalg.norm(seen.goals[:, :3, 3] - first.goals[:, :3, 3], axis=1) < 6e-3
+        repeated += near[first.false].tolist()
+    assert abs(np.mean(repeated) - repeat) < 0.1
+
+
+def test_rates_may_follow_the_name():
+    noise = make_noise("flips:p=0.1/r=0.5", LEVEL)
+    assert (noise.failures, noise.repeat) == ((PRESETS["flips"]._replace(rate=0.1),), 0.5)
+    assert make_noise("stale:r=0.5", LEVEL).failures == make_noise("stale", LEVEL).failures
+    stated = observe(demonstration(), "flips:p=0.1/r=0.5", np.random.default_rng(1)).outliers
+    assert (stated.gross, stated.repeat) == pytest.approx((0.1, 0.5))
+
+
+@pytest.mark.parametrize("given", ["flips:0.1", "flips:q=0.1", "flips:p=0.1/p=0.2"])
+def test_rates_that_are_none_are_refused(given):
+    with pytest.raises(InputError, match=rf"'{given}' was given; state how often the camera fails, 'flips:p=0\.1'"):
+        make_noise(given, LEVEL)
+
+
+@pytest.mark.parametrize("given", ["flips:p=nan", "flips:r=-0.1"])
+def test_rates_that_make_no_sense_are_refused(given):
+    with pytest.raises(InputError, match="give a number from 0 to 1"):
+        make_noise(given, LEVEL)

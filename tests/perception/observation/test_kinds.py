@@ -1,0 +1,310 @@
+"""What each noise model is about, beyond the laws that all obey."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from apo_bench import Demonstration, InputError, Observation, draw_layout, load_scenario, observe
+from apo_bench.geometry import Array, pose, symmetries
+from apo_bench.perception.observation.models import shared
+from apo_bench.perception.observation.models.camera import CAMERA_DISTANCE_M, WORKSPACE_MIDDLE_M, Camera
+from apo_bench.perception.observation.models.isotropic import FREEDOM, HeavyTailed, Isotropic
+from apo_bench.perception.observation.models.outliers import (
+    MISSES,
+    OUTLIER_TIMES,
+    OUTLIERS,
+    UNSEEN_DEVIATION,
+    Outliers,
+    last_seen,
+)
+from apo_bench.perception.observation.models.shared import CORRELATION, Bias, BiasView, Correlated
+from apo_bench.perception.observation.models.sighted import Sighted, line_of_sight
+from apo_bench.perception.observation.models.symmetric import WORSE, AnyTurn, Symmetric
+from apo_bench.perception.observation.noise import Level, Noise, make_noise
+from tests import scenes
+
+LEVEL = Level(2.0, 2.0)
+CYCLE = scenes.turned(scenes.subassembly_on_castles(), pose.at((0.1, -0.02, 0.0), (0.0, 0.0, 23.0)))
+CUBE_TWICE = [2, 4]
+"""The operations that move the cube."""
+
+
+def see(noise: Noise, seed: int, scene: scenes.Scene = CYCLE) -> Observation:
+    return observe(scenes.shown(scene), noise, np.random.default_rng(seed))
+
+
+def twists(seen: Observation, scene: scenes.Scene = CYCLE) -> Array:
+    return pose.log(pose.inverse(scene.goals) @ seen.goals)
+
+
+def test_the_default_camera_looks_at_the_middle_as_anisotropic_does() -> None:
+    T = Camera().T_world_camera
+    assert_allclose(T[:3, :3] @ T[:3, :3].T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(T[:3, :3]) == pytest.approx(1.0)
+    assert_allclose(T[:3, 3] + CAMERA_DISTANCE_M * T[:3, 2], WORKSPACE_MIDDLE_M, atol=1e-15)
+    assert_allclose(T[:3, 2], line_of_sight(), atol=1e-15)
+    assert T[2, 0] == 0.0
+    assert T[2, 1] < 0.0  # y points down
+
+
+def test_frames_are_turned_the_shortest_way_onto_the_rays() -> None:
+    camera = Camera()
+    rng = np.random.default_rng(0)
+    goals = np.tile(np.eye(4), (200, 1, 1))
+    goals[:, :3, 3] = camera.T_world_camera[:3, 3] + rng.standard_normal((200, 3))
+    F = camera.frames(goals)
+    R = camera.T_world_camera[:3, :3]
+    assert_allclose(F @ np.swapaxes(F, 1, 2), np.tile(np.eye(3), (200, 1, 1)), atol=1e-12)
+    assert_allclose(F[:, :, 2], camera.rays(goals), atol=1e-12)
+    turned = np.arccos(np.clip((np.trace(R.T @ F, axis1=1, axis2=2) - 1) / 2, -1, 1))
+    assert_allclose(turned, np.arccos(np.clip(F[:, :, 2] @ R[:, 2], -1, 1)), atol=1e-6)
+
+
+@pytest.mark.parametrize("along", [0.0, 1.0, -1.0])
+def test_on_the_optical_axis_and_behind_the_camera_frames_are_still_rotations(along: float) -> None:
+    T = Camera().T_world_camera.copy()
+    T[:3, 3] += along * T[:3, 2]
+    F = Camera().frames(T[None])[0]
+    assert_allclose(F @ F.T, np.eye(3), atol=1e-12)
+    assert np.linalg.det(F) == pytest.approx(1.0)
+    assert_allclose(F[:, 2], (1.0 if along >= 0.0 else -1.0) * T[:3, 2], atol=1e-12)
+
+
+def test_a_camera_errs_along_its_rays_by_what_it_was_asked_to() -> None:
+    """Positions that were seen, in the frames of the true rays: what the twist does to them is not used."""
+    camera = Camera(pose.at((0.5, -0.4, 0.6), (-140.0, 10.0, 50.0)))
+    noise = Sighted(Level(1.0, 1.0), camera=camera, across=0.4, along=5.0, tilt=0.2, about=3.0)
+    offsets = []
+    turns = []
+    for seed in range(600):
+        goals = see(noise, seed).goals
+        F = camera.frames(CYCLE.goals)
+        offsets.append(np.einsum("nji,nj->ni", F, goals[:, :3, 3] - CYCLE.goals[:, :3, 3]))
+        w = pose.log(goals @ pose.inverse(CYCLE.goals))[:, 3:]
+        turns.append(np.einsum("nji,nj->ni", F, w))
+    rms = [np.sqrt(np.mean(np.concatenate(some) ** 2, axis=0)) for some in (offsets, turns)]
+    assert_allclose(rms[0] * 1e3, [0.4, 0.4, 5.0], rtol=0.05)
+    assert_allclose(np.degrees(rms[1]), [0.2, 0.2, 3.0], rtol=0.05)
+
+
+def test_what_a_camera_states_follows_from_what_it_saw() -> None:
+    """From seen poses alone, so a corrector cannot read the true ray off the covariance."""
+    noise = Sighted(LEVEL)
+    seen = see(noise, 1)
+    sigma = np.array([2e-3 * noise.across] * 2 + [2e-3 * noise.along])
+    turn = np.radians(2.0) * np.array([noise.tilt, noise.tilt, noise.about])
+    Q = np.swapaxes(seen.goals[:, :3, :3], 1, 2) @ noise.camera.frames(seen.goals)
+    assert_allclose(seen.covariance[:, :3, :3], Q @ np.diag(sigma**2) @ np.swapaxes(Q, 1, 2), rtol=1e-9, atol=1e-18)
+    assert_allclose(seen.covariance[:, 3:, 3:], Q @ np.diag(turn**2) @ np.swapaxes(Q, 1, 2), rtol=1e-9, atol=1e-18)
+
+
+def test_heavy_tails_are_those_of_student() -> None:
+    """The squared length over 6, scaled back, follows Fisher's F with 6 and nu degrees of freedom."""
+    from scipy.stats import f, kstest
+
+    sigma = np.repeat([2e-3, np.radians(2.0)], 3)
+    xi = np.concatenate([twists(see(HeavyTailed(LEVEL), seed)) for seed in range(300)])
+    squared = np.sum((xi / sigma) ** 2, axis=1) / 6 * FREEDOM / (FREEDOM - 2)
+    assert kstest(squared, f(6, FREEDOM).cdf).pvalue > 1e-3
+    gaussian = np.concatenate([twists(see(HeavyTailed(LEVEL, freedom=1e6), seed)) for seed in range(300)])
+    assert kstest(np.sum((gaussian / sigma) ** 2, axis=1) / 6, f(6, FREEDOM).cdf).pvalue < 1e-6
+
+
+@cache
+def outlying(trials: int = 1200) -> tuple[Array, Array, Array]:
+    """Errors in units of the level, whether they are outliers by construction, and whether they were seen."""
+    sigma = np.repeat([2e-3, np.radians(2.0)], 3)
+    unit = []
+    gross = []
+    seen = []
+    for seed in range(trials):
+        made = see(Outliers(LEVEL), seed)
+        rng = np.random.default_rng(seed)
+        rng.standard_normal((5, 6))
+        gross.append(rng.random((5, 2))[:, 0] < OUTLIERS)
+        unit.append(twists(made) / sigma)
+        seen.append(made.seen)
+    return np.concatenate(unit), np.concatenate(gross), np.concatenate(seen)
+
+
+def test_outliers_and_misses_are_as_frequent_and_as_large_as_declared() -> None:
+    unit, gross, seen = outlying()
+    n = len(unit)
+    for share, found in ((OUTLIERS, gross.mean()), (MISSES, 1 - seen.mean())):
+        assert abs(found - share) < 5 * np.sqrt(share * (1 - share) / n)
+    for chosen, times in ((seen & ~gross, 1.0), (seen & gross, OUTLIER_TIMES)):
+        rms = np.sqrt(np.mean(unit[chosen] ** 2))
+        assert abs(rms / times - 1) < 5 / np.sqrt(12 * chosen.sum())
+
+
+def test_how_often_there_are_outliers_is_stated() -> None:
+    stated = see(Outliers(Level(1.0, 1.0), outliers=0.2, times=8.0), 0).outliers
+    assert stated is not None
+    assert (stated.broad, stated.times) == (0.2, 8.0)
+    assert stated.gross == 1e-3  # the least rate that is ever stated
+    assert see(Outliers(Level(1.0, 1.0), times=1.0), 0).outliers is None
+    assert see(Isotropic(LEVEL), 0).outliers is None
+
+
+def test_inliers_have_the_stated_covariance_and_all_errors_the_declared_one() -> None:
+    unit, gross, seen = outlying()
+    stated = see(Outliers(LEVEL, misses=0.0), 0).covariance
+    assert_allclose(stated, np.tile(np.diag(np.repeat([2e-3, np.radians(2.0)], 3) ** 2), (5, 1, 1)), rtol=1e-12)
+    inliers = unit[seen & ~gross]
+    assert_allclose(inliers.T @ inliers / len(inliers), np.eye(6), atol=5 * np.sqrt(2 / len(inliers)))
+    assert np.mean(unit[seen] ** 2) / Outliers(LEVEL).inflation == pytest.approx(1.0, abs=0.12)
+    assert Outliers(LEVEL).inflation == pytest.approx(10.9)
+
+
+def test_a_missed_operation_tells_nothing_of_where_its_part_went() -> None:
+    """Move what is missed elsewhere: the observation stays the same, to the bit."""
+    seed = next(s for s in range(200) if not see(Outliers(LEVEL), s).seen.all())
+    here = see(Outliers(LEVEL), seed)
+    k = int(np.argmin(here.seen))
+    goals = CYCLE.goals.copy()
+    goals[k] = goals[k] @ pose.at((0.1, 0.2, 0.3), (10.0, 20.0, 30.0))
+    there = see(Outliers(LEVEL), seed, scenes.Scene(CYCLE.assembly, CYCLE.start, goals))
+    assert here.goals.tobytes() == there.goals.tobytes()
+    assert_array_equal(here.covariance, there.covariance)
+    assert_allclose(here.covariance[k], np.diag(UNSEEN_DEVIATION**2))
+
+
+def test_what_was_missed_stays_where_its_part_was_seen_last() -> None:
+    operations = CYCLE.assembly.operations
+    start = CYCLE.start
+    seen = np.array([False, True, True, True, False])
+    out = last_seen(CYCLE.assembly, start, CYCLE.goals, seen)
+    assert [o.main for o in operations][4] == operations[2].main == "cube"
+    assert_array_equal(out[0], start["castle1"])
+    assert_array_equal(out[4], CYCLE.goals[2])
+    assert_array_equal(out[1:4], CYCLE.goals[1:4])
+
+
+def test_the_same_operations_are_missed_at_every_level_but_zero() -> None:
+    for seed in range(60):
+        masks = [see(Outliers(Level(mm, mm)), seed).seen for mm in (0.1, 1.0, 4.0)]
+        assert_array_equal(masks[0], masks[1])
+        assert_array_equal(masks[0], masks[2])
+        assert see(Outliers(Level(0.0, 0.0), misses=1.0), seed).seen.all()
+
+
+def test_a_part_has_one_bias_in_all_its_operations(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shared, "OWN", 0.0)
+    for seed in range(20):
+        xi = twists(see(Bias(LEVEL), seed))
+        assert_allclose(xi[CUBE_TWICE[0]], xi[CUBE_TWICE[1]], atol=1e-12)
+        assert np.abs(xi[0] - xi[1]).max() > 1e-5
+
+
+def test_a_bias_of_the_view_leaves_parts_to_each_other_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every displacement in the world, T_seen T^-1, is the same; about the middle it is as large as the level."""
+    monkeypatch.setattr(shared, "OWN", 0.0)
+    size = []
+    for seed in range(400):
+        seen = see(BiasView(LEVEL), seed)
+        E = seen.goals @ pose.inverse(CYCLE.goals)
+        middle = pose.at(CYCLE.goals[:, :3, 3].mean(axis=0))
+        assert_allclose(E, np.tile(E[0], (5, 1, 1)), atol=1e-12)
+        size.append(pose.log(pose.inverse(middle) @ E[0] @ middle))
+    rms = np.sqrt(np.mean(np.array(size) ** 2, axis=0))
+    assert_allclose(rms, np.repeat([2e-3, np.radians(2.0)], 3), rtol=0.18)
+
+
+def test_errors_drift_from_operation_to_operation() -> None:
+    """In the axes of the camera errors j operations apart are correlated by rho to the j."""
+    A = Camera().T_world_camera[:3, :3]
+    world = []
+    for seed in range(800):
+        seen = see(Correlated(LEVEL), seed)
+        xi = twists(seen)
+        R = seen.goals[:, :3, :3]
+        world.append(np.concatenate([np.einsum("nij,nj->ni", R, half) @ A for half in (xi[:, :3], xi[:, 3:])], axis=1))
+    z = np.array(world) / np.repeat([2e-3, np.radians(2.0)], 3)
+    for j in range(1, 5):
+        correlation = np.mean(z[:, j:] * z[:, :-j], axis=(0, 1))
+        assert_allclose(correlation, CORRELATION**j, atol=5 * np.sqrt(2 / 800))
+    cross = np.mean(z[:, :, 0] * z[:, :, 1])
+    assert abs(cross) < 5 / np.sqrt(800)
+
+
+def test_only_turns_about_axes_of_fourfold_symmetry_are_less_certain() -> None:
+    """Errors about the centre of volume: castles like isotropic ones, cube and stick worse about x alone."""
+    centred = []
+    for seed in range(800):
+        xi = twists(see(Symmetric(LEVEL), seed))
+        solids = [CYCLE.assembly.solids[o.main] for o in CYCLE.assembly.operations]
+        to = np.array([pose.adjoint(pose.inverse(pose.at(solid.centroid))) for solid in solids])
+        centred.append((to @ xi[..., None])[..., 0])
+    rms = np.sqrt(np.mean(np.array(centred) ** 2, axis=0)) / np.repeat([2e-3, np.radians(2.0)], 3)
+    expected = np.ones((5, 6))
+    expected[2:, 3] = WORSE
+    assert_allclose(rms, expected, rtol=0.13)
+
+
+def test_of_equal_poses_the_nearest_is_reported_and_what_is_stated_bounds_its_error() -> None:
+    """At 40 degrees, 120 about the axis of a stick: no symmetry brings what was seen nearer to the truth."""
+    turns = []
+    stated = []
+    for seed in range(300):
+        seen = see(Symmetric(Level(1.0, 40.0)), seed)
+        off = pose.inverse(CYCLE.goals) @ seen.goals
+        for k, operation in enumerate(CYCLE.assembly.operations):
+            equal = off[k] @ symmetries(CYCLE.assembly.solids[operation.main])
+            angles = np.linalg.norm(pose.log(equal)[:, 3:], axis=1)
+            assert angles[0] <= angles.min() + 1e-6
+        turns.append(pose.log(off)[3, 3:])
+        stated.append(np.diagonal(seen.covariance[3])[3:])
+    assert (np.mean(np.array(turns) ** 2, axis=0) <= np.array(stated[0]) * 1.15).all()
+    assert np.sqrt(stated[0][0]) == pytest.approx(np.radians(45.0 / np.sqrt(3.0)))
+
+
+def test_of_a_part_of_revolution_the_turn_about_its_axis_is_as_wrong_as_stated() -> None:
+    """A part that looks the same after any turn; else its region covers more than it says."""
+    scenario = load_scenario("nested_bushings")
+    layout = draw_layout(scenario, np.random.default_rng(3), 0.0)
+    n = len(layout.goals)
+    shown = Demonstration(scenario.assembly, layout.start, layout.goals, layout.start, np.zeros((n, 6, 6)))
+    lengths = []
+    for seed in range(300):
+        seen = Symmetric(LEVEL)(scenario.assembly, shown, np.random.default_rng(seed))
+        xi = pose.log(pose.inverse(seen.goals) @ layout.goals)
+        lengths.append(np.einsum("ki,kij,kj->k", xi, np.linalg.inv(seen.covariance), xi))
+    assert_allclose(np.mean(lengths, axis=0), 6.0, rtol=0.15)
+
+
+def test_any_turn_fills_the_same_space_and_names_other_faces() -> None:
+    """It differs from `symmetric` by symmetries of the parts alone, and every one of them occurs."""
+    turns = set()
+    for seed in range(120):
+        near = see(Symmetric(LEVEL), seed)
+        far = see(AnyTurn(LEVEL), seed)
+        for k, operation in enumerate(CYCLE.assembly.operations):
+            group = symmetries(CYCLE.assembly.solids[operation.main])
+            off = np.abs(group - pose.inverse(near.goals[k]) @ far.goals[k]).max(axis=(1, 2))
+            assert off.min() < 1e-12
+            turns.add((operation.main, int(np.argmin(off))))
+            Ad = pose.adjoint(group[int(np.argmin(off))])
+            assert_allclose(Ad @ far.covariance[k] @ Ad.T, near.covariance[k], rtol=1e-9, atol=1e-15)
+    assert len(turns) == 2 + 2 + 8 + 8
+
+
+def test_a_camera_is_rigid() -> None:
+    with pytest.raises(InputError, match="the pose of a camera was given that is not rigid"):
+        Camera(np.diag([2.0, 1.0, 1.0, 1.0]))
+
+
+@pytest.mark.parametrize("name", ["isotropic", "correlated", "swaps"])
+def test_a_demonstration_without_operations_is_seen_as_one(name: str) -> None:
+    empty = scenes.scene([scenes.table()], [], np.zeros((0, 4, 4)))
+    demonstration = Demonstration(empty.assembly, empty.start, empty.goals, empty.start, np.zeros((0, 6, 6)))
+    assert observe(demonstration, make_noise(name, LEVEL), np.random.default_rng(0)).goals.shape == (0, 4, 4)
+
+
+def test_everything_missed_is_an_observation_too() -> None:
+    seen = see(Outliers(LEVEL, misses=1.0), 0)
+    assert not seen.seen.any()
+    assert np.isfinite(seen.goals).all()

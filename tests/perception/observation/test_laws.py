@@ -1,0 +1,271 @@
+"""Laws that every noise model with a name obeys, whoever adds it: what it states is true, and it reaches the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cache
+from types import SimpleNamespace
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from apo_bench import Demonstration, Layout, Observation, Scene, TrialSettings, draw_layout, load_scenario, observe
+from apo_bench.assembly import placements
+from apo_bench.envs.spaces import LARGEST_DEVIATION, ROOM_M, packed
+from apo_bench.geometry import Array, pose
+from apo_bench.perception.observation.models import sighted
+from apo_bench.perception.observation.models.camera import Camera
+from apo_bench.perception.observation.models.displaced import COVARIANCE_FLOOR
+from apo_bench.perception.observation.models.isotropic import Isotropic
+from apo_bench.perception.observation.noise import FAILURES, NOISES, Level, Noise, make_noise
+from apo_bench.trial import trial
+from apo_bench.trial.planning import apply_method
+from apo_bench.trial.stages import SimulatedDemonstration, observe_demonstration, stream
+from tests import scenes
+
+NAMES = sorted(NOISES)
+STEADY = sorted({*NOISES} - {*FAILURES})
+"""Those whose errors all have what is stated; failures have laws of their own, in test_failures.py."""
+LEVEL = Level(2.0, 2.0)
+CYCLE = scenes.turned(scenes.subassembly_on_castles(), pose.at((0.1, -0.02, 0.0), (20.0, 35.0, 23.0)))
+"""Five operations: castles with their origin off the centre, a cube that is moved twice, a stick."""
+TRIALS = 700
+BOUND = 5.0
+"""Observations behind a law, and how many standard errors off a mean may be."""
+
+
+class Draws(NamedTuple):
+    """Errors of the operations that were seen, in units of what was stated; (trials, n, 6)."""
+
+    unit: Array
+    seen: Array
+    """(trials, n)."""
+
+
+def drawn(noise: Noise, trials: int = TRIALS) -> Draws:
+    demonstration = scenes.shown(CYCLE)
+    observations = [observe(demonstration, noise, np.random.default_rng(seed)) for seed in range(trials)]
+    xi = pose.log(pose.inverse(CYCLE.goals) @ np.array([observation.goals for observation in observations]))
+    L = np.linalg.cholesky(np.array([observation.covariance for observation in observations]))
+    seen = np.array([observation.seen for observation in observations], dtype=np.float64)
+    return Draws(np.linalg.solve(L, xi[..., None])[..., 0] * seen[..., None], seen)
+
+
+def bias(draws: Draws) -> float:
+    """How many standard errors the mean of the worst component of the worst operation is away from zero.
+
+    Operations of one trial may be correlated, so each has its own mean over trials.
+    """
+    count = draws.seen.sum(axis=0)[:, None]
+    mean = draws.unit.sum(axis=0) / count
+    deviation = np.sqrt((draws.unit**2).sum(axis=0) / count)
+    return float((np.abs(mean) / (deviation / np.sqrt(count))).max())
+
+
+def mismatch(draws: Draws, inflation: float = 1.0) -> float:
+    """How many standard errors the worst entry of any operation's second moments is away from those declared.
+
+    The standard error is that of the products themselves, so heavy tails widen it.
+    """
+    worst = 0.0
+    for k in range(draws.unit.shape[1]):
+        z = draws.unit[draws.seen[:, k] > 0.0, k] / np.sqrt(inflation)
+        products = z[:, :, None] * z[:, None, :]
+        error = products.std(axis=0) / np.sqrt(len(z))
+        worst = max(worst, float((np.abs(products.mean(axis=0) - np.eye(6)) / error).max()))
+    return worst
+
+
+@pytest.mark.parametrize("name", STEADY)
+def test_errors_have_zero_mean_and_the_covariance_that_is_declared(name: str) -> None:
+    """Over seeds. `inflation` is what a model declares beyond what its observations state: gross outliers."""
+    noise = make_noise(name, LEVEL)
+    draws = drawn(noise)
+    assert bias(draws) < BOUND
+    assert mismatch(draws, getattr(noise, "inflation", 1.0)) < BOUND
+
+
+@dataclass(frozen=True)
+class Cheat:
+    """A model that states what it does not do."""
+
+    offset: float = 0.0
+    factor: float = 1.0
+    skew: float = 0.0
+
+    def __call__(self, assembly: Any, shown: Demonstration, rng: np.random.Generator) -> Observation:
+        seen = Isotropic(LEVEL)(assembly, shown, rng)
+        sigma = np.sqrt(np.diagonal(seen.covariance, axis1=1, axis2=2))
+        unit = pose.log(pose.inverse(shown.goals) @ seen.goals) / sigma
+        unit = self.factor * unit + self.offset * np.eye(6)[4] + self.skew * np.roll(unit, 1, axis=1)
+        return replace(seen, goals=shown.goals @ pose.exp(unit * sigma))
+
+
+@cache
+def honest() -> Draws:
+    return drawn(Cheat())
+
+
+@pytest.mark.parametrize(
+    ("cheat", "check"),
+    [
+        (Cheat(offset=0.35), bias),
+        (Cheat(factor=1.2), mismatch),
+        (Cheat(factor=0.85), mismatch),
+        (Cheat(skew=0.3), mismatch),
+    ],
+)
+def test_the_law_would_notice(cheat: Noise, check: Callable[[Draws], float]) -> None:
+    assert check(drawn(cheat)) > BOUND
+    assert check(honest()) < BOUND
+
+
+def in_another_world(scene: scenes.Scene, name: str, W: Array, monkeypatch: pytest.MonkeyPatch) -> Observation:
+    """What is seen where the scene and the camera are turned together, with the same chance."""
+    noise: Any = make_noise(name, LEVEL)
+    rng: Any = np.random.default_rng(3)
+    if hasattr(noise, "camera"):
+        noise = replace(noise, camera=Camera(W @ noise.camera.T_world_camera))
+    if name == "anisotropic":  # its camera is a direction of the world, and so are its draws
+        sight = W[:3, :3] @ sighted.line_of_sight()
+        monkeypatch.setattr(sighted, "line_of_sight", lambda: sight)
+        turn = np.kron(np.eye(2), W[:3, :3].T)
+
+        class Turned(np.random.Generator):
+            def standard_normal(self, size: Any) -> Array:  # type: ignore[override]
+                return super().standard_normal(size) @ turn
+
+        rng = Turned(np.random.PCG64(3))
+    return observe(scenes.shown(scenes.turned(scene, W)), noise, rng)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_choice_of_the_world_frame_does_not_count(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Scene and camera turned by W: the goals turn with them, and what is stated in the frames of parts stays."""
+    here = observe(scenes.shown(CYCLE), make_noise(name, LEVEL), np.random.default_rng(3))
+    for W in (pose.at((0.4, -0.3, 0.2), (30.0, -50.0, 80.0)), pose.at((-2.0, 1.0, 0.5), (170.0, 5.0, -95.0))):
+        with monkeypatch.context() as patch:
+            there = in_another_world(CYCLE, name, W, patch)
+        assert_allclose(there.goals, W @ here.goals, atol=1e-12)
+        assert_allclose(there.covariance, here.covariance, rtol=1e-9, atol=1e-15)
+        assert_array_equal(there.seen, here.seen)
+
+
+@pytest.mark.parametrize("name", STEADY)
+def test_levels_scale_the_same_errors_and_use_chance_alike(name: str) -> None:
+    """Twists scale with the level, up to the turn by which the frame that is seen differs; so do deviations."""
+    seen = []
+    after = set()
+    for factor in (1.0, 4.0):
+        rng = np.random.default_rng(2)
+        seen.append(observe(scenes.shown(CYCLE), make_noise(name, Level(0.5 * factor, 0.75 * factor)), rng))
+        after.add(rng.random())
+    weak, strong = (pose.log(pose.inverse(CYCLE.goals) @ observation.goals) for observation in seen)
+    assert_array_equal(seen[0].seen, seen[1].seen)
+    there = seen[0].seen
+    assert there.any()
+    assert_allclose(strong[there, 3:], 4.0 * weak[there, 3:], rtol=1e-6, atol=1e-9)
+    lengths = [np.linalg.norm(xi[there, :3], axis=1) for xi in (weak, strong)]
+    assert_allclose(lengths[1], 4.0 * lengths[0], rtol=1e-6)
+    weight = [np.trace(observation.covariance[there][:, :3, :3], axis1=1, axis2=2) for observation in seen]
+    assert_allclose(weight[1], 16.0 * weight[0], rtol=1e-2)
+    assert len(after) == 1
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_level_zero_shows_what_was_shown_bit_for_bit(name: str) -> None:
+    for seed in range(40):
+        seen = observe(scenes.shown(CYCLE), make_noise(name, Level(0.0, 0.0)), np.random.default_rng(seed))
+        assert seen.goals.tobytes() == CYCLE.goals.tobytes()
+        assert seen.seen.all()
+        assert_allclose(seen.covariance, np.tile(np.diag(COVARIANCE_FLOOR**2), (5, 1, 1)), rtol=1e-9, atol=1e-20)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_one_seed_gives_the_same_bytes_and_another_one_others(name: str) -> None:
+    def made(seed: int) -> bytes:
+        seen = observe(scenes.shown(CYCLE), make_noise(name, LEVEL), np.random.default_rng(seed))
+        return seen.goals.tobytes() + seen.covariance.tobytes() + seen.seen.tobytes()
+
+    assert made(1) == made(1)
+    assert made(1) != made(2)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_carelessness_is_stated_but_not_drawn(name: str) -> None:
+    careless = np.zeros((5, 6, 6))
+    careless[1, 1, 1] = 0.0029**2
+    demonstrations = (scenes.shown(CYCLE), scenes.shown(CYCLE, careless))
+    plain, loose = (
+        observe(demonstration, make_noise(name, LEVEL), np.random.default_rng(0)) for demonstration in demonstrations
+    )
+    assert_array_equal(loose.goals, plain.goals)
+    assert plain.seen[1]
+    assert_allclose(loose.covariance - plain.covariance, careless, atol=1e-17)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_is_seen_reaches_the_robot(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A whole trial up to the robot: what `none` has it carry out are the model's goals for this seed, bit for bit."""
+    scenario = load_scenario("carried_bridge")
+    layout = draw_layout(scenario, stream(5, 0))
+    final = placements(scenario.assembly, layout.start, layout.goals)[-1]
+    n = len(scenario.assembly)
+    demonstration = Demonstration(scenario.assembly, layout.start, layout.goals, final, np.zeros((n, 6, 6)))
+    scene = object.__new__(Scene)
+    vars(scene).update(scenario=scenario, clearance_mm=0.25, arm=SimpleNamespace(mjcf=""))
+    simulated = SimulatedDemonstration(Layout(layout.goals, layout.start), demonstration)
+    carried_out: list[Any] = []
+
+    class Carried(Exception):
+        pass
+
+    def refuse(plan: Any, *_: object, **__: object) -> None:
+        carried_out.append(plan)
+        raise Carried
+
+    monkeypatch.setattr(trial, "replay_and_judge", refuse)
+    monkeypatch.setattr(trial, "predicted_outcome", lambda *_: "")  # which needs an arm
+    monkeypatch.setattr(trial, "promised_success", lambda *_: 1.0)  # so does this
+    spec = TrialSettings("carried_bridge", level_mm=1.5, level_deg=0.5, noise=name, method="none", seed=5)
+    with pytest.raises(Carried):
+        trial.run_trial(spec, scene, simulated=simulated, content="any")
+    expected = make_noise(name, Level(1.5, 0.5))(demonstration.assembly, demonstration, stream(5, 2))
+    assert expected.seen.all()
+    assert carried_out[0].goals.tobytes() == expected.goals.tobytes()
+    assert carried_out[0].targets.tobytes() == expected.goals.tobytes()
+    assert np.abs(expected.goals - layout.goals).max() > 1e-4
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_what_was_not_seen_is_never_carried_out(name: str) -> None:
+    """Of forty seeds: a plan of `none` exists exactly where everything was seen, and then holds what was seen."""
+    simulated = SimulatedDemonstration(Layout(CYCLE.goals, CYCLE.start), scenes.shown(CYCLE))
+    for seed in range(40):
+        seen = observe_demonstration(simulated, make_noise(name, LEVEL), seed)
+        planned = apply_method("none", seen, CYCLE.goals)
+        if seen.seen.all():
+            assert planned.plan is not None
+            assert planned.plan.goals.tobytes() == seen.goals.tobytes()
+        else:
+            assert planned.plan is None
+            assert planned.failure is not None
+            assert planned.failure.code == "not_seen"
+            assert planned.failure.operation == int(np.argmin(seen.seen))
+            assert not apply_method("contact", seen, CYCLE.goals).plan
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_large_errors_stay_within_the_observations_of_the_environment(name: str) -> None:
+    """At level 40; positions of gross outliers are given at the wall of the room."""
+    widest = np.outer(LARGEST_DEVIATION, LARGEST_DEVIATION)
+    for seed in range(60):
+        seen = observe(scenes.shown(CYCLE), make_noise(name, Level(40.0, 40.0)), np.random.default_rng(seed))
+        assert (np.abs(seen.covariance) <= widest).all()
+        goals = packed(seen.goals)
+        assert np.abs(goals[:, :3]).max() <= ROOM_M
+        near = np.abs(seen.goals[:, :3, 3]).max(axis=1) <= ROOM_M
+        assert_allclose(goals[near], pose.pack(seen.goals[near]), atol=1e-15)

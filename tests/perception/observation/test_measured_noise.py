@@ -1,0 +1,344 @@
+"""Noise out of files, fitted or drawn from residuals, obeys the laws of all noise models; bad files are refused."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
+
+from apo_bench import InputError, Observation, TrialSettings, observe
+from apo_bench.cli.app import main
+from apo_bench.envs.spaces import LARGEST_DEVIATION
+from apo_bench.formats.bop import read_results
+from apo_bench.formats.bop_truth import read_truth
+from apo_bench.geometry import Array, pose
+from apo_bench.perception.observation.models.camera import Camera
+from apo_bench.perception.observation.models.displaced import COVARIANCE_FLOOR
+from apo_bench.perception.observation.models.empirical import Empirical, read_residuals, residuals_text
+from apo_bench.perception.observation.models.fitted import LEVEL_UNITS, ConstantError, Fitted, ViewNoise, restated
+from apo_bench.perception.observation.models.outliers import UNSEEN_DEVIATION
+from apo_bench.perception.observation.models.residuals import Residuals, match_residuals
+from apo_bench.perception.observation.noise import Level, make_noise
+from apo_bench.perception.observation.noise_file import noise_text, presets, read_noise
+from apo_bench.trial.fingerprint import spec_hash
+from apo_bench.trial.inputs import noise_content
+from apo_bench.trial.planning import apply_method
+from tests import bop_made as made_of
+from tests import scenes
+from tests.bop_made import Known
+
+TOWER = scenes.turned(scenes.stick_in_tower(), pose.at((0.1, -0.02, 0.0), (20.0, 35.0, 23.0)))
+LEVEL = Level(0.8, 0.6)
+DRAWS = 1200
+BOUND = 5.0
+"""Observations behind a law, three operations each, and how many standard errors off a mean may be."""
+STAYS = ConstantError(
+    np.array([1.5, -1.0, 2.0, 1.0, -0.8, 0.5]) * LEVEL_UNITS, pose.at((0.1, 0.0, 0.03), (5.0, 0.0, 40.0))
+)
+CAMERA_NOISE = replace(read_noise(presets()["megapose-tless-inliers"])[0], view=ViewNoise(0.2, 0.1), constant=STAYS)
+WHOLE = Known()
+INLIERS = Known(missed=0.0, outliers=0.0)
+
+
+def residuals_of(folder: Path, known: Known, n: int = 400) -> Residuals:
+    estimates, truth = made_of.files(folder, made_of.draw(n, known, np.random.default_rng(4)))
+    seen = read_results(estimates)
+    return match_residuals(seen, read_truth(truth, seen))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Files of residuals: `whole.csv`, and `inliers.csv` of an estimator with a bias, without outliers and misses."""
+    path = tmp_path_factory.mktemp("residuals")
+    for name, known in (("whole", WHOLE), ("inliers", INLIERS)):
+        residuals = residuals_of(path, known)
+        if known is INLIERS:
+            residuals = replace(residuals, shift_mm=0.85 * residuals.shift_mm + [0.0, 2.0, 5.0])
+        (path / f"{name}.csv").write_text(residuals_text(residuals), encoding="utf-8")
+    return path
+
+
+@pytest.fixture(params=["megapose-lmo", "empirical"])
+def names(request: pytest.FixtureRequest, folder: Path) -> tuple[str, str]:
+    """A noise model, and the same without outliers and misses."""
+    if request.param == "empirical":
+        return f"empirical:{folder / 'whole.csv'}", f"empirical:{folder / 'inliers.csv'}"
+    return request.param, f"{request.param}-inliers"
+
+
+def see(name: str, seed: int, level: Level = LEVEL) -> Observation:
+    return observe(scenes.shown(TOWER), make_noise(name, level), np.random.default_rng(seed))
+
+
+def whitened(name: str, draws: int = DRAWS) -> tuple[Array, Array]:
+    """Body twists in units of what was stated, (draws, n, 6), and which were seen, (draws, n)."""
+    noise = make_noise(name, LEVEL)
+    demonstration = scenes.shown(TOWER)
+    seen = [observe(demonstration, noise, np.random.default_rng(seed)) for seed in range(draws)]
+    xi = pose.log(pose.inverse(TOWER.goals) @ np.array([observation.goals for observation in seen]))
+    L = np.linalg.cholesky(np.array([observation.covariance for observation in seen]))
+    return np.linalg.solve(L, xi[..., None])[..., 0], np.array([observation.seen for observation in seen])
+
+
+def test_no_bias_and_the_covariance_that_is_stated(names: tuple[str, str]) -> None:
+    """Of inliers, whose standard errors are those of their own heavy tails."""
+    unit, there = whitened(names[1])
+    assert there.all()
+    z = unit.reshape(-1, 6)
+    products = z[:, :, None] * z[:, None, :]
+    error = products.std(axis=0) / np.sqrt(len(z))
+    assert (np.abs(z.mean(axis=0)) < BOUND * z.std(axis=0) / np.sqrt(len(z))).all()
+    assert (np.abs(products.mean(axis=0) - np.eye(6)) < BOUND * error).all()
+    assert error.max() < 0.15
+
+
+def test_outliers_and_misses_come_as_often_as_measured_and_are_not_stated(names: tuple[str, str]) -> None:
+    unit, there = whitened(names[0], 800)
+    noise = make_noise(names[0], LEVEL)
+    if isinstance(noise, Fitted):
+        missed = noise.measured.missed
+        outliers = noise.measured.outliers
+    else:
+        assert isinstance(noise, Empirical)
+        missed = noise.sample.missed
+        outliers = noise.sample.gross
+        assert_allclose([missed, outliers], [WHOLE.missed, WHOLE.outliers], rtol=0.35)
+    assert abs(1.0 - there.mean() - missed) < 4.0 * np.sqrt(missed / there.size)
+    gross = (unit[there] ** 2).sum(axis=1) > chi2(6).ppf(1.0 - 1e-6)
+    assert outliers - 0.06 < gross.mean() < outliers + 0.08
+    clean = see(names[1], 0)
+    dirty = see(names[0], 0)
+    assert np.trace(dirty.covariance[dirty.seen][0]) < 2.0 * np.trace(clean.covariance[0])
+    assert dirty.outliers is not None
+    assert dirty.outliers.gross == pytest.approx(outliers)
+
+
+def test_the_choice_of_the_world_frame_does_not_count(names: tuple[str, str]) -> None:
+    noise = make_noise(names[0], LEVEL)
+    assert isinstance(noise, Fitted | Empirical)
+    here = observe(scenes.shown(TOWER), noise, np.random.default_rng(3))
+    for W in (pose.at((0.4, -0.3, 0.2), (30.0, -50.0, 80.0)), pose.at((-2.0, 1.0, 0.5), (170.0, 5.0, -95.0))):
+        turned = replace(noise, camera=Camera(W @ noise.camera.T_world_camera))
+        there = observe(scenes.shown(scenes.turned(TOWER, W)), turned, np.random.default_rng(3))
+        assert_allclose(there.goals, W @ here.goals, atol=1e-12)
+        assert_allclose(there.covariance, here.covariance, rtol=1e-9, atol=1e-15)
+        assert_array_equal(there.seen, here.seen)
+
+
+def test_a_level_multiplies_what_was_measured(names: tuple[str, str]) -> None:
+    """The same operations are outliers and missed at every level but 0, at which all is seen as shown."""
+    for seed in range(20):
+        seen = []
+        after = set()
+        for level in (Level(0.2, 0.1), Level(0.8, 0.2)):
+            rng = np.random.default_rng(seed)
+            seen.append(observe(scenes.shown(TOWER), make_noise(names[0], level), rng))
+            after.add(rng.random())
+        assert len(after) == 1
+        assert_array_equal(seen[0].seen, seen[1].seen)
+        weak, strong = (
+            pose.log(pose.inverse(TOWER.goals) @ observation.goals)[observation.seen] for observation in seen
+        )
+        lengths = [np.linalg.norm(xi[:, :3], axis=1) for xi in (weak, strong)]
+        assert_allclose(lengths[1], 4.0 * lengths[0], rtol=1e-6)
+        assert_allclose(strong[:, 3:], 2.0 * weak[:, 3:], rtol=1e-6, atol=1e-12)
+        none = see(names[0], seed, Level(0.0, 0.0))
+        assert none.goals.tobytes() == TOWER.goals.tobytes()
+        assert none.seen.all()
+        assert_allclose(none.covariance, np.tile(np.diag(COVARIANCE_FLOOR**2), (3, 1, 1)), rtol=1e-9, atol=1e-20)
+
+
+def test_levels_that_make_no_sense_are_refused(names: tuple[str, str]) -> None:
+    """What is stated stays within the observations of the environment."""
+    for level, unit in ((Level(900.0, 0.0), "mm"), (Level(0.0, 900.0), "degrees")):
+        with pytest.raises(InputError, match=rf"a level of 900 {unit} .*; at most \d") as raised:
+            make_noise(names[0], level)
+        most = float(str(raised.value).split("at most ")[1].split()[0])
+        seen = see(names[1], 0, Level(*(min(x, most) for x in level)))
+        assert (np.abs(seen.covariance) <= np.outer(LARGEST_DEVIATION, LARGEST_DEVIATION)).all()
+        assert np.sqrt(seen.covariance.max()) > 0.7 * (0.4 if unit == "mm" else 2.0)
+
+
+def test_what_is_seen_reaches_the_robot_and_misses_do_not(names: tuple[str, str]) -> None:
+    for seed in range(30):
+        seen = see(names[0], seed)
+        planned = apply_method("none", seen, TOWER.goals)
+        assert (planned.plan is not None) == bool(seen.seen.all())
+        if planned.plan is not None:
+            assert planned.plan.goals.tobytes() == seen.goals.tobytes()
+        again = see(names[0], seed)
+        assert again.goals.tobytes() + again.covariance.tobytes() == seen.goals.tobytes() + seen.covariance.tobytes()
+
+
+def test_nothing_of_the_truth_is_in_what_was_missed(names: tuple[str, str]) -> None:
+    """Its pose is the one at which the part started or was seen last, and what is stated says that it is not known."""
+    noise = make_noise(names[0], LEVEL)
+    demonstration = scenes.shown(TOWER)
+    missed = 0
+    for seed in range(60):
+        seen = observe(demonstration, noise, np.random.default_rng(seed))
+        for k in np.flatnonzero(~seen.seen):
+            missed += 1
+            start = TOWER.start[TOWER.assembly.operations[k].main]
+            assert_array_equal(seen.goals[k], start)
+            assert_allclose(np.sqrt(np.diagonal(seen.covariance[k])), UNSEEN_DEVIATION)
+    assert missed > 5
+
+
+def test_empirical_noise_gives_the_measured_poses_back(folder: Path) -> None:
+    """At level 1 every error is a row of the file, shift and turn, or of opposite sign, as far off and turned back."""
+    rows = np.genfromtxt(folder / "whole.csv", delimiter=",", skip_header=1, usecols=range(4, 10))
+    rows = rows[np.isfinite(rows[:, 0])]
+    camera = Camera()
+    found = []
+    for seed in range(60):
+        seen = see(f"empirical:{folder / 'whole.csv'}", seed, Level(1.0, 1.0))
+        F = camera.frames(TOWER.goals)
+        shift = np.einsum("nji,nj->ni", F, seen.goals[:, :3, 3] - TOWER.goals[:, :3, 3]) * 1e3
+        R = seen.goals[:, :3, :3] @ np.swapaxes(TOWER.goals[:, :3, :3], 1, 2)
+        turn = np.einsum("nji,nj->ni", F, Rotation.from_matrix(R).as_rotvec(degrees=True))
+        for d, w in zip(shift[seen.seen], turn[seen.seen], strict=True):
+            straight = np.abs(rows - [*d, *w]).max(axis=1).min() < 1e-6
+            opposite = np.abs(rows[:, 3:] + w).max(axis=1)
+            k = int(np.argmin(opposite))
+            back = opposite[k] < 1e-6 and abs(np.linalg.norm(rows[k, :3]) - np.linalg.norm(d)) < 1e-6
+            assert straight != back
+            found.append(straight)
+    assert 0.3 < np.mean(found) < 0.7
+
+
+def test_residuals_of_turned_parts_are_left_out(folder: Path, tmp_path: Path) -> None:
+    """They count as found, and are not drawn."""
+    lines = (folder / "inliers.csv").read_text(encoding="utf-8").splitlines()
+    cells = lines[1].split(",")
+    turned = ",".join([*cells[:3], "turned", *cells[4:9], "178.5"])
+    path = tmp_path / "turned.csv"
+    path.write_text("\n".join([lines[0], turned, *lines[2:]]), encoding="utf-8")
+    sample = read_residuals(path)
+    assert len(sample.inliers) == 399
+    assert (sample.missed, sample.gross) == (0.0, 0.0)
+
+
+def test_many_residuals_are_thinned(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("apo_bench.perception.observation.models.empirical.MOST_RESIDUALS", 150)
+    lines = residuals_text(residuals_of(folder, WHOLE)).splitlines()
+    whole = (folder / "whole.csv").read_text(encoding="utf-8").splitlines()
+    assert lines == [whole[0], *whole[1::3]]
+
+
+def test_a_file_that_changes_is_read_again_and_changes_the_hash(folder: Path, tmp_path: Path) -> None:
+    path = tmp_path / "r.csv"
+    name = f"empirical:{path}"
+    seen = []
+    for i, source in enumerate(("whole", "inliers")):
+        path.write_bytes((folder / f"{source}.csv").read_bytes())
+        os.utime(path, ns=(i, i))
+        hashed = spec_hash(TrialSettings("stick_in_tower", noise=name), "content")
+        seen.append((see(name, 0).goals.tobytes(), hashed, noise_content(name)[f"noise {name}"]))
+    assert all(first != second for first, second in zip(*seen, strict=True))
+    assert noise_content("isotropic", "anisotropic", "package.module:name") == {}
+
+
+def test_presets_are_models_by_name_and_fit_files_by_path(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    measured, camera = read_noise(presets()["megapose-lmo"])
+    path.write_text(noise_text(measured, ("a note",)) + "\n[camera]\nat_mm = [0, 0, 1500]\nturn_deg = [180, 0, 0]\n")
+    noise = make_noise(str(path), LEVEL)
+    assert isinstance(noise, Fitted)
+    assert noise.measured == measured
+    assert_allclose(noise.camera.T_world_camera, pose.at((0, 0, 1.5), (180, 0, 0)))
+    assert_allclose(camera.T_world_camera, Camera().T_world_camera)
+
+
+def test_an_error_of_the_view_and_one_that_stays_come_back_from_a_file(tmp_path: Path) -> None:
+    path = tmp_path / "cam.toml"
+    path.write_text(noise_text(CAMERA_NOISE), encoding="utf-8")
+    measured, _ = read_noise(path)
+    assert measured.view == CAMERA_NOISE.view
+    assert measured.constant is not None
+    assert_allclose(measured.constant.twist, STAYS.twist, rtol=1e-6)
+    assert_allclose(measured.constant.frame, STAYS.frame, atol=1e-8)
+
+
+def test_an_error_that_stays_is_taken_out_and_the_noise_of_the_file_stated() -> None:
+    P = STAYS.frame
+    right = see("camera", 1)
+    displaced = replace(right, goals=P @ pose.exp(STAYS.twist) @ pose.inverse(P) @ right.goals)
+    clean = restated(displaced, CAMERA_NOISE, Camera())
+    assert_allclose(clean.goals, right.goals, atol=1e-12)
+    assert clean.tails is not None
+    assert len(clean.shared) == 1
+
+
+def test_correct_takes_the_noise_of_a_camera_out_of_its_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "cam.toml"
+    path.write_text(noise_text(CAMERA_NOISE), encoding="utf-8")
+    assert main(["correct", "stick_in_tower", "--observation", "docs/seen.csv", "--camera-noise", str(path)]) == 0
+    assert "assumed where the file states none" not in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("freedom", ["inf", "1e301"])
+def test_many_degrees_of_freedom_are_a_gaussian(freedom: str, tmp_path: Path) -> None:
+    path = tmp_path / "noise.toml"
+    path.write_text(GOOD.replace("along_degrees_of_freedom = 0.96916", f"along_degrees_of_freedom = {freedom}", 1))
+    assert read_noise(path)[0].shift_mm.along.heaviness == 0.0
+
+
+GOOD = noise_text(read_noise(presets()["megapose-lmo"])[0])
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "message"),
+    [
+        ('"apo-bench/noise/2"', '"apo-bench/noise/9"', 'schema: "apo-bench/noise/2" is needed'),
+        ("missed_rate = 0.16609", "missed_rate = 1.5", "missed_rate: a number from 0 to 1 is needed, 1.5 was given"),
+        ("along_scale_mm = 10.972\n", "", "the key 'along_scale_mm' is missing"),
+        ("[turn]", "[turns]", "unknown key 'turns'; did you mean 'turn'"),
+        ("[turn]", "[turn", "this is not TOML: .*line"),
+    ],
+)
+def test_bad_noise_files_are_refused(
+    before: str, after: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert before in GOOD
+    path = tmp_path / "noise.toml"
+    path.write_text(GOOD.replace(before, after, 1), encoding="utf-8")
+    with pytest.raises(InputError, match=message) as raised:
+        make_noise(str(path), LEVEL)
+    assert str(path) in str(raised.value)
+    assert main(["noise", "card", str(path)]) == 2
+    assert capsys.readouterr().err == f"apo-bench: {raised.value}\n"
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        (
+            "1,0,1,good,1,2,3,4,5,6",
+            "line 2, column kind: inlier, turned, outlier or missed is needed, 'good' was given",
+        ),
+        ("1,0,1,inlier,1,2,3,4,5,190", "line 2, column turn_along_deg: a number of at most 180.01 is needed"),
+        ("1,0,1,missed,,,,,,", "no residual of an inlier stands in the file"),
+    ],
+)
+def test_bad_residuals_are_refused(line: str, message: str, folder: Path, tmp_path: Path) -> None:
+    path = tmp_path / "r.csv"
+    header = (folder / "whole.csv").read_text(encoding="utf-8").splitlines()[0]
+    path.write_text(f"{header}\n{line}\n", encoding="utf-8")
+    with pytest.raises(InputError, match=message) as raised:
+        make_noise(f"empirical:{path}", LEVEL)
+    assert str(path) in str(raised.value)
+
+
+def test_files_that_are_not_there(tmp_path: Path) -> None:
+    for name in (f"{tmp_path}/no.toml", f"empirical:{tmp_path}/no.csv", f"empirical:{tmp_path}", "empirical:"):
+        with pytest.raises(InputError, match=r"cannot be read|a folder was given|a file is needed"):
+            make_noise(name, LEVEL)

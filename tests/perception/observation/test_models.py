@@ -1,0 +1,112 @@
+"""Noise that is not the same everywhere: the camera's line of sight, and parts that are seen worse than others."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from apo_bench import Observation, observe
+from apo_bench.geometry import Array, pose
+from apo_bench.perception.observation.models.isotropic import (
+    LEAST_FACTOR,
+    MOST_FACTOR,
+    Isotropic,
+    PerPart,
+    part_factors,
+)
+from apo_bench.perception.observation.models.sighted import (
+    ACROSS_SIGHT,
+    ALONG_SIGHT,
+    IN_IMAGE,
+    OUT_OF_IMAGE,
+    Anisotropic,
+    line_of_sight,
+)
+from apo_bench.perception.observation.noise import Level, Noise, make_noise
+from tests import scenes
+
+TOWER = scenes.turned(scenes.stick_in_tower(), pose.at((0.1, -0.02, 0.0), (20.0, 35.0, 23.0)))
+LEVEL = Level(3.0, 6.0)
+
+
+def see(noise: Noise, seed: int) -> Observation:
+    return observe(scenes.shown(TOWER), noise, np.random.default_rng(seed))
+
+
+def twists(seen: Observation, shown: Array) -> Array:
+    """Body twists by which goals are wrong, (n, 6)."""
+    return pose.log(pose.inverse(shown) @ seen.goals)
+
+
+def test_draws_differ_along_the_sight_and_across_it() -> None:
+    """Empirical world covariance against the factors, whatever the part's frame."""
+    sight = line_of_sight()
+    world = []
+    for seed in range(1000):
+        seen = see(Anisotropic(LEVEL), seed)
+        R = seen.goals[:, :3, :3]
+        xi = twists(seen, TOWER.goals)
+        world.append(np.stack([np.einsum("nij,nj->ni", R, half) for half in (xi[:, :3], xi[:, 3:])]))
+    for half, (along, across), sigma in zip(
+        np.concatenate(world, axis=1),
+        ((ALONG_SIGHT, ACROSS_SIGHT), (IN_IMAGE, OUT_OF_IMAGE)),
+        (3e-3, np.radians(6.0)),
+        strict=True,
+    ):
+        expected = sigma**2 * (across**2 * np.eye(3) + (along**2 - across**2) * np.outer(sight, sight))
+        assert_allclose(half.T @ half / len(half), expected, atol=0.1 * np.abs(expected).max())
+
+
+def test_the_line_of_sight_is_fixed_in_the_world() -> None:
+    """Turn the parts: the body covariance turns, that in the world stays."""
+    turned = scenes.turned(TOWER, pose.at((0.3, 0.1, 0.0), (15.0, -40.0, 100.0)))
+    worlds = []
+    for scene in (TOWER, turned):
+        seen = observe(scenes.shown(scene), Anisotropic(LEVEL), np.random.default_rng(4))
+        R = np.zeros((len(seen.goals), 6, 6))
+        R[:, :3, :3] = R[:, 3:, 3:] = seen.goals[:, :3, :3]
+        worlds.append(R @ seen.covariance @ np.swapaxes(R, 1, 2))
+    assert_allclose(worlds[1], worlds[0], atol=1e-15)
+    assert_allclose(worlds[0], np.tile(worlds[0][0], (3, 1, 1)), atol=1e-15)
+
+
+def test_the_geometric_mean_is_that_of_isotropic() -> None:
+    """Determinants: 0.91 of the level for positions, the level itself for turns."""
+    seen = see(Anisotropic(LEVEL), 0)
+    for half, expected in (
+        (slice(0, 3), (ALONG_SIGHT * ACROSS_SIGHT**2) ** (1 / 3) * 3e-3),
+        (slice(3, 6), np.radians(6.0)),
+    ):
+        assert_allclose(np.linalg.det(seen.covariance[:, half, half]) ** (1 / 6), expected, rtol=1e-9)
+    assert_allclose((ALONG_SIGHT * ACROSS_SIGHT**2) ** (1 / 3), 0.909, atol=1e-3)
+
+
+def test_a_part_is_as_bad_in_every_operation() -> None:
+    """The error of each operation is that of `isotropic` times the factor of the part it moves."""
+    plain = see(Isotropic(LEVEL), 8)
+    seen = see(PerPart(LEVEL), 8)
+    ratio = twists(seen, TOWER.goals) / twists(plain, TOWER.goals)
+    assert_allclose(ratio, np.tile(ratio[:, :1], (1, 6)), rtol=1e-6)
+    rng = np.random.default_rng(8)
+    rng.standard_normal((3, 6))
+    factor = part_factors(TOWER.assembly.solids, rng)
+    assert_allclose(ratio[:, 0], [factor[o.main] for o in TOWER.assembly.operations], rtol=1e-6)
+    assert_allclose(seen.covariance, ratio[:, :1, None] ** 2 * plain.covariance, rtol=1e-6)
+
+
+def test_factors_are_log_uniform() -> None:
+    from scipy.stats import kstest
+
+    drawn = np.log(list(part_factors([str(i) for i in range(2000)], np.random.default_rng(2)).values()))
+    assert kstest(drawn, "uniform", (np.log(LEAST_FACTOR), np.log(MOST_FACTOR) - np.log(LEAST_FACTOR))).pvalue > 1e-3
+
+
+@pytest.mark.parametrize("name", ["anisotropic", "camera", "correlated"])
+def test_levels_in_mm_and_in_degrees_scale_alone(name: str) -> None:
+    """Positions by the one, turns by the other, whatever frame they are drawn in."""
+    sizes = []
+    for level in (Level(1.0, 0.5), Level(4.0, 1.0)):
+        xi = twists(see(make_noise(name, level), 2), TOWER.goals).reshape(3, 2, 3)
+        sizes.append(np.linalg.norm(xi, axis=2))
+    assert_allclose(sizes[1] / sizes[0], np.tile([4.0, 2.0], (3, 1)), rtol=1e-6)

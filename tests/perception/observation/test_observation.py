@@ -1,0 +1,119 @@
+"""Noise: its distribution, its frame, what it states about itself, and what `observe` refuses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from apo_bench import Demonstration, InputError, Observation, observe
+from apo_bench.geometry import Array, pose
+from apo_bench.perception.observation.models.displaced import COVARIANCE_FLOOR, floored
+from apo_bench.perception.observation.models.isotropic import Isotropic
+from apo_bench.perception.observation.noise import Level, make_noise
+from tests import scenes
+
+pytestmark = pytest.mark.numeric
+
+TOWER = scenes.turned(scenes.stick_in_tower(), pose.at((0.1, -0.02, 0.0), (0.0, 0.0, 23.0)))
+
+
+def errors(level: Level, draws: int) -> Array:
+    """Body twists of what was seen, from what was shown, (draws * n, 6)."""
+    rng = np.random.default_rng(11)
+    demonstration = scenes.shown(TOWER)
+    seen = [Isotropic(level)(demonstration.assembly, demonstration, rng).goals for _ in range(draws)]
+    return pose.log(pose.inverse(TOWER.goals) @ np.array(seen)).reshape(-1, 6)
+
+
+def test_errors_are_gaussian() -> None:
+    from scipy.stats import kstest
+
+    unit = errors(Level(1.0, 1.0), 200) / np.repeat([1e-3, np.radians(1.0)], 3)
+    assert kstest(unit.ravel(), "norm").pvalue > 1e-3
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_the_floor_keeps_covariances_positive_definite(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    axis = rng.standard_normal(6) * COVARIANCE_FLOOR * 20
+    C = np.outer(axis, axis)[None]
+    raised = floored(C)
+    assert_array_equal(raised, np.swapaxes(raised, 1, 2))
+    unit = np.outer(COVARIANCE_FLOOR, COVARIANCE_FLOOR)
+    assert np.linalg.eigvalsh(raised[0] / unit).min() > 1 - 1e-9
+    assert np.linalg.eigvalsh((raised - C)[0] / unit).min() > -1e-9
+    assert (np.sqrt(np.diagonal(raised[0])) >= COVARIANCE_FLOOR * (1 - 1e-12)).all()
+
+
+def test_what_is_above_the_floor_is_left_alone() -> None:
+    C = np.tile(np.diag((3 * COVARIANCE_FLOOR) ** 2), (2, 1, 1))
+    assert_array_equal(floored(C), C)
+
+
+def test_observe_passes_on_the_topology_the_starts_and_the_threshold() -> None:
+    shown = replace(scenes.shown(TOWER), gap_m=3e-4, play_m=2e-4)
+    seen = observe(shown, Isotropic(Level(1.0, 1.0)), np.random.default_rng(0))
+    assert seen.assembly is shown.assembly
+    assert dict(seen.start).keys() == dict(shown.start).keys()
+    assert seen.seen.tolist() == [True, True, True]
+    assert (seen.gap_m, seen.play_m) == (3e-4, 2e-4)
+
+
+def test_make_noise_by_name_class_function_and_object() -> None:
+    level = Level(2.0, 1.0)
+    rng = np.random.default_rng(0)
+
+    def plain(assembly: object, shown: Demonstration, rng: np.random.Generator) -> Observation:
+        return scenes.seen(TOWER, shown.goals)
+
+    assert make_noise("isotropic", level) == Isotropic(level)
+    assert make_noise("apo_bench.perception.observation.models.isotropic:Isotropic", level) == Isotropic(level)
+    assert make_noise(Isotropic, level) == Isotropic(level)
+    assert make_noise(Isotropic(Level(9.0, 9.0)), level) == Isotropic(Level(9.0, 9.0))
+    assert make_noise(plain, level) is plain
+    assert_array_equal(observe(scenes.shown(TOWER), plain, rng).goals, TOWER.goals)
+
+
+@pytest.mark.parametrize(
+    ("given", "level", "message"),
+    [
+        ("isotropc", Level(1, 1), "unknown noise model 'isotropc'; did you mean 'isotropic'"),
+        ("here/mine.csv", Level(1, 1), "did you mean 'empirical:here/mine.csv'"),
+        ("isotropic", Level(1, float("nan")), "noise level nan degrees is not possible"),
+        (lambda goals: goals, Level(1, 1), "cannot be called with (assembly, shown, rng)"),
+        (object, Level(1, 1), "the noise model 'object' failed"),
+    ],
+)
+def test_what_make_noise_refuses(given: object, level: Level, message: str) -> None:
+    with pytest.raises(InputError) as refused:
+        make_noise(given, level)
+    assert message in str(refused.value)
+
+
+GOOD = scenes.seen(TOWER, TOWER.goals)
+SKEWED = GOOD.covariance.copy()
+SKEWED[1, 0, 1] = 1e-7
+
+
+@pytest.mark.parametrize(
+    ("returned", "message"),
+    [
+        (TOWER.goals, "returned ndarray; return an apo_bench.assembly.goals.Observation"),
+        (scenes.seen(scenes.stick_in_tower(), TOWER.goals), "changed the assembly"),
+        (replace(GOOD, start={}), "changed which parts have a start pose"),
+        (replace(GOOD, goals=1.1 * TOWER.goals), "goal for operation 1 that is not a rigid pose"),
+        (replace(GOOD, covariance=SKEWED), "covariance for operation 2 that is not symmetric and positive definite"),
+    ],
+)
+def test_what_observe_refuses(returned: object, message: str) -> None:
+    with pytest.raises(InputError, match="the noise model 'mine'") as refused:
+        observe(scenes.shown(TOWER), named(lambda *_: returned), np.random.default_rng(0))
+    assert message in str(refused.value)
+
+
+def named(noise):
+    noise.__name__ = "mine"
+    return noise

@@ -1,0 +1,189 @@
+"""Wrong relations: exactly one thing is wrong, nothing but a corrector is told, and it is told nothing of the rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from apo_bench import Assembly, InputError, Observation, TrialSettings, load_scenario
+from apo_bench.assembly import Contact, relation_graph
+from apo_bench.assembly.equations import equations
+from apo_bench.perception.observation.relations import (
+    NEAR_FACES_M,
+    TOUCHING_M,
+    Shifted,
+    culprit,
+    false,
+    make_relations,
+    missed,
+    relations_name,
+    with_relations,
+)
+from apo_bench.trial.planning import apply_method
+from apo_bench.trial.stages import ARM, DEMONSTRATION, LAYOUT, OBSERVATION, RELATIONS, stream
+from tests import scenes
+
+SEEDS = range(4)
+
+
+def contacts(assembly: Assembly) -> set[tuple[int, Contact]]:
+    return {(relation.made, relation.contact) for relation in assembly.relations()}
+
+
+def gaps(assembly: Assembly, scene: scenes.Scene) -> np.ndarray:
+    """The largest |e| of each contact at the truth, [m]."""
+    return equations(assembly, scene.start, scene.goals).gaps(scene.goals)
+
+
+@pytest.mark.parametrize("name", ["stick_in_tower", "pockets"])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_exactly_one_contact_is_wrong(name: str, seed: int) -> None:
+    scene = scenes.ALL[name]()
+    right = contacts(scene.assembly)
+    arguments = (scene.assembly, scene.start, scene.goals)
+    less = contacts(missed(*arguments, stream(seed, RELATIONS)))
+    assert less < right
+    assert len(right - less) == 1
+    off = contacts(Shifted()(*arguments, stream(seed, RELATIONS)))
+    assert len(off) == len(right)
+    assert len(right - off) == 1
+    more = contacts(false(*arguments, stream(seed, RELATIONS)))
+    assert more > right
+    assert len(more - right) == 1
+
+
+@pytest.mark.parametrize("name", ["stick_in_tower", "pockets"])
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_shifted_face_is_off_by_its_size_and_every_other_contact_holds(name: str, seed: int) -> None:
+    scene = scenes.ALL[name]()
+    wrong = Shifted(3e-3)(scene.assembly, scene.start, scene.goals, stream(seed, RELATIONS))
+    off = gaps(wrong, scene)
+    accused = [r.contact not in scene.assembly.operations[r.made].contacts for r in wrong.relations()]
+    assert_allclose(off[accused], 3e-3, atol=1e-12)
+    assert off[~np.array(accused)].max(initial=0.0) < 1e-12
+
+
+@pytest.mark.parametrize("name", ["block_on_block", "carried_bridge", "pocket_table"])
+def test_a_false_contact_is_plausible(name: str) -> None:
+    """It joins a moved part and one that stands there; their faces are apart, and where a scenario has them, near."""
+    s = load_scenario(name)
+    for seed in SEEDS:
+        wrong = false(s.assembly, s.start, s.goals, stream(seed, RELATIONS))
+        ((made, contact),) = contacts(wrong) - contacts(s.assembly)
+        before = {part for operation in s.assembly.operations[:made] for part in operation.moves}
+        assert contact.manipulated.part in s.assembly.operations[made].moves
+        assert contact.environment.part in s.assembly.fixed | before
+        system = equations(wrong, s.start, s.goals)
+        apart = system.gaps(s.goals)[[r.contact == contact and r.made == made for r in wrong.relations()]]
+        assert apart > TOUCHING_M
+        if name in ("carried_bridge", "pocket_table"):
+            assert apart < NEAR_FACES_M
+
+
+def test_the_culprit_is_the_relation_of_the_graph_that_is_told() -> None:
+    scene = scenes.stick_in_tower()
+    arguments = (scene.assembly, scene.start, scene.goals)
+    for seed in SEEDS:
+        assert culprit(scene.assembly, missed(*arguments, stream(seed, RELATIONS))) is None
+        for wrong in (false(*arguments, stream(seed, RELATIONS)), Shifted()(*arguments, stream(seed, RELATIONS))):
+            ((made, contact),) = contacts(wrong) - contacts(scene.assembly)
+            (arc,) = [arc for arc in relation_graph(wrong).arcs if arc.made == made and contact in arc.contacts]
+            assert culprit(scene.assembly, wrong) == arc.name
+    assert culprit(scene.assembly, scene.assembly) is None
+
+
+def test_shared_faces_are_shifted_for_one_contact_only() -> None:
+    """The table's top carries three blocks of Fig. 6; two of them keep it where it is."""
+    scene = scenes.pockets()
+    for seed in range(40):
+        wrong = Shifted()(scene.assembly, scene.start, scene.goals, stream(seed, RELATIONS))
+        ((_, contact),) = contacts(wrong) - contacts(scene.assembly)
+        if contact.environment.part == "table" and contact.environment.face == "top_shifted":
+            assert sum(r.contact.environment.face == "top" for r in wrong.relations()) == 3
+            assert_array_equal(
+                wrong.solids["table"].faces["top"].outline, scene.assembly.solids["table"].faces["top"].outline
+            )
+            return
+    raise AssertionError("no seed shifts the table's top")
+
+
+def test_a_plan_has_the_relations_that_its_planner_was_given() -> None:
+    scene = scenes.stick_in_tower()
+    seen = scenes.seen(scene, scenes.noisy(scene.goals, np.random.default_rng(1), 1.0, 1.0))
+    wrong = with_relations(seen, Shifted(3e-3), scene.goals, stream(4, RELATIONS))
+    assert wrong.goals.tobytes() == seen.goals.tobytes()
+    for method in ("oracle", "none"):
+        with_wrong = apply_method(method, wrong, scene.goals)
+        without = apply_method(method, seen, scene.goals)
+        assert with_wrong.plan is not None
+        assert without.plan is not None
+        assert with_wrong.plan.goals.tobytes() == without.plan.goals.tobytes()
+    heard: list[Observation] = []
+
+    def listens(observation: Observation) -> object:
+        heard.append(observation)
+        return observation.goals
+
+    plan = apply_method(listens, wrong, scene.goals)
+    assert heard == [wrong]
+    assert plan.plan is not None
+    assert plan.plan.assembly is wrong.assembly
+
+
+def test_the_stream_is_its_own() -> None:
+    assert len({LAYOUT, DEMONSTRATION, OBSERVATION, ARM, RELATIONS}) == 5
+    assert (LAYOUT, DEMONSTRATION, OBSERVATION, ARM) == (0, 1, 2, 3)
+
+
+@pytest.mark.parametrize(
+    ("given", "name"),
+    [("given", "given"), ("shifted", "shifted:2"), ("shifted:3.0", "shifted:3"), ("shifted:0.5", "shifted:0.5")],
+)
+def test_rows_spell_relations_one_way(given: str, name: str) -> None:
+    assert relations_name(given) == TrialSettings("stick_in_tower", relations=given).relations == name
+
+
+def test_relations_come_by_name_as_a_function_or_with_a_size() -> None:
+    assert make_relations("given") is None
+    assert make_relations("missed") is missed
+    assert make_relations("apo_bench.perception.observation.relations:false") is false
+    assert make_relations("shifted:3") == Shifted(3e-3)
+    assert make_relations(Shifted(1e-3)) == Shifted(1e-3)
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ("mised", "did you mean 'missed'"),
+        ("shifted:far", "a size above 0 and up to 50 mm is allowed"),
+        ("shifted:-1", "a size above 0 and up to 50 mm is allowed"),
+        (7, "are no function; give (assembly, start, goals, rng) -> Assembly"),
+    ],
+)
+def test_what_make_relations_refuses(given: object, words: str) -> None:
+    with pytest.raises(InputError) as refused:
+        make_relations(given)
+    assert words in str(refused.value)
+
+
+def test_relations_change_nothing_but_contacts_and_faces() -> None:
+    scene = scenes.stick_in_tower()
+    seen = scenes.seen(scene, scene.goals)
+    for returned, words in (
+        (None, "returned NoneType; return an Assembly"),
+        (scene.assembly.first(2), "changed parts or operations"),
+        (replace(scene.assembly, solids={"table": scenes.table()}), "changed parts or operations"),
+    ):
+        with pytest.raises(InputError) as refused:
+            with_relations(seen, lambda *_, r=returned: r, scene.goals, np.random.default_rng(0))
+        assert words in str(refused.value)
+
+
+def test_no_contact_can_be_wrong_where_there_is_none() -> None:
+    scene = scenes.bridge()
+    bare = replace(scene.assembly, operations=tuple(replace(o, contacts=()) for o in scene.assembly.operations))
+    with pytest.raises(InputError, match="the assembly has no contact"):
+        missed(bare, scene.start, scene.goals, np.random.default_rng(0))

@@ -1,0 +1,103 @@
+"""Wrong relations of round faces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from apo_bench import Assembly, InputError, correct
+from apo_bench.assembly import Contact, PartFace
+from apo_bench.perception.observation.relations import Shifted, culprit, false, missed, with_relations
+from tests import rounds, scenes
+from tests.brackets import on_pins
+
+SCENES = {**rounds.ALL, "on_pins": on_pins}
+
+
+def contacts(assembly: Assembly) -> set[tuple[int, Contact]]:
+    return {(relation.made, relation.contact) for relation in assembly.relations()}
+
+
+@pytest.mark.parametrize("name", ["nested", "in_groove", "on_pins"])
+def test_exactly_one_contact_is_wrong(name: str) -> None:
+    scene = SCENES[name]()
+    right = contacts(scene.assembly)
+    arguments = (scene.assembly, scene.start, scene.goals)
+    for seed in range(4):
+        assert len(right - contacts(missed(*arguments, np.random.default_rng(seed)))) == 1
+        off = contacts(Shifted()(*arguments, np.random.default_rng(seed)))
+        assert (len(off), len(right - off)) == (len(right), 1)
+        more = contacts(false(*arguments, np.random.default_rng(seed)))
+        assert more >= right
+        assert len(more - right) <= 1
+
+
+def test_a_round_face_is_off_across_its_axis() -> None:
+    scene = rounds.through()
+    seen = set[str]()
+    for seed in range(12):
+        wrong = Shifted(2e-3)(scene.assembly, scene.start, scene.goals, np.random.default_rng(seed))
+        ((_, contact),) = contacts(wrong) - contacts(scene.assembly)
+        part, face = contact.environment
+        seen.add(face)
+        if face == "bore_shifted":
+            new = wrong.solids[part].rounds[face]
+            old = wrong.solids[part].rounds["bore"]
+            by = new.point - old.point
+            assert np.linalg.norm(by) == pytest.approx(2e-3)
+            assert by @ old.axis == pytest.approx(0.0, abs=1e-12)
+            assert (new.radii, new.span, culprit(scene.assembly, wrong)) == (
+                old.radii,
+                old.span,
+                f"R{3 + (part == 'b')}",
+            )
+    assert seen == {"bore_shifted", "top_shifted"}
+
+
+def test_a_shaft_that_is_told_to_be_in_another_bore() -> None:
+    """Bores 12 mm beside each other: the other one is the only contact that could be taken for one."""
+    scene = rounds.peg_in_plate()
+    plate = scene.assembly.solids["plate"]
+    other = replace(plate.rounds["bore"], name="other", point=np.array([0.012, 0.0, 0.0]))
+    two = replace(plate, rounds={**plate.rounds, "other": other})
+    assembly = replace(scene.assembly, solids={**scene.assembly.solids, "plate": two})
+    added = {
+        str(contact)
+        for seed in range(20)
+        for _, contact in contacts(false(assembly, scene.start, scene.goals, np.random.default_rng(seed)))
+        - contacts(assembly)
+    }
+    assert "peg.wall on plate.other" in added
+
+
+def test_what_is_told_wrongly_is_noticed() -> None:
+    """Bores a millimetre off each other let no shaft through; whoever believes the wrong one is off by that."""
+    scene = rounds.through()
+    seen = scenes.seen(scene, scene.goals)
+    for seed in range(12):
+        wrong = Shifted(1e-3)(scene.assembly, scene.start, scene.goals, np.random.default_rng(seed))
+        if any(c.environment.face == "bore_shifted" for _, c in contacts(wrong)):
+            made = correct(replace(seen, assembly=wrong), "contact")
+            assert np.linalg.norm(made.goals[:, :3, 3] - scene.goals[:, :3, 3], axis=1).max() > 1e-4
+            return
+    raise AssertionError("no bore was shifted")
+
+
+@pytest.mark.parametrize(
+    ("face", "words"),
+    [("nowhere", "no face"), ("bore", "faces of these kinds cannot make")],
+)
+def test_relations_of_ones_own_must_be_possible(face: str, words: str) -> None:
+    scene = rounds.peg_in_plate()
+    seen = scenes.seen(scene, scene.goals)
+
+    def told(assembly: Assembly, *rest: object) -> Assembly:
+        operations = list(assembly.operations)
+        contact = Contact(PartFace("peg", "head"), PartFace("plate", face))
+        operations[1] = replace(operations[1], contacts=(contact,))
+        return replace(assembly, operations=tuple(operations))
+
+    with pytest.raises(InputError, match=words):
+        with_relations(seen, told, scene.goals, np.random.default_rng(0))

@@ -1,0 +1,172 @@
+"""Macros by peeling, and ways checked by what boxes sweep; against sampling, and on small assemblies of every state."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from apo_bench import Assembly
+from apo_bench.assembly import Operation
+from apo_bench.geometry import Array, Solid
+from apo_bench.planning.insertion.arrival import Arrival, Preference, arrive
+from apo_bench.planning.insertion.macros import Chain, Way, chain, departure, peel
+from tests import scenes
+
+X, Y, Z = np.eye(3)
+
+
+def out(along: Array, walls: tuple[int, ...]) -> Way:
+    """Along the first axis there is, a decimetre."""
+    return Way(along[0], 0.1, True)
+
+
+def made(*normals: Array) -> Chain:
+    return chain(np.array(normals).reshape(-1, 3), out)
+
+
+def names(found: Chain) -> list[str]:
+    return [macro.name for macro in found.macros]
+
+
+@pytest.mark.parametrize(
+    ("letter", "normals", "macros"),
+    [
+        ("S", [], []),
+        ("A", [Z], ["move-to-contact"]),
+        ("B", [Y, -Y], ["insert-between"]),
+        ("C", [X, Z], ["move-to-contact", "slide-to-contact"]),
+        ("D", [Y, Z, -Y], ["insert-into-slot", "move-to-contact"]),
+        ("E", [Y, -Y, Z, -Z], ["insert-into"]),
+        ("F", [X, Y, Z], ["move-to-contact", "slide-to-contact", "slide-to-contact"]),
+        ("G", [X, Y, -Y, Z], ["insert-into-slot", "move-to-contact", "slide-to-contact"]),
+        ("H", [X, -X, Y, -Y, Z], ["insert-into", "move-to-bottom"]),
+        ("I", [X, -X, Y, -Y, Z, -Z], []),
+    ],
+)
+def test_the_procedure_tree(letter: str, normals: list[Array], macros: list[str]) -> None:
+    found = made(*normals)
+    assert (found.state.letter, names(found)) == (letter, macros)
+    assert found.locked == (letter == "I")
+    closed = [i for macro in found.macros for i in macro.makes]
+    assert sorted(closed) == ([] if found.locked else list(range(len(normals)))), "every contact is made once"
+    for macro in found.macros:
+        n = np.array(normals)
+        assert np.abs(n[list(macro.keeps)] @ macro.direction).max(initial=0.0) < 1e-9, "along what was made before"
+        if macro.guarded:
+            assert (n[list(macro.makes)] @ macro.direction < -1e-3).all(), "onto what it makes"
+        else:
+            assert np.abs(n[list(macro.makes)] @ macro.direction).max() < 1e-9, "between its walls"
+
+
+def test_what_carries_is_met_first_and_from_above() -> None:
+    for normals in ([X, Z], [Z, X], [Y, X, Z]):
+        np.testing.assert_array_equal(made(*normals).macros[0].direction, -Z)
+    groove = [(Z + X) / 2**0.5, (Z - X) / 2**0.5]
+    (down,) = made(*groove).macros
+    np.testing.assert_array_equal(down.direction, -Z)
+    assert down.makes == (0, 1)
+    (up,) = made(-Z).macros
+    np.testing.assert_array_equal(up.direction, Z)
+
+
+def test_a_part_leaves_the_way_it_came() -> None:
+    """Sides first, then out of walls; from supports alone it is just lifted."""
+    assert departure(made(Z), (0,)) == ()
+    (off,) = departure(made(Z, X), (0,))
+    assert (off.name, off.direction.tolist(), off.makes) == ("depart", [1.0, 0.0, 0.0], (1,))
+    (pulled,) = departure(made(Y, -Y, Z, -Z), (2,))
+    assert pulled.length_m == 0.1
+    assert abs(pulled.direction[0]) == pytest.approx(1.0)
+    back = departure(made(X, Y, -Y, Z), (3,))
+    assert back[0].makes == (0,), "off the end of the slot first"
+
+
+def test_peeling_takes_off_everything_that_is_not_locked() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(60):
+        n = rng.standard_normal((rng.integers(1, 5), 3))
+        normals = n / np.linalg.norm(n, axis=1)[:, None]
+        if rng.integers(2):
+            normals = np.concatenate([normals, -normals[:1]])
+        layers = peel(normals)
+        assert sorted(i for layer in layers for i in layer.breaks) == list(range(len(normals)))
+        assert [layer.locked for layer in layers[:-1]] == [False] * (len(layers) - 1)
+        for layer in layers:
+            if layer.cone.state.detaching:
+                t = layer.cone.direction
+                assert (normals[list(layer.breaks)] @ t > 0.0).all()
+                assert np.abs(normals[list(layer.keeps)] @ t).max(initial=0.0) < 1e-6
+
+
+def assembly(contacts: dict[str, Sequence[str]], **parts: tuple[Solid, Array]) -> tuple[Assembly, dict[str, Array]]:
+    """One movable part called `part`, all others fixed, and where everything is."""
+    touched = [c for other, pairs in contacts.items() for c in scenes.touch("part", other, *pairs)]
+    solids = {name: solid for name, (solid, _) in parts.items()}
+    fixed = frozenset(parts) - {"part"}
+    return Assembly(solids, (Operation("part", tuple(touched)),), fixed), {name: T for name, (_, T) in parts.items()}
+
+
+def arrival(built: tuple[Assembly, dict[str, Array]], stated: Preference | None = None) -> Arrival:
+    of, poses = built
+    return arrive(of, ("part",), of.operations[0].contacts, poses, stated or Preference())
+
+
+def between(height_mm: float = 80.0) -> tuple[Assembly, dict[str, Array]]:
+    return assembly(
+        {"left": ("py-ny",), "right": ("ny-py",)},
+        left=(scenes.block(), scenes.mm(0, 50, height_mm)),
+        right=(scenes.block(), scenes.mm(0, -50, height_mm)),
+        part=(scenes.block(), scenes.mm(0, 0, height_mm)),
+    )
+
+
+def test_a_block_between_two_walls_comes_from_above_unless_told_otherwise() -> None:
+    found = arrival(between())
+    (macro,) = found.macros
+    assert (found.state.letter, macro.name, macro.direction.tolist()) == ("B", "insert-between", [0, 0, -1])
+    assert macro.length_m == pytest.approx(0.05)
+    assert (found.line.travel_m, found.free) == (pytest.approx(0.07), True)
+    (level,) = arrival(between(), Preference(X)).macros
+    assert (level.name, level.direction.tolist()) == ("insert-between", [1, 0, 0])
+    through = arrival(between(), Preference(Y))
+    assert through.macros[0].direction.tolist() == [0, 0, -1], "a line through a wall is not followed"
+
+
+def slot(*more: tuple[str, Sequence[str], Solid, Array]) -> tuple[Assembly, dict[str, Array]]:
+    contacts = {"castle": scenes.SLOT} | {name: pairs for name, pairs, _, _ in more if pairs}
+    parts = {name: (solid, T) for name, _, solid, T in more}
+    at = scenes.mm(0, 0, 40)
+    return assembly(contacts, castle=(scenes.castle(), np.eye(4)), part=(scenes.stick(), at), **parts)
+
+
+def test_a_slot_under_a_roof_is_entered_from_its_end() -> None:
+    roof = scenes.cuboid("roof", (30, 30, 5))
+    found = arrival(slot(("roof", (), roof, scenes.mm(0, 0, 58))))
+    assert found.free
+    assert [(m.name, m.direction.tolist()) for m in found.macros] == [
+        ("insert-into-slot", [1, 0, 0]),
+        ("move-to-contact", [0, 0, -1]),
+    ]
+    assert found.macros[0].length_m == pytest.approx(0.14)
+
+
+def hole(*more: tuple[str, Sequence[str], Solid, Array]) -> tuple[Assembly, dict[str, Array]]:
+    parts = {name: (solid, T) for name, _, solid, T in more}
+    contacts = {"cube": scenes.HOLE} | {name: pairs for name, pairs, _, _ in more if pairs}
+    return assembly(contacts, cube=(scenes.cube(), np.eye(4)), part=(scenes.stick(), np.eye(4)), **parts)
+
+
+def test_the_end_of_a_hole_that_is_free_is_taken() -> None:
+    """Along the axis of the stick, forwards; backwards if something stands there, or above where it would begin."""
+    forwards = arrival(hole()).line.direction
+    travel = arrival(hole()).line.travel_m
+    assert (forwards.tolist(), travel) == ([1, 0, 0], 0.155)
+    for x, z in ((-200, 0), (-250, 100)):
+        found = arrival(hole(("stop", (), scenes.block(), scenes.mm(x, 0, z))))
+        assert (found.line.direction.tolist(), found.free) == ([-1, 0, 0], True)
+    stops = [(f"stop{x}", (), scenes.block(), scenes.mm(x, 0, 0)) for x in (-200, 200)]
+    assert not arrival(hole(*stops)).free
+    assert arrival(hole(), Preference(-X)).line.direction.tolist() == [-1, 0, 0]
+    assert arrival(hole(), Preference(None, 0.2)).line.travel_m == 0.2

@@ -1,0 +1,318 @@
+"""What a plan says about itself before anything moves."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from apo_bench import Assembly, Plan, load_scenario
+from apo_bench.assembly import Operation, Step, placements
+from apo_bench.geometry import Array, pose
+from apo_bench.planning.insertion.arrival import Attach
+from apo_bench.planning.prediction.failure import Prediction, predict
+from apo_bench.planning.prediction.measures import ArmMove
+from apo_bench.planning.prediction.resting import is_support, residual, resting_poses
+from apo_bench.records import Thresholds
+from tests import rounds, scenes
+from tests.scenes import touch
+
+pytestmark = pytest.mark.numeric
+
+CLEARANCE_MM = 0.25
+ALLOWED_MM = CLEARANCE_MM + Thresholds().fit_margin_mm
+DOWN = (0.0, 0.0, -1.0)
+AWAY = (0.0, 0.0, 1.0)
+ALONG = (1.0, 0.0, 0.0)
+
+
+def ways(scene: scenes.Scene) -> list[Attach]:
+    """From above in the world; a stick that goes through holes, along its own x axis."""
+    made = []
+    for operation, goal in zip(scene.assembly.operations, scene.goals, strict=True):
+        holes = [c for c in operation.contacts if c.manipulated.part == "stick" and c.manipulated.face == "pz"]
+        upright = goal[2, 2] > 0
+        made.append(Attach(np.array(ALONG), 0.2) if holes else Attach(np.array(DOWN if upright else AWAY), 0.05))
+    return made
+
+
+def said(scene: scenes.Scene, goals: Array, attach: Sequence[Attach] | None = None, **plan: object) -> Prediction:
+    asked = Plan(scene.assembly, scene.start, goals, **plan)
+    return predict(asked, CLEARANCE_MM, Thresholds(), ways(scene) if attach is None else attach)
+
+
+def off(scene: scenes.Scene, operation: int, T: Array) -> Array:
+    """The true goals, that of one operation (from 1) wrong by a body displacement."""
+    goals = scene.goals.copy()
+    goals[operation - 1] = goals[operation - 1] @ T
+    return goals
+
+
+@pytest.mark.parametrize("name", scenes.ALL)
+def test_the_examples_of_the_paper_fit(name: str) -> None:
+    found = said(scenes.ALL[name](), scenes.ALL[name]().goals)
+    assert (found.fails, found.operation, found.code) == (False, None, "ok")
+    assert found.size_mm == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "wrong", "shift", "fails"),
+    [
+        ("stick_on_castles", (2,), (0, 2, 0), 3),
+        ("stick_in_tower", (2,), (0, -2, 0), 3),
+        ("subassembly_on_castles", (2,), (0, 2, 0), 5),
+        ("fixture", (2, 3), (0, -2, 0), 5),
+        ("pockets", (2,), (2, 0, 0), 6),
+    ],
+)
+def test_careless_placing_fails_where_the_paper_says(
+    name: str, wrong: tuple[int, ...], shift: tuple[float, float, float], fails: int
+) -> None:
+    """Fig. 3 and 6, examples 5.1 to 5.3: one part 2 mm aside, seen exactly; everything before still fits."""
+    scene = scenes.ALL[name]()
+    goals = scene.goals.copy()
+    goals[[k - 1 for k in wrong]] = goals[[k - 1 for k in wrong]] @ scenes.mm(*shift)
+    found = said(scene, goals)
+    assert (found.fails, found.operation, found.code) == (True, fails - 1, "residual")
+    assert found.size_mm == pytest.approx(2.0, abs=1e-9)
+    assert found.sentence.startswith(f"operation {fails} ({scene.assembly.operations[fails - 1].main}) will fail: ")
+
+
+@settings(max_examples=30, deadline=None)
+@given(mm=st.floats(-1.0, 1.0).filter(lambda mm: abs(abs(mm) - ALLOWED_MM) > 1e-6))
+def test_clearance_and_margin_are_the_border(mm: float) -> None:
+    found = said(scenes.stick_in_tower(), off(scenes.stick_in_tower(), 2, scenes.mm(0, mm, 0)))
+    assert found.fails == (abs(mm) > ALLOWED_MM)
+    assert found.size_mm == pytest.approx(abs(mm), abs=1e-9)
+
+
+@pytest.mark.parametrize("mm", [-4.0, 3.0])
+def test_what_is_found_by_touch_tells_nothing(mm: float) -> None:
+    """Too deep or too high: a support is no fit contact, and the floor of a slot lies along the way in."""
+    scene = scenes.stick_on_castles()
+    assert said(scene, scene.goals @ scenes.mm(0, 0, mm)).code == "ok"
+    laid = off(scene, 3, scenes.mm(0, 0, mm))
+    assert said(scene, laid).code == "ok"
+    assert (said(scene, laid, []).code, said(scene, laid, []).operation) == ("residual", 2)
+
+
+def test_a_side_contact_tells_nothing() -> None:
+    """Example 5.3: castle 2 planned 1 mm into the fixture, or off it, is slid onto it."""
+    for mm in (1.0, -1.0):
+        assert said(scenes.fixture(), off(scenes.fixture(), 3, scenes.mm(0, mm, 0))).operation == 4
+
+
+@pytest.mark.parametrize(("yaw_deg", "fails"), [(0.1, False), (-0.5, True)])
+def test_a_slide_does_not_turn_the_part(yaw_deg: float, fails: bool) -> None:
+    """Fig. 5: a 50 mm side that is not parallel touches with one corner; the other stays off by 50 mm times the yaw."""
+    scene = scenes.fixture_alignment()
+    found = said(scene, off(scene, 2, pose.at((0, 0, 0), (0, 0, yaw_deg))))
+    assert (found.fails, found.operation) == (fails, 1 if fails else None)
+    if fails:
+        assert found.size_mm == pytest.approx(50.0 * abs(np.sin(np.radians(yaw_deg))), rel=0.02)
+
+
+def test_what_lies_flat_after_all_tells_nothing() -> None:
+    """Tilts of a degree and heights of a millimetre are gone once the blocks of Fig. 5 rest on the table."""
+    scene = scenes.fixture_alignment()
+    goals = scene.goals @ pose.at((0, 0, 0.001), (1.0, 0, 0))
+    goals[0] = goals[0] @ pose.at((0, 0, 0), (0, -1.0, 0))
+    assert said(scene, goals).code == "ok"
+
+
+@pytest.mark.parametrize("name", ["stick_in_tower", "fixture", "pockets"])
+def test_what_is_found_by_touch_ends_in_touch(name: str) -> None:
+    """Supports close, of sides one corner, and settling again changes nothing."""
+    scene = scenes.ALL[name]()
+    poses = dict(scene.start)
+    goals = scenes.noisy(scene.goals, np.random.default_rng(4), 1.0, 1.0)
+    for operation, goal in zip(scene.assembly.operations, goals, strict=True):
+        alone = Assembly(scene.assembly.solids, (operation,), scene.assembly.fixed)
+        (brought,) = placements(alone, poses, goal[None])
+        rests = resting_poses(alone, operation, brought)
+        touched = [c for c in operation.contacts if not alone.is_fit(c)]
+        sides = [c for c in touched if not is_support(alone, c, rests)]
+        for contact in touched:
+            e, _ = residual(alone, contact, rests)
+            assert (e.min() if contact in sides else np.abs(e).max()) == pytest.approx(0.0, abs=2e-5)
+        for part, T in rests.items():
+            assert part in operation.moves or T is brought[part]
+            relative = pose.inverse(rests[operation.main]) @ T
+            if part in operation.moves:
+                np.testing.assert_allclose(relative, pose.inverse(brought[operation.main]) @ brought[part], atol=1e-12)
+        again = resting_poses(alone, operation, rests)
+        np.testing.assert_allclose(again[operation.main], rests[operation.main], rtol=0, atol=2e-5)
+        poses = dict(rests)
+
+
+def test_parts_in_one_another_interfere() -> None:
+    """Example 5.3: the fixture is put away where castle 2 stands."""
+    scene = scenes.fixture()
+    found = said(scene, off(scene, 4, scenes.mm(0, -100, 0)))
+    assert (found.fails, found.operation, found.code) == (True, 3, "interference")
+    assert found.size_mm == pytest.approx(15.0)
+    assert said(scene, off(scene, 4, scenes.mm(0, -85.0 - 0.5, 0))).code == "ok"
+
+
+def test_the_way_in_may_be_barred() -> None:
+    """The fixture slides to its place through castle 2, which neither the goal nor the way from above meets."""
+    scene = scenes.fixture()
+    attach = ways(scene)
+    attach[3] = Attach(np.array([0.0, 1.0, 0.0]), 0.18)
+    found = said(scene, scene.goals, attach)
+    assert (found.operation, found.code) == (3, "interference")
+
+
+def test_an_unstable_goal_comes_before_everything() -> None:
+    scene = scenes.stick_on_castles()
+    goals = off(scene, 3, scenes.mm(150, 0, 0))
+    goals[1] = goals[1] @ scenes.mm(0, 3, 0)
+    found = said(scene, goals)
+    assert (found.operation, found.code, found.size_mm) == (2, "unstable_goal", None)
+
+
+def test_work_that_is_taken_apart_is_looked_at_as_it_is_redone() -> None:
+    """Example 5.1: castle 2 is put down wrongly, taken off, put down rightly; only then comes the stick."""
+    scene = scenes.stick_in_tower()
+    wrong = off(scene, 2, scenes.mm(0, 3, 0))
+    schedule = (Step(0), Step(1), Step(1, undo=True), Step(1), Step(2))
+    targets = np.array([scene.goals[0], wrong[1], wrong[1], scene.goals[1], scene.goals[2]])
+    assert said(scene, scene.goals, schedule=schedule, targets=targets).code == "ok"
+    targets[3] = wrong[1]
+    found = said(scene, wrong, schedule=schedule, targets=targets)
+    assert (found.operation, found.code) == (2, "residual")
+
+
+def test_the_frame_of_the_world_does_not_matter_and_nothing_is_changed() -> None:
+    scene = scenes.pockets()
+    turned = scenes.turned(scene, pose.at((0.1, -0.2, 0.0), (0, 0, 35.0)))
+    goals = off(turned, 2, scenes.mm(1, 0, 0))
+    kept = goals.copy()
+    found = said(turned, goals)
+    plain = said(scene, off(scene, 2, scenes.mm(1, 0, 0)))
+    assert (found.operation, found.code) == (plain.operation, plain.code) == (5, "residual")
+    assert found.size_mm == pytest.approx(plain.size_mm)
+    np.testing.assert_array_equal(goals, kept)
+
+
+@pytest.mark.parametrize(("mm", "leans"), [(29.0, False), (31.0, True)])
+def test_a_part_that_stays_does_not_lean_on_what_lies_above(mm: float, leans: bool) -> None:
+    """The stick in the tower, its middle beside castle 1: castle 2 keeps it from falling, clearances let it lean."""
+    scene = scenes.stick_in_tower()
+    found = said(scene, off(scene, 3, scenes.mm(mm, 0, 0)))
+    assert (found.fails, found.code) == (leans, "residual" if leans else "ok")
+    assert found.mendable == leans
+    assert (
+        predict(Plan(scene.assembly, scene.start, off(scene, 3, scenes.mm(mm, 0, 0))), 0.05, Thresholds()).code == "ok"
+    )
+
+
+ROUND_WAYS = {
+    "peg_in_plate": [(0, 0, -1)] * 2,
+    "loose_peg": [(0, 0, -1)] * 2,
+    "nested": [(0, 0, -1)] * 3,
+    "through": [(0, -1, 0), (0, -1, 0), (0, 0, 1)],
+    "in_groove": [(0, 0, -1), (1, 0, 0)],
+    "on_table": [(1, 0, 0)],
+    "countersink": [(0, 0, -1)] * 2,
+    "on_rim": [(0, 0, -1)] * 2,
+    "wedges_meet": [(0, 0, -1), (0, 0, 1)],
+    "dovetail": [(0, 0, -1), (1, 0, 0)],
+}
+"""Of each scene the ways in, in the frame of the part."""
+
+
+def round_ways(name: str) -> list[Attach]:
+    """Long enough to begin beside everything."""
+    return [Attach(np.array(way, dtype=np.float64), 0.15) for way in ROUND_WAYS[name]]
+
+
+@pytest.mark.parametrize("name", rounds.ALL)
+def test_round_and_tilted_parts_fit(name: str) -> None:
+    scene = rounds.ALL[name]()
+    found = said(scene, scene.goals, round_ways(name))
+    assert (found.fails, found.code) == (False, "ok")
+    assert found.size_mm == pytest.approx(0.0, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "operation", "T", "code", "size_mm"),
+    [
+        ("peg_in_plate", 2, scenes.mm(0.34, 0, 0), "ok", 0.34),
+        ("peg_in_plate", 2, scenes.mm(0.3, 0.4, 0), "residual", 0.5),
+        ("peg_in_plate", 2, scenes.mm(0, 0, 8), "ok", 0.0),
+        ("peg_in_plate", 2, scenes.mm(0, 0, 0, (2, 0, 0)), "residual", 20 * np.tan(np.radians(2))),
+        ("loose_peg", 2, scenes.mm(0.25, 0, 0), "residual", 0.25),
+        ("through", 3, scenes.mm(0, 0, 12), "ok", 0.0),
+        ("countersink", 2, scenes.mm(0.2, 0, 0), "residual", 0.2),
+        ("on_rim", 2, scenes.mm(0, 0, 0, (2, 0, 0)), "ok", 2 * np.sin(np.radians(2))),
+        ("in_groove", 2, scenes.mm(-0.7, 0.6, 0, (0, 1, 0)), "ok", 0.0),
+        ("dovetail", 2, scenes.mm(0, 0.7, 0), "residual", 0.7 * np.sin(np.radians(60))),
+    ],
+)
+def test_round_and_tilted_parts_that_are_planned_wrongly(
+    name: str, operation: int, T: Array, code: str, size_mm: float
+) -> None:
+    scene = rounds.ALL[name]()
+    found = said(scene, off(scene, operation, T), round_ways(name))
+    assert found.code == code
+    assert found.size_mm == pytest.approx(size_mm, abs=1e-3)
+
+
+@pytest.mark.parametrize(("low_mm", "fails"), [(0.0, True), (0.25, False)])
+def test_walls_may_be_apart_by_the_play_of_all_faces_together(low_mm: float, fails: bool) -> None:
+    """As the judge has it: a slide that lies lower on its receded floor has more room between its leaning walls."""
+    scenario = load_scenario("dovetail")
+    goals = scenario.goals.copy()
+    goals[-1] = goals[-1] @ scenes.mm(0, 0.5, -low_mm)
+    found = predict(
+        Plan(scenario.assembly, scenario.start, goals), scenario.clearance_mm, scenario.thresholds, scenario.attach
+    )
+    assert found.fails == fails
+
+
+def test_a_plate_comes_to_rest_on_a_shaft() -> None:
+    """The plane is the part that moves."""
+    peg_on = Operation("peg", touch("peg", "table", "wall-top"))
+    block_on = Operation("block", touch("block", "peg", "nz-wall"))
+    goals = [scenes.mm(0, 0, 5, (0, 90, 0)), scenes.mm(25, 0, 35)]
+    scene = scenes.scene([scenes.table(), rounds.peg(), scenes.block()], [peg_on, block_on], goals)
+    before, _ = placements(scene.assembly, scene.start, scene.goals)
+    brought = {**before, "block": goals[1] @ scenes.mm(0, 0, 0.8, (0, 1.0, 0))}
+    rests = resting_poses(scene.assembly, block_on, brought)
+    assert residual(scene.assembly, block_on.contacts[0], rests)[0] == pytest.approx(np.zeros(2), abs=1e-9)
+    e, n = residual(scene.assembly, block_on.contacts[0], brought)
+    assert (e.mean(), n[2]) == pytest.approx((0.8e-3, -1.0), abs=2e-4)
+
+
+def by_arm(k: int, **made: object) -> Prediction:
+    """The true goals of the stick in the tower, one operation of which an arm does like this."""
+    scene = scenes.ALL["stick_in_tower"]()
+    plan = Plan(scene.assembly, scene.start, scene.goals)
+    moves = [ArmMove(i, **(made if i == k else {})) for i in range(len(scene.goals))]
+    return predict(plan, CLEARANCE_MM, Thresholds(), ways(scene), moves)
+
+
+def test_what_an_arm_cannot_do_is_foretold() -> None:
+    last = len(scenes.ALL["stick_in_tower"]().goals) - 1
+    assert by_arm(last).code == "ok"
+    short = by_arm(last, refused="unreachable", at_limit="j4")
+    assert (short.operation, short.code, short.size_mm) == (last, "unreachable", None)
+    assert short.sentence.endswith("the arm does not reach the goal, or the way to it: its joint 'j4' is at its limit")
+    assert by_arm(1, struck="foot", struck_mm=0.9).code == "ok"
+    narrow = by_arm(1, struck="foot", struck_mm=1.1)
+    assert (narrow.operation, narrow.code, narrow.size_mm) == (1, "gripper_room", 1.1)
+    assert "in 'foot'" in narrow.sentence
+
+
+def test_the_error_of_a_tip_counts_where_something_enters() -> None:
+    last = len(scenes.ALL["stick_in_tower"]().goals) - 1
+    assert by_arm(0, beside_mm=5.0).code == "ok"
+    assert by_arm(last, beside_mm=CLEARANCE_MM - 0.01).code == "ok"
+    soft = by_arm(last, beside_mm=CLEARANCE_MM + 0.01)
+    assert (soft.operation, soft.code) == (last, "tip_error")
+    assert soft.size_mm == pytest.approx(CLEARANCE_MM + 0.01)
+    assert by_arm(last, sag=scenes.mm(0, 0, -0.3)).code == "tip_error"

@@ -1,0 +1,121 @@
+"""Which planned goals would not hold a part."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.testing import assert_array_equal
+
+from apo_bench.assembly import Operation
+from apo_bench.geometry import Array, pose
+from apo_bench.planning.prediction.stability import first_unstable
+from tests import rounds, scenes
+
+pytestmark = pytest.mark.numeric
+
+
+def falls(scene: scenes.Scene, operation: int, T: Array) -> int | None:
+    """The verdict if that operation (from 1) had another goal, displaced in the frame of its part; counted from 1."""
+    goals = scene.goals.copy()
+    goals[operation - 1] = goals[operation - 1] @ T
+    found = first_unstable(scene.assembly, scene.start, goals)
+    return None if found is None else found + 1
+
+
+@pytest.mark.parametrize("build", [*scenes.ALL.values(), *rounds.ALL.values()])
+def test_the_examples_of_the_paper_and_round_parts_stand(build) -> None:
+    scene = scenes.turned(build(), pose.at((0.1, 0.05, 0.0), (0.0, 0.0, 37.0)))
+    assert first_unstable(scene.assembly, scene.start, scene.goals) is None
+
+
+@pytest.mark.parametrize("build", [scenes.stick_in_tower, rounds.in_groove, rounds.dovetail])
+def test_noise_alone_topples_nothing(build) -> None:
+    scene = build()
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        goals = scenes.noisy(scene.goals, rng, 1.0, 1.0)
+        assert first_unstable(scene.assembly, scene.start, goals) is None
+
+
+@pytest.mark.parametrize(("beyond_mm", "expected"), [(-1.0, None), (1.0, 1)])
+def test_castle_over_the_edge_of_the_table(beyond_mm: float, expected: int | None) -> None:
+    """The table ends at x = 700; the centre of the castle decides."""
+    put = Operation("castle", scenes.touch("castle", "table", "bottom-top"))
+    alone = scenes.scene([scenes.table(), scenes.castle()], [put], [scenes.mm(700, 0, 0)])
+    assert falls(alone, 1, scenes.mm(beyond_mm, 0, 0)) == expected
+
+
+@pytest.mark.parametrize(("along_mm", "expected"), [(95.0, None), (-105.0, 3)])
+def test_stick_whose_centre_lies_beside_its_supports(along_mm: float, expected: int | None) -> None:
+    """The slots carry it from x = -100 to 100."""
+    assert falls(scenes.stick_on_castles(), 3, scenes.mm(along_mm, 0, 0)) == expected
+
+
+def test_stick_in_a_closed_hole_is_held_like_a_cantilever() -> None:
+    """Its centre hangs 60 mm out; the floor pushes up at the mouth, the ceiling down at the far end."""
+    assert falls(scenes.stick_in_tower(), 3, scenes.mm(60, 0, 0)) is None
+
+
+def test_a_ceiling_alone_carries_nothing() -> None:
+    hung = Operation("stick", scenes.touch("stick", "castle2", "pz-sfl"))
+    operations = (*scenes.stick_in_tower().assembly.operations[:2], hung)
+    solids = [scenes.table(), scenes.castle("castle1"), scenes.castle("castle2"), scenes.stick()]
+    assert falls(scenes.scene(solids, operations, list(scenes.stick_in_tower().goals)), 3, np.eye(4)) == 3
+
+
+@pytest.mark.parametrize("pairs", [(), ("py-spy", "ny-sny")])
+def test_without_floor_or_ceiling_nothing_is_claimed(pairs: tuple[str, ...]) -> None:
+    held = Operation("stick", scenes.touch("stick", "castle1", *pairs))
+    operations = (*scenes.stick_on_castles().assembly.operations[:2], held)
+    solids = [scenes.table(), scenes.castle("castle1"), scenes.castle("castle2"), scenes.stick()]
+    scene = scenes.scene(solids, operations, list(scenes.stick_on_castles().goals))
+    assert falls(scene, 3, scenes.mm(0, 0, 200)) is None
+
+
+def test_floors_too_steep_claim_nothing() -> None:
+    scene = scenes.stick_on_castles()
+    tilted = scenes.turned(scene, pose.at((0, 0, 0), (40.0, 0, 0)))
+    far = tilted.goals.copy()
+    far[2] = far[2] @ scenes.mm(105, 0, 0)
+    assert first_unstable(tilted.assembly, tilted.start, far) is None
+
+
+def test_what_is_carried_weighs_too() -> None:
+    """A cube in the air holds a long stick; it stands as long as the common centre is above the castles."""
+    scene = scenes.subassembly_on_castles()
+    assert falls(scene, 5, scenes.mm(98, 0, 0)) is None
+    # The stick hangs 60 mm out of the cube: 37.5 per cent of the mass, so the centre moves by about a third of that.
+    goals = scene.goals.copy()
+    goals[3] = goals[3] @ scenes.mm(60, 0, 0)
+    goals[4] = goals[4] @ scenes.mm(85, 0, 0)
+    assert first_unstable(scene.assembly, scene.start, goals) == 4
+    goals[4] = goals[4] @ scenes.mm(-25, 0, 0)
+    assert first_unstable(scene.assembly, scene.start, goals) is None
+
+
+def test_the_first_unstable_operation_is_named_and_nothing_is_changed() -> None:
+    scene = scenes.stick_on_castles()
+    goals = scene.goals.copy()
+    goals[1] = goals[1] @ scenes.mm(700, 0, 0)
+    goals[2] = goals[2] @ scenes.mm(300, 0, 0)
+    before = goals.copy()
+    assert first_unstable(scene.assembly, scene.start, goals) == 1
+    assert_array_equal(goals, before)
+
+
+@pytest.mark.parametrize(
+    ("build", "operation", "T", "expected"),
+    [
+        (rounds.through, 3, scenes.mm(0, 0, 90), None),
+        (rounds.through, 3, scenes.mm(0, 0, 110), 3),
+        (rounds.in_groove, 2, scenes.mm(0, 0, 38), None),
+        (rounds.in_groove, 2, scenes.mm(0, 0, 42), 2),
+        (rounds.peg_in_plate, 2, scenes.mm(0, 0, 0, (0, 0, 40)), None),
+        (rounds.wedges_meet, 2, scenes.mm(0, 45, 0), 2),
+        (rounds.dovetail, 2, scenes.mm(50, 0, 0), None),
+        (rounds.dovetail, 2, scenes.mm(81, 0, 0), 2),
+    ],
+)
+def test_what_carries_round_and_tilted_parts(build, operation: int, T: Array, expected: int | None) -> None:
+    """A bore holds a shaft like a cantilever; the groove and the slope carry what has its centre over them."""
+    assert falls(build(), operation, T) == expected

@@ -1,0 +1,301 @@
+"""Part files: shapes against numbers written by hand, unions against counted cells, broken files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import mujoco
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from apo_bench import InputError, build_scene, load_scenario
+from apo_bench.geometry import Box, face_area, union_mesh
+from apo_bench.resources import folder
+from apo_bench.scenario.parts import load_part, part_names, part_path
+from apo_bench.scenario.parts.allowed import LARGEST_PART_BYTES, MOST_FACES
+from apo_bench.scenario.parts.faces import SIDES, unite
+
+SIX = ("px", "nx", "py", "ny", "pz", "nz")
+POCKETS = tuple(f"{pocket}_{wall}" for pocket in "AB" for wall in ("px", "nx", "py", "ny"))
+
+NAMED = {
+    "block": SIX,
+    "bridge": SIX,
+    "stick": SIX,
+    "cube": (*SIX, "hpy", "hny", "hpz", "hnz"),
+    "castle": ("px", "nx", "py", "ny", "bottom", "topP", "topN", "sfl", "spy", "sny"),
+    "table": ("top",),
+    "table_pockets": ("top", "A_fl", "B_fl", *POCKETS),
+}
+VOLUME_MM3 = {
+    "block": 50**3,
+    "bridge": 100 * 50 * 20,
+    "stick": 220 * 20 * 20,
+    "cube": 50**3 - 50 * 20 * 20,
+    "castle": 60 * 60 * 40 - 60 * 20 * 10,
+    "table": 1400 * 1200 * 20,
+    "table_pockets": 1400 * 1200 * 20 - 2 * 50 * 50 * 6,
+}
+CASTLE = {  # normal, its coordinate [mm], corners, area [mm^2]
+    "px": ((1, 0, 0), 30, 8, 60 * 40 - 200),
+    "nx": ((-1, 0, 0), 30, 8, 60 * 40 - 200),
+    "py": ((0, 1, 0), 30, 4, 60 * 40),
+    "ny": ((0, -1, 0), 30, 4, 60 * 40),
+    "bottom": ((0, 0, -1), 0, 4, 60 * 60),
+    "topP": ((0, 0, 1), 40, 4, 60 * 20),
+    "topN": ((0, 0, 1), 40, 4, 60 * 20),
+    "sfl": ((0, 0, 1), 30, 4, 60 * 20),
+    "spy": ((0, -1, 0), -10, 4, 60 * 10),
+    "sny": ((0, 1, 0), -10, 4, 60 * 10),
+}
+
+
+def test_the_package_has_the_parts_of_the_toy_world_and_those_that_a_script_makes():
+    made = {name for name in part_names() if part_path(name).with_suffix(".toml").exists()}
+    assert set(part_names()) - made == set(NAMED)
+
+
+@pytest.mark.parametrize("name", sorted(NAMED))
+def test_names_volume_and_exact_coordinates(name: str):
+    solid = load_part(name)
+    assert {face for face in solid.faces if not face.startswith("auto_")} == set(NAMED[name])
+    assert solid.volume == pytest.approx(1e-9 * VOLUME_MM3[name], rel=1e-12)
+    for face in solid.faces.values():
+        corners = np.concatenate([face.outline, *face.holes]) * 1e3
+        assert np.abs(corners - corners.round()).max() < 1e-6, "every corner of these parts lies on whole millimetres"
+
+
+@pytest.mark.parametrize("name", sorted(NAMED))
+def test_the_faces_close_the_solid(name: str):
+    """Areas along opposite directions are equal, and the divergence theorem gives the volume."""
+    faces = load_part(name).faces.values()
+    assert np.abs(sum(face_area(f) * f.normal for f in faces)).max() < 1e-12
+    flux = sum(face_area(f) * f.normal @ f.outline[0] for f in faces)
+    assert flux / 3 == pytest.approx(1e-9 * VOLUME_MM3[name], rel=1e-9)
+
+
+@pytest.mark.parametrize("name", sorted(CASTLE))
+def test_the_faces_of_the_castle(name: str):
+    normal, distance, corners, square_mm = CASTLE[name]
+    face = load_part("castle").faces[name]
+    assert face.plane == pytest.approx((*normal, -1e-3 * distance), abs=1e-12)
+    assert len(face.outline) == corners
+    assert face_area(face) == pytest.approx(1e-6 * square_mm)
+    assert not face.fit
+
+
+def test_centroids_in_the_part_frame():
+    assert load_part("castle").centroid == pytest.approx((0, 0, (144 * 20 - 12 * 35) / 132 * 1e-3), abs=1e-12)
+    assert load_part("cube").centroid == pytest.approx((0, 0, 0), abs=1e-12)
+
+
+def test_faces_without_a_site_are_named_by_direction_and_place():
+    first, second = (list(load_part("table").faces) for _ in range(2))
+    assert first == second
+    assert first == ["top", "auto_px_1", "auto_nx_1", "auto_py_1", "auto_ny_1", "auto_nz_1"]
+
+
+cells = st.lists(st.tuples(*[st.integers(0, 3)] * 3, *[st.integers(1, 3)] * 3), min_size=1, max_size=5)
+
+
+@given(cells)
+@settings(max_examples=30, deadline=None)
+def test_a_union_is_what_counted_cells_say(spans: list[tuple[int, ...]]):
+    """An independent count on a grid of unit cells: volume, centroid, and the area that looks along each direction."""
+    full = np.zeros((8, 8, 8), bool)
+    boxes = []
+    for k, (x, y, z, dx, dy, dz) in enumerate(spans):
+        full[x + 1 : x + dx + 1, y + 1 : y + dy + 1, z + 1 : z + dz + 1] = True
+        low = 0.01 * np.array([x, y, z])
+        size = 0.01 * np.array([dx, dy, dz])
+        boxes.append(Box(f"b{k}", low + size / 2, size / 2))
+    union = unite(boxes)
+    assert union.volume == pytest.approx(1e-6 * full.sum(), rel=1e-9)
+    assert union.centroid == pytest.approx(0.01 * (np.argwhere(full).mean(axis=0) - 0.5), abs=1e-9)
+    for side in range(len(SIDES)):
+        axis = side // 2
+        step = 1 - 2 * (side % 2)
+        bare = full & ~np.roll(full, -step, axis=axis)
+        areas = sum(surface.shape.area for surface in union.surfaces if surface.side == side)
+        assert areas == pytest.approx(1e-4 * bare.sum(), abs=1e-10)
+        heights = {round(s.height * 100) for s in union.surfaces if s.side == side}
+        assert heights == {i - (step < 0) for i in np.argwhere(bare)[:, axis]}
+
+
+GOOD = """<mujoco model="thing">
+  <default>
+    <geom type="box"/>
+    <default class="fit"><site size="0.002"/></default>
+  </default>
+  <worldbody>
+    <body name="thing">
+      <geom name="low" pos="0 0 0.01" size="0.02 0.02 0.01"/>
+      <geom name="high" pos="0 0 0.03" size="0.01 0.02 0.01"/>
+      <site name="foot" pos="0 0 0"/>
+      <site name="side" class="fit" pos="0.02 0 0.01"/>
+    </body>
+  </worldbody>
+</mujoco>
+"""
+FIT = '<default class="fit"><site size="0.002"/></default>'
+HIGH = '<geom name="high" pos="0 0 0.03" size="0.01 0.02 0.01"/>'
+FOOT = '<site name="foot" pos="0 0 0"/>'
+
+BROKEN = {
+    "not mjcf": (GOOD, "<body/>", "MuJoCo cannot read this part file"),
+    "no body": (GOOD, "<mujoco><worldbody/></mujoco>", "one <body>"),
+    "two bodies": ("</worldbody>", '<body name="other"/></worldbody>', "one <body>"),
+    "a joint": (FOOT, "<freejoint/>", "the part has joints"),
+    "a moved body": ('<body name="thing">', '<body name="thing" pos="0 0 1">', "has a pose"),
+    "an included file": ("<worldbody>", '<include file="x.xml"/><worldbody>', "<include> is given"),
+    "an inertia": (FOOT, FOOT + '<inertial pos="0 0 1" mass="1" diaginertia="1 1 1"/>', "an inertia"),
+    "a sphere": (HIGH, '<geom name="high" type="sphere" size="0.01"/>', "another type than box"),
+    "no size": ('size="0.01 0.02 0.01"', "", "needs half sizes"),
+    "two densities": ('size="0.01 0.02 0.01"', 'size="0.01 0.02 0.01" density="600"', "one density"),
+    "too light": ('<geom type="box"/>', '<geom type="box" density="1"/>', "weighs 4.8e-05 kg"),
+    "a turned box": ('name="high"', 'name="high" euler="0 0 45"', "is turned or has a mass"),
+    "a name with a dot": ('name="high"', 'name="a.b"', "'a.b' is no name"),
+    "a flat box": ('size="0.01 0.02 0.01"', 'size="0.01 0 0.01"', "needs half sizes from 0.0005 m"),
+    "far away": ('pos="0 0 0.03"', 'pos="0 0 1e9"', "none farther away than 10 m"),
+    "two names of a face": (FOOT, FOOT + '<site name="sole" pos="0.01 0 0"/>', "'foot' and 'sole' lie on one face"),
+    "a site in the air": (FOOT, '<site name="foot" pos="0 0 -0.01"/>', "'foot' at (0, 0, -10) mm lies on no face"),
+    "a kept name": ('name="foot"', 'name="auto_foot"', "auto_"),
+    "two pieces": ('pos="0 0 0.03"', 'pos="0 0 0.3"', "2 separate solids"),
+}
+
+
+@pytest.mark.parametrize("fault", sorted(BROKEN))
+def test_a_broken_part_file_is_refused_in_one_sentence(fault: str, tmp_path: Path):
+    old, new, words = BROKEN[fault]
+    assert GOOD.count(old) == 1
+    path = tmp_path / "thing.xml"
+    path.write_text(GOOD.replace(old, new))
+    with pytest.raises(InputError) as error:
+        load_part(path)
+    message = str(error.value)
+    assert words in message
+    assert message.startswith(str(path))
+    assert message.endswith(".")
+    assert "\n" not in message
+
+
+def test_missing_files_and_folders(tmp_path: Path):
+    for name, words in (
+        (tmp_path, "a folder was given"),
+        (tmp_path / "none.xml", "No such file"),
+        ("castel", "did you mean 'castle'"),
+    ):
+        with pytest.raises(InputError, match=words):
+            load_part(name)
+    binary = tmp_path / "binary.xml"
+    binary.write_bytes(bytes(range(256)))
+    with pytest.raises(InputError, match="not UTF-8 text"):
+        load_part(binary)
+
+
+@pytest.mark.parametrize("name", sorted(NAMED))
+def test_the_simulator_reads_the_same_boxes(name: str):
+    model = mujoco.MjModel.from_xml_path(str(part_path(name)))
+    for box in load_part(name).pieces:
+        geom = model.geom(box.name)
+        assert geom.type == mujoco.mjtGeom.mjGEOM_BOX
+        assert geom.pos == pytest.approx(box.center)
+        assert geom.size == pytest.approx(box.half)
+        assert geom.friction == pytest.approx((0.8, 0.005, 0.0001))
+    assert {model.site(i).name for i in range(model.nsite)} == set(NAMED[name])
+
+
+@given(cells)
+@settings(max_examples=30, deadline=None)
+def test_a_mesh_of_the_same_boxes_has_the_same_matter(spans: list[tuple[int, ...]]):
+    """Also where the surface touches itself along an edge or in a corner."""
+    boxes = [
+        Box(f"b{k}", 0.01 * (np.array(low) + np.array(size) / 2), 0.005 * np.array(size))
+        for k, (*low, sx, sy, sz) in enumerate(spans)
+        for size in [(sx, sy, sz)]
+    ]
+    union = unite(boxes)
+    mesh = union_mesh(boxes)
+    assert mesh.volume == pytest.approx(union.volume, rel=1e-6)
+    assert mesh.center_mass == pytest.approx(union.centroid, abs=1e-7)
+
+
+SCENARIO = (folder("scenarios") / "stick_in_tower.toml").read_text(encoding="utf-8")
+
+
+def with_own_stick(tmp_path: Path, text: str) -> Path:
+    """A scenario file whose stick is this part file."""
+    (tmp_path / "rod.xml").write_text(text, encoding="utf-8")
+    file = tmp_path / "mine.toml"
+    file.write_text(SCENARIO.replace('file = "stick"', 'file = "rod.xml"'), encoding="utf-8")
+    return file
+
+
+def test_a_scene_does_not_take_a_part_that_has_changed_since(tmp_path: Path):
+    whole = part_path("stick").read_text(encoding="utf-8")
+    scenario = load_scenario(with_own_stick(tmp_path, whole))
+    with_own_stick(tmp_path, whole.replace('"bar"', '"rod"'))
+    with pytest.raises(InputError, match="load the scenario again"):
+        build_scene(scenario)
+
+
+def test_only_shape_place_and_matter_of_a_part_reach_the_physics(tmp_path: Path):
+    """The rest of what MuJoCo understands is the scene's business."""
+    whole = part_path("stick").read_text(encoding="utf-8")
+    more = whole.replace("<geom type", '<geom margin="1" condim="6" solmix="9" priority="7" type')
+    more = more.replace("<worldbody>", '<option gravity="0 0 -1" timestep="0.5"/><worldbody>')
+    models = [build_scene(load_scenario(with_own_stick(tmp_path, text))).work.model for text in (whole, more)]
+    images = []
+    for model in models:
+        image = np.zeros(mujoco.mj_sizeModel(model), dtype=np.uint8)
+        mujoco.mj_saveModel(model, None, image)
+        images.append(image.tobytes())
+    assert images[0] == images[1]
+
+
+def test_density_and_friction_of_a_part_reach_the_physics(tmp_path: Path):
+    said = 'density="2" friction="0.01"'
+    whole = part_path("stick").read_text(encoding="utf-8").replace('density="600" friction="0.8 0.005 0.0001"', said)
+    model = build_scene(load_scenario(with_own_stick(tmp_path, whole))).work.model
+    assert model.geom("stick/bar").friction == pytest.approx((0.01, 0.005, 0.0001))
+    assert model.body("stick/").subtreemass == pytest.approx(2 * 0.22 * 0.0195**2)
+
+
+def test_costly_files_are_refused(tmp_path: Path):
+    """Three combs in each other make thousands of small faces out of a hundred boxes."""
+    boxes = ""
+    for axis in range(3):
+        for k in range(33):
+            size = ["0.05"] * 3
+            at = ["0"] * 3
+            size[axis] = "0.0005"
+            at[axis] = f"{0.003 * (k - 16):.4f}"
+            boxes += f'<geom name="b{axis}_{k}" size="{" ".join(size)}" pos="{" ".join(at)}"/>'
+    path = tmp_path / "thing.xml"
+    path.write_text(GOOD.partition("<geom name")[0] + boxes + "</body></worldbody></mujoco>")
+    with pytest.raises(InputError, match=f"more than {MOST_FACES} faces"):
+        load_part(path)
+    path.write_text(GOOD + " " * LARGEST_PART_BYTES)
+    with pytest.raises(InputError, match="larger than 4 MB"):
+        load_part(path)
+
+
+def test_no_file_of_somebody_else_is_read(tmp_path: Path):
+    """Neither included, nor as an entity, nor as a picture outside of the folder of the part."""
+    secret = tmp_path / "secret.xml"
+    secret.write_text("<mujoco><default><geom density='77'/></default></mujoco>")
+    path = tmp_path / "own" / "thing.xml"
+    path.parent.mkdir()
+    entity = f'<!DOCTYPE m [<!ENTITY a SYSTEM "file://{secret}">]>{GOOD.replace("<worldbody>", "&a;<worldbody>")}'
+    looks = '<geom name="looks" type="mesh" mesh="m" contype="0" conaffinity="0"/>'
+    picture = GOOD.replace("<worldbody>", '<asset><mesh name="m" file="../secret.stl"/></asset><worldbody>')
+    for text in (
+        GOOD.replace("<worldbody>", f'<include file="{secret}"/><worldbody>'),
+        entity,
+        picture.replace(FOOT, FOOT + looks),
+    ):
+        path.write_text(text)
+        with pytest.raises(InputError):
+            load_part(path)

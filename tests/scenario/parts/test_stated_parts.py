@@ -1,0 +1,254 @@
+"""Faces, matter and pieces of parts that are not boxes alone: what does not agree is refused in one sentence."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from apo_bench import InputError, build_scene, load_scenario
+from apo_bench.geometry import physical_pieces
+from apo_bench.resources import folder
+from apo_bench.scenario.parts import load_part, part_names, part_path, read_part
+from apo_bench.scenario.parts.checking import check_part
+from apo_bench.scenario.parts.making import bore, circle, extrude, join, rectangle, shaft, write_part
+from apo_bench.scenario.parts.stated import _across
+
+MADE = join(
+    extrude(
+        rectangle(40, 40, names=("ny", "px", "py", "nx")),
+        0,
+        10,
+        bores=[bore((-8, 0), 3, 0, 10, "bore", fit=True)],
+        bottom="bottom",
+        top="top",
+    ),
+    shaft(4, 10, 22, "pin", chamfer_high=1, top="tip").moved((10, 0, 0)),
+)
+
+
+@pytest.fixture
+def part(tmp_path: Path) -> Path:
+    return write_part("thing", MADE, tmp_path, density=2700.0, source="a test", licence="Apache-2.0")
+
+
+def refusal(path: Path) -> str:
+    with pytest.raises(InputError) as refused:
+        load_part(path)
+    message = str(refused.value)
+    assert message.startswith((str(path), str(path.with_suffix(".toml"))))
+    assert message.endswith(".")
+    assert "\n" not in message
+    assert len(message) < 2 * len(str(path)) + 320
+    return message
+
+
+def test_the_part_loads_with_its_matter(part: Path) -> None:
+    file = read_part(part)
+    assert file.density == 2700.0
+    assert {geom.density for geom in file.model.geoms} == {2700.0}
+    assert file.stated is not None
+
+
+OUTLINE = r"(?s)(\[faces\.nx\].*?)outline_mm = .*?\n"
+FACES = {
+    "another schema": (r"part/1", "part/9", '"apo-bench/part/1" is needed'),
+    "another volume": (r"volume_mm3 = .*", "volume_mm3 = 17000.0", "volume_mm3: 17000 is stated"),
+    "a centroid elsewhere": (r"centroid_mm = .*", "centroid_mm = [1, 0, 5]", "centroid_mm: that of the pieces is"),
+    "an inertia in other units": (r"inertia_mm5 = .*", "inertia_mm5 = [1, 1, 1, 0, 0, 0]", "inertia_mm5: that of"),
+    "much friction": (r"friction = .*", "friction = 99", "friction: 1 to 3 numbers"),
+    "a name with a dot": (r"\[faces\.top\]", '[faces."top.most"]', "letters, digits and underscores"),
+    "another kind": (r'kind = "plane"', 'kind = "torus"', '"plane" or "cylinder" or "cone" or "rim" is needed'),
+    "off its plane": (
+        OUTLINE,
+        r"\1outline_mm = [[-20, -20, 0], [-20, -20, 10], [-20, 20, 10], [-20.1, 20, 0]]" + "\n",
+        "within 0.001 mm of one plane",
+    ),
+    "beside its sides": (
+        OUTLINE,
+        r"\1outline_mm = [[-20, -20, 0], [-20, -20, 11], [-20, 20, 11], [-20, 20, 0]]" + "\n",
+        "no side of a piece lies below the face",
+    ),
+    "no hole where the pin stands": (
+        r"(?s)(\[faces\.top\].*?)holes_mm = .*?\n",
+        r"\1",
+        "no side of a piece lies below",
+    ),
+    "a wider bore": (r"radius_mm = 3\n", "radius_mm = 3.1\n", "pieces have a side 3.0"),
+    "a narrower bore": (r"radius_mm = 3\n", "radius_mm = 2.95\n", "pieces lie along 0% of the wall"),
+    "a bore that is a shaft": (r"(?s)(\[faces\.bore\].*?)hole = true", r"\1hole = false", "pieces have a side"),
+    "a tilted axis": (r"axis = \[0, 0, 1\]", "axis = [0, 0.01, 1]", "mm is stated"),
+    "a span from end to start": (r"span_mm = \[10, 21\]", "span_mm = [21, 10]", "a start and an end"),
+    "half a turn of nothing": (r"hole = true", "hole = true\nextent_deg = 180", "extent_deg below 360 and toward"),
+    "a steeper cone": (r"radii_mm = \[4, 3\]", "radii_mm = [4, 3.2]", "of the wall"),
+    "a face twice": (
+        r"\Z",
+        '\n[faces.again]\nkind = "plane"\noutline_mm = [[-20, -20, 0], [-20, -20, 10], [-20, 20, 10], [-20, 20, 0]]\n',
+        "the face lies on 'nx'",
+    ),
+    "a wall twice": (
+        r"\Z",
+        '\n[faces.again]\nkind = "cylinder"\nat_mm = [10, 0, 0]\naxis = [0, 0, 1]\nradius_mm = 4\n'
+        "span_mm = [12, 20]\nhole = false\n",
+        "the face lies on 'pin'",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", FACES)
+def test_what_is_stated_must_be_so(case: str, part: Path) -> None:
+    old, new, words = FACES[case]
+    beside = part.with_suffix(".toml")
+    text, count = re.subn(old, new, beside.read_text(encoding="utf-8"), count=1)
+    assert count == 1
+    beside.write_text(text, encoding="utf-8")
+    assert words in refusal(part)
+
+
+PIECES = {
+    "no corners": (r' vertex="[^"]*"', "", "needs a mesh with vertex="),
+    "three corners": (r'vertex="[^"]*"', 'vertex="0 0 0 1 0 0 0 1 0"', "needs 4 corners"),
+    "a flat piece": (r'vertex="[^"]*"', 'vertex="0 0 0 1 0 0 0 1 0 1 1 0"', "is flat"),
+    "a corner twice": (r'vertex="[^"]*"', 'vertex="0 0 0 1 0 0 0 1 0 0 0 1 0 0 0"', "has a corner twice"),
+    "a corner inside": (r'vertex="[^"]*"', 'vertex="0 0 0 1 0 0 0 1 0 0 0 1 .1 .1 .1"', "is not convex: its corner 5"),
+    "a mesh of two geoms": (r'mesh="p2"', 'mesh="p1"', "each mesh belongs to one geom"),
+    "a wide cylinder": (r'size="0.004 ', 'size="0.4 ', "has a radius of 0.4 m; 0.1 is the most"),
+    "a turned mesh": (r'mesh="p2"', 'mesh="p2" zaxis="1 0 0"', "has zaxis=, which only a cylinder has"),
+    "a cylinder along nothing": (r'zaxis="0 0 1"', 'zaxis="0 0 0"', "has a zaxis= of no length"),
+    "a site": (r"</body>", '<site name="s" pos="0 0 0"/></body>', "sites name faces of boxes alone"),
+    "a piece far away": (r'type="cylinder" pos="[0-9.]* ', 'type="cylinder" pos="0.5 ', "separate solids"),
+}
+
+
+@pytest.mark.parametrize("case", PIECES)
+def test_pieces_must_be_convex_and_one(case: str, part: Path) -> None:
+    old, new, words = PIECES[case]
+    text, count = re.subn(old, new, part.read_text(encoding="utf-8"), count=1)
+    assert count == 1
+    part.write_text(text, encoding="utf-8")
+    assert words in refusal(part)
+
+
+def test_the_file_beside_it_must_be_there(part: Path) -> None:
+    part.with_suffix(".toml").unlink()
+    assert "the file that states the faces of a part" in refusal(part)
+
+
+def test_beside_boxes_alone_any_file_may_lie(tmp_path: Path) -> None:
+    path = write_part("step", extrude(rectangle(40, 40), 0, 10, top="top"), tmp_path, source="a test", licence="none")
+    assert not path.with_suffix(".toml").exists()
+    path.with_suffix(".toml").write_text("a scenario, perhaps", encoding="utf-8")
+    assert "top" in load_part(path).faces
+
+
+def stl(triangles: np.ndarray) -> bytes:
+    """A binary STL file."""
+    row = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("spare", "<u2")])
+    rows = np.zeros(len(triangles), dtype=row)
+    rows["corners"] = triangles
+    return bytes(80) + len(triangles).to_bytes(4, "little") + rows.tobytes()
+
+
+TETRAHEDRON = 0.01 * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]], dtype=np.float64)
+TRIANGLES = TETRAHEDRON[[[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]]
+PICTURE = '<geom name="looks" type="mesh" mesh="looks" contype="0" conaffinity="0"/>'
+
+
+def with_picture(part: Path, geom: str, file: str = "looks.stl") -> None:
+    text = part.read_text(encoding="utf-8")
+    text = text.replace("</asset>", f'<mesh name="looks" file="{file}"/></asset>').replace("</body>", geom + "</body>")
+    part.write_text(text, encoding="utf-8")
+
+
+def test_a_picture_is_shown_and_never_collides(part: Path, tmp_path: Path) -> None:
+    pieces = load_part(part).pieces
+    with_picture(part, PICTURE)
+    (part.parent / "looks.stl").write_bytes(stl(TRIANGLES))
+    assert [piece.name for piece in load_part(part).pieces] == [piece.name for piece in pieces]
+    assert read_part(part).files == (part, part.parent / "looks.stl", part.with_suffix(".toml"))
+    file = tmp_path / "mine.toml"
+    text = (folder("scenarios") / "stick_in_tower.toml").read_text(encoding="utf-8")
+    more = '[parts.thing]\nfile = "thing.xml"\nfixed = true\nstart = { at_mm = [-300, 300, 0] }\n\n[site]'
+    file.write_text(text.replace("\n[site]", f"\n{more}"), encoding="utf-8")
+    model = build_scene(load_scenario(file)).work.model
+    looks = model.geom("thing/looks")
+    assert (looks.contype[0], looks.conaffinity[0], looks.group[0]) == (0, 0, 1)
+    names = [model.geom(i).name for i in range(model.ngeom) if model.geom_group[i] < 3]
+    assert [name for name in names if name.startswith("thing/")] == ["thing/looks"]
+    assert model.body("thing/").subtreemass == pytest.approx(2700.0 * load_part(part).volume, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("geom", "raw", "words"),
+    [
+        (PICTURE, None, "cannot read the picture looks.stl"),
+        (PICTURE, b"solid looks\nendsolid looks\n" + bytes(200), "cannot read the picture looks.stl"),
+        (PICTURE, stl(TRIANGLES)[:-1], "cannot read the picture looks.stl"),
+        (PICTURE.replace('mesh="looks"', 'mesh="p1"'), stl(TRIANGLES), "each mesh belongs to one geom"),
+        (PICTURE + PICTURE.replace('"looks"', '"again"', 1), stl(TRIANGLES), "2 geoms never collide"),
+        (PICTURE.replace(' contype="0" conaffinity="0"', ""), stl(TRIANGLES), "needs a mesh with vertex="),
+    ],
+)
+def test_a_picture_that_is_none_is_refused(geom: str, raw: bytes | None, words: str, part: Path) -> None:
+    with_picture(part, geom)
+    if raw is not None:
+        (part.parent / "looks.stl").write_bytes(raw)
+    assert words in refusal(part)
+
+
+def test_pieces_of_many_sides_are_refused(part: Path) -> None:
+    rng = np.random.default_rng(0)
+    ball = rng.normal(size=(600, 3))
+    ball *= 0.004 / np.linalg.norm(ball, axis=1)[:, None]
+    text = part.read_text(encoding="utf-8")
+    corners = " ".join(f"{x:.9f}" for x in ball.ravel())
+    part.write_text(re.sub(r'vertex="[^"]*"', f'vertex="{corners}"', text, count=1), encoding="utf-8")
+    assert "more than 330 sides or 200 directions" in refusal(part)
+
+
+def test_a_fit_hole_whose_pieces_touch_it_in_corners_is_refused(tmp_path: Path) -> None:
+    """Triangles that fan out from corners of the wall have no side on it; where they are hardly anything of the part,
+    they recede to nothing, and the hole gets wider all around."""
+    hole = circle(5, name="bore", sides=64)
+    body = extrude(rectangle(12, 12), 0, 10, holes=[hole])
+    marked = replace(body, rounds=tuple(replace(wall, fit=True) for wall in body.rounds))
+    assert load_part(write_part("free", body, tmp_path, source="a test", licence="none")).rounds["bore"].hole
+    assert "touch it in a corner only" in refusal(write_part("fan", marked, tmp_path, source="a test", licence="none"))
+    large = extrude(rectangle(60, 40), 0, 10, holes=[hole])
+    fitting = replace(large, rounds=tuple(replace(wall, fit=True) for wall in large.rounds))
+    solid = load_part(write_part("wide", fitting, tmp_path, source="a test", licence="none"))
+    assert len(physical_pieces(solid, 2.5e-4)) < len(solid.pieces)
+    banded = extrude(rectangle(60, 40), 0, 10, holes=[circle(5, name="bore", sides=64, fit=True)])
+    assert load_part(write_part("band", banded, tmp_path, source="a test", licence="none")).fits
+
+
+@pytest.mark.parametrize("name", part_names())
+def test_parts_of_the_package_are_as_they_say(name: str) -> None:
+    """They are not held against their pieces each time that they are loaded."""
+    check_part(read_part(part_path(name)), load_part(name))
+
+
+def test_a_part_file_is_read_once_until_it_or_the_file_beside_it_changes(tmp_path: Path) -> None:
+    for suffix in (".xml", ".toml"):
+        shutil.copy(part_path("peg").with_suffix(suffix), tmp_path / f"mine{suffix}")
+    mine = tmp_path / "mine.xml"
+    first = read_part(mine)
+    assert read_part(mine) is first
+    beside = mine.with_suffix(".toml")
+    beside.write_text(beside.read_text().replace("density = ", "density = 1"))
+    assert read_part(mine).density > first.density
+    mine.write_text("<mujoco/>")
+    with pytest.raises(InputError):
+        read_part(mine)
+
+
+def test_where_a_face_points_is_taken_across_its_axis() -> None:
+    """A middle that is stated half a thousandth off is brought across the axis, not further off."""
+    axis = np.array([0.0, 0.0, 1.0])
+    assert _across((1.0, 0.0, 5e-4), axis, "part.toml") == pytest.approx([1.0, 0.0, 0.0], abs=1e-15)
+    with pytest.raises(InputError, match="a direction across the axis is needed"):
+        _across((1.0, 0.0, 2e-3), axis, "part.toml")

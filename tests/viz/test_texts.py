@@ -1,0 +1,175 @@
+"""What texts, tables and JSON objects say of small records whose numbers are known."""
+
+from __future__ import annotations
+
+import io
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from apo_bench import Correction, Observation
+from apo_bench.assembly import Consistency, Contact, PartFace, relation_graph
+from apo_bench.geometry import pose
+from apo_bench.perception.detection.evidence import Evidence, Recognised, Rival
+from apo_bench.perception.detection.thresholds import PairThresholds
+from apo_bench.perception.observation.fitting.fit import fit_noise, goodness_of_fit
+from apo_bench.simulation.arms.finding import find_arm
+from apo_bench.viz.arm_text import list_line
+from apo_bench.viz.correct_text import correction_form, correction_lines, correction_tables
+from apo_bench.viz.fit_text import fit_form, fit_lines
+from apo_bench.viz.graph.text import graph_form, graph_lines
+from apo_bench.viz.recognised_text import confidence_lines, difference_lines, evidence_table, recognition_form
+from tests import bop_made, scenes
+
+ON_TABLE = Contact(PartFace("castle1", "bottom"), PartFace("table", "top"))
+BESIDE = Contact(PartFace("castle1", "py"), PartFace("table", "top"))
+ALLOWED = PairThresholds(0.003, np.radians(4.0))
+
+
+def evidence_of(contact: Contact, made: int = 0) -> Evidence:
+    """Seen 1.5 mm apart, 0.2 mm inside each other when it was taken, at 0.5 degrees, over a quarter of a face."""
+    return Evidence(contact, made, -2e-4, np.radians(0.5), 0.25, ALLOWED, 1.5e-3)
+
+
+def tower() -> Observation:
+    scene = scenes.stick_in_tower()
+    return scenes.seen(scene, scene.goals)
+
+
+def table_lines(table: object) -> list[list[str]]:
+    """The words of every line of a table of `rich`."""
+    out = io.StringIO()
+    Console(file=out, width=300).print(table)
+    return [line.split() for line in out.getvalue().splitlines()]
+
+
+def corrected(observation: Observation, **changes: object) -> Correction:
+    """Everything as seen but the second goal, 3 mm along its own x and turned by 2 degrees about its own z."""
+    goals = np.array(observation.goals)
+    goals[1] = goals[1] @ pose.at((0.003, 0.0, 0.0), (0.0, 0.0, 2.0))
+    correction = Correction(goals, "converged", "all contacts are made", (2, 1, 0), 4e-3, 1e-9, 13)
+    return replace(correction, **changes)  # type: ignore[arg-type]
+
+
+def test_evidence_is_shown_and_written_in_millimetres_and_degrees() -> None:
+    observation = tower()
+    evidence = (evidence_of(ON_TABLE), evidence_of(BESIDE))
+    recognised = Recognised(observation.assembly, evidence, 0.75, Rival(observation.assembly, 0.25))
+    form = recognition_form("tower", "recognised", observation, recognised, False)
+    _, right, wrong = table_lines(evidence_table(form))
+    numbers = ["1.50", "-0.20", "3.00", "0.50", "4.00", "25%"]
+    assert right == ["1", "castle1.bottom", "table.top", *numbers, "True"]
+    assert wrong == ["1", "castle1.py", "table.top", *numbers, "False"]
+    first, second = form["contacts"]
+    assert (first["operation"], first["in_scenario"], second["in_scenario"]) == (1, True, False)
+    assert len(form["missed"]) == len(observation.assembly.relations()) - 1
+    assert {"operation": 1, "manipulated": "castle1.bottom", "environment": "table.top"} not in form["missed"]
+    assert form["next"] == {"probability": 0.25, "with": [], "without": []}
+    json.dumps(form, allow_nan=False)
+
+
+def test_a_set_of_contacts_that_is_not_likely_is_called_not_certain() -> None:
+    observation = tower()
+    solids = list(observation.assembly.solids.values())
+    fewer = scenes.scene(solids, observation.assembly.operations[:2], scenes.stick_in_tower().goals[:2])
+    recognised = Recognised(observation.assembly, (), 0.75, Rival(fewer.assembly, 0.25))
+
+    def said(recognised: Recognised) -> list[str]:
+        return confidence_lines(recognition_form("tower", "recognised", observation, recognised, False))
+
+    (line,) = said(recognised)
+    assert line.startswith("not certain: this set of contacts is right with probability 0.75")
+    assert "the next (0.25) is without 3: stick." in line
+    assert said(replace(recognised, probability=0.95, rival=None))[0].startswith("this set")
+    assert said(replace(recognised, probability=None)) == []
+
+
+def test_contacts_that_were_missed_are_named() -> None:
+    observation = tower()
+    every = tuple(evidence_of(r.contact, r.made) for r in observation.assembly.relations())
+    fewer = scenes.scene(list(observation.assembly.solids.values()), observation.assembly.operations[:1], [np.eye(4)])
+    forms = [
+        recognition_form("tower", "recognised", observation, recognised, False)
+        for recognised in (Recognised(observation.assembly, every), Recognised(fewer.assembly, every[:1]))
+    ]
+    assert difference_lines(forms[0]) == [f"all {len(every)} contacts of the scenario were recognised, and no other"]
+    first, *missed = difference_lines(forms[1])
+    assert first.startswith(f"1 of the {len(every)} contacts")
+    assert len(missed) == len(every) - 1
+    assert missed[0].startswith("missed: 2: castle2.")
+
+
+def test_residuals_of_a_graph_are_said_with_what_is_above_the_gap() -> None:
+    graph = relation_graph(scenes.pockets().assembly, 6)
+    lines = graph_lines("pockets", graph, [None, *([2e-3] * 7), 5e-5], 1e-4)
+    arcs = [line for line in lines if line.startswith("R")]
+    assert arcs[0].endswith("not seen")
+    assert all(line.endswith("2.000 mm, above 0.1") for line in arcs[1:8])
+    assert arcs[8].endswith("0.050 mm")
+    assert "made 1, lost at 4" in arcs[0]
+    assert [line.split("  ")[0] for line in lines if line.endswith("moved on")] == [
+        "cube1 (1): T1",
+        "cube2 (2): T2",
+        "cube3 (3): T3",
+    ]
+    form = graph_form("pockets", graph, [None, *([2e-3] * 7), 5e-5])
+    assert [arc["residual_mm"] for arc in form["arcs"]] == [None, *([2.0] * 7), 0.05]
+    assert [node["stands"] for node in form["nodes"]] == [True, False, False, False, True, True, True, True]
+
+
+def test_a_correction_is_said_with_how_far_it_moved_each_goal() -> None:
+    observation = tower()
+    form = correction_form("tower", "contact", observation, corrected(observation), None, False)
+    (poses,) = correction_tables(form)
+    moved = [row[-2:] for row in table_lines(poses)[1:]]
+    assert moved == [["0.000", "0.000"], ["3.000", "2.000"], ["0.000", "0.000"]]
+    second = form["operations"][1]
+    assert (second["operation"], second["part"]) == (2, "castle2")
+    assert (second["moved_mm"], second["turned_deg"]) == (pytest.approx(3.0), pytest.approx(2.0))
+    assert (form["gap_before_mm"], form["gap_after_mm"]) == (pytest.approx(4.0), pytest.approx(1e-6))
+
+
+def test_infinite_numbers_of_a_correction_are_null() -> None:
+    """JSON knows none: readers of other languages stop at `Infinity`."""
+    observation = tower()
+    test = Consistency(np.inf, 13, 0.0, 0.01)
+    failed = corrected(observation, status="inconsistent", gap_before_m=np.inf, test=test)
+    form = correction_form("tower", "contact", observation, failed, None, False)
+    assert (form["gap_before_mm"], form["gap_after_mm"], form["operations"]) == (None, None, None)
+    assert form["test"]["chi_square"] is None
+    json.dumps(form, allow_nan=False)
+    assert dict(correction_lines(failed, None))["test"].endswith("the contacts contradict each other")
+
+
+def test_estimates_left_over_are_counted_per_image(tmp_path: Path) -> None:
+    from apo_bench.formats.bop import read_results
+    from apo_bench.formats.bop_truth import read_truth
+    from apo_bench.perception.observation.models.residuals import match_residuals
+
+    drawn = bop_made.draw(600, bop_made.Known(), np.random.default_rng(5))
+    estimates, truth = bop_made.files(tmp_path, drawn)
+    found = estimates.read_text(encoding="utf-8").splitlines()
+    absent = [",".join([*line.split(",")[:2], "77", *line.split(",")[3:]]) for line in found[1:61:5]]
+    estimates.write_text("\n".join([*found, *dict.fromkeys(absent)]) + "\n", encoding="utf-8")
+    seen = read_results(estimates)
+    residuals = match_residuals(seen, read_truth(truth, seen))
+    measured = fit_noise(residuals, "made")
+    figures = goodness_of_fit(residuals, measured)
+    form = fit_form(residuals, measured, figures)
+    assert (form["parts"], form["images"]) == (600, 120)
+    assert form["left_over"] == residuals.surplus > 0
+    said = dict(line.split("  ", 1) for line in fit_lines(form) if "  " in line)
+    assert said["left over"].strip() == str(residuals.surplus)
+    assert said["images"].strip() == "120"
+    json.dumps(form, allow_nan=False)
+
+
+def test_an_arm_is_listed_with_what_it_can_hold() -> None:
+    arm = find_arm("six_axis")
+    line = list_line("six_axis", arm)
+    assert line.startswith(f"six_axis: 6 joints, opens {2e3 * arm.opening_m:.1f} mm")
+    assert line.endswith(f"; {arm.control}")
